@@ -12,12 +12,16 @@ import msgspec
 from gridpeers.netem.fault_schedule import Change, FaultSchedule, schedule_of
 from gridpeers.netem.ledger import LinkCounts
 from gridpeers.netem.schema.pattern import Link, links_among
-from gridpeers.scenarios.emulation.link_data import EmulationConfig, LinkCommand, LinkStatus, data_of, words
+from gridpeers.scenarios.emulation.link_data import (
+    NO_MESSAGES,
+    EmulationConfig,
+    LinkCommand,
+    LinkStatus,
+    data_of,
+    words,
+)
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.wire.messages import LinkReport, LinkRequest
-
-NO_MESSAGES = LinkCounts(sent=0, duplicated=0, delivered=0, dropped={}, corrupted=0, in_flight=0)
-"""Counts of a link before its first message."""
 
 
 class LinkFaults:

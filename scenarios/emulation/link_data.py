@@ -65,6 +65,8 @@ class LinkStatus(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     """Counts of its messages so far; None if none was judged."""
 
 
+NO_MESSAGES = LinkCounts(sent=0, duplicated=0, delivered=0, dropped={}, corrupted=0, in_flight=0)
+
 encode_statuses = msgspec.msgpack.Encoder().encode
 
 _statuses = msgspec.msgpack.Decoder(dict[Name, LinkStatus])

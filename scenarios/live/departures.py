@@ -8,9 +8,6 @@ from dataclasses import dataclass, replace
 from math import inf
 from typing import NamedTuple
 
-from gridpeers.netem.models.loss import Bernoulli
-from gridpeers.netem.schema.fault import Span
-from gridpeers.netem.schema.pattern import Link
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.equipment.connectivity import switch_names
 from gridpeers.plant.equipment.named_loads import load_name, named_loads
@@ -19,64 +16,17 @@ from gridpeers.scenarios.results.event_windows import Window, as_they_came, wind
 from gridpeers.scenarios.results.island_membership import is_closed
 from gridpeers.scenarios.results.steadiness import STEADY
 from gridpeers.scenarios.schema import ScenarioModel
-from gridpeers.scenarios.schema.participants import netem_of, setup_of
-from gridpeers.wire.messages import PLANT, PlantEvent
+from gridpeers.scenarios.schema.participants import LISTS, netem_of
+from gridpeers.wire.messages import PlantEvent
+
+_SILENCE = re.compile(r"\S+ (is silent:|does not hear )")
+_AGAIN = re.compile(r"\S+ (is heard again|hears .* again)")
 
 _NOTICED = 1.0
 """Time (s) after the end of a fault until which a silence is its doing: states have to come and to be reported."""
 
-_RECOVERED = 10.0
-"""Time (s) after a pause until which its links may yet have to be made anew."""
-
-_RARE = 0.3
-"""Probability of independent losses at which a dozen in a row come once in two million."""
-
-_SILENT = re.compile(r"\S+ is silent: (?:.* (no measurement))?")
-_DEAF = re.compile(r"\S+ does not hear ([^:]+):")
-_AGAIN = re.compile(r"\S+ (is heard again|hears .* again)")
-
-
-class ExpectedSilence:
-    """Recognise silences (`gridpeers.plant.realtime.silence_detector`) that the scenario's one case causes itself."""
-
-    def __init__(self, scenario: ScenarioModel, feeder: Feeder) -> None:
-        (case,) = scenario.cases
-        setup = setup_of(netem_of(scenario, case), scenario, feeder, real_nodes=True)
-        self._netem, self._microgrids = setup.netem, setup.microgrids
-
-    def __call__(self, event: PlantEvent) -> bool:
-        """Return whether an event ends a silence, or begins one that a fault of the scenario causes."""
-        if _AGAIN.match(event.text):
-            return True
-        name, t = event.subject, event.t
-        if match := _SILENT.match(event.text):
-            return self._hurt(name, t) or (bool(match[1]) and self._cut_off(PLANT, name, t))
-        if match := _DEAF.match(event.text):
-            others = match[1].split(", ")
-            return self._hurt(name, t) or all(self._hurt(one, t) or self._cut_off(one, name, t) for one in others)
-        return False
-
-    def _hurt(self, name: str, t: float) -> bool:
-        """Whether an agent is paused, slow or dead at t (s), or was shortly before."""
-        return any(
-            node.name == name
-            and (node.kill or node.pause or node.slow_s > 0.0)
-            and node.from_s <= t < (inf if node.to_s is None else node.to_s + _RECOVERED)
-            for node in self._netem.nodes
-        )
-
-    def _cut_off(self, src: str, dst: str, t: float) -> bool:
-        """Whether a fault that can keep back all messages acts on a link at t (s) or shortly before."""
-        spans = self._netem.spans(Link(src, dst), self._microgrids)
-        return any(_silences(span) and span.from_s <= t < span.to_s + _NOTICED for span in spans)
-
-
-def _silences(span: Span) -> bool:
-    """Whether a fault can keep back or delay a dozen messages one after the other."""
-    if isinstance(span.model, Bernoulli):
-        return span.model.p > _RARE
-    return span.kind not in ("duplicate", "corrupt")
-
+_SHOWN = 3
+"""Most departures in a note; metrics.json has all of them."""
 
 NEAR = 1e-9
 """Times (s) that differ by less are the same: they are multiples of the plant's step."""
@@ -87,7 +37,6 @@ class LiveWindows:
     """The windows of a live run, each kind in the order of time."""
 
     measured: tuple[Window, ...]
-    """Windows with numbers: each lasts to the next event, of the scenario or live."""
     too_short: tuple[Window, ...]
     """Windows that the next event ended before the values could be steady."""
     not_reached: tuple[Window, ...]
@@ -104,9 +53,8 @@ def live_windows(
 ) -> LiveWindows:
     """Return the windows of a live run that ended at a time (s), given label and time (s) of its live events in order.
 
-    A live event opens a window as the scenario's events do, and ends the one before it. Its own window lasts to the
-    next event or to the end of the run. A switch operated at the moment of an event of the scenario belongs to the
-    window of that event. `missing` has the times (s) of the rows before and after each interval without rows.
+    A live event opens a window, which lasts to the next event or to the end of the run, and ends the one before it. At
+    the moment of an event of the scenario it belongs to the window of that event.
     """
     meant = windows([(event.label, event.t_s) for event in scenario.events], scenario.time.end_s)
     scripted = windows(as_they_came(scenario, events), scenario.time.end_s)
@@ -139,10 +87,6 @@ def live_windows(
     )
 
 
-_SHOWN = 3
-"""Most departures in a note; metrics.json has all of them."""
-
-
 def few(lines: Sequence[str]) -> str:
     more = f", and {len(lines) - _SHOWN} more (metrics.json)" if len(lines) > _SHOWN else ""
     return f"{'; '.join(lines[:_SHOWN])}{more}"
@@ -154,8 +98,7 @@ class Departures:
 
     events: tuple[PlantEvent, ...]
     disturbed: tuple[Window, ...]
-    """Measured windows of the scenario, as it means them, that end after the first departure or miss rows: the plant
-    remembers whatever happened to it."""
+    """Measured windows of the scenario that end after the first departure, or miss rows."""
     windows: LiveWindows
     live: Mapping[str, str]
     """By label, the operations of each event that people made."""
@@ -183,9 +126,8 @@ class _Due(NamedTuple):
     until: float
     """Times (s) between which it may happen."""
     complaint: str = ""
-    """Text of the departure if it does not happen; "" if it need not."""
+    """Text of the departure if it has not happened by the deadline (s); "" if it need not."""
     deadline: float = inf
-    """From when (s) on it is missing."""
 
 
 def compare(
@@ -204,7 +146,6 @@ def compare(
     commands = (event for event in events if event.kind == "link" and event.subject == "links")
     departures = sorted((*switched, *_moved(scenario, feeder, events, meant, ended), *commands), key=lambda one: one.t)
     first = departures[0].t if departures else ended
-    # label and time (s) of what people did on switches and loads; at one step it is one event
     live = tuple((f"live at {round(t, 3):.12g} s", t) for t in dict.fromkeys(event.t for event in switched))
     opened = live_windows(scenario, events, live, ended, missing)
     measured = {window.label for window in opened.measured}
@@ -224,27 +165,20 @@ def compare(
 def _switched(scenario: ScenarioModel, feeder: Feeder, events: Iterable[PlantEvent]) -> Iterator[PlantEvent]:
     """Yield the switches that people operated and the loads that they set; opening an open switch changes nothing."""
     switches, loads = switch_names(feeder), named_loads(feeder)
-    timeout = scenario.plant.sync_check.timeout
-    planned = [
-        (f"switch {closes}", switches[name], event.t_s, event.t_s + (timeout if closes and event.synchronised else 0.0))
-        for event in scenario.events
-        for names, closes in ((event.open, False), (event.close, True))
-        for name in names
-    ]
-    planned += [
-        ("load", load_name(loads, text), event.t_s, event.t_s) for event in scenario.events for text in event.load
-    ]
-    for event in events:
-        if event.kind not in ("switch", "load") or event.text.endswith(" already"):
+    planned: list[tuple[object, str, float, float]] = []
+    for event in scenario.events:
+        latest = event.t_s + (scenario.plant.sync_check.timeout if event.synchronised else 0.0)
+        planned += [(False, switches[name], event.t_s, event.t_s) for name in event.open]
+        planned += [(True, switches[name], event.t_s, latest) for name in event.close]
+        planned += [("load", load_name(loads, text), event.t_s, event.t_s) for text in event.load]
+    for came in events:
+        if came.kind not in ("switch", "load") or came.text.endswith(" already"):
             continue
-        if event.kind == "switch":
-            done = f"switch {is_closed(event)}", switches.get(event.subject, event.subject)
-        else:
-            done = "load", event.subject
-        if not any(
-            done == (what, name) and since - NEAR < event.t < until + NEAR for what, name, since, until in planned
-        ):
-            yield event
+        done: tuple[object, str] = ("load", came.subject)
+        if came.kind == "switch":
+            done = is_closed(came), switches.get(came.subject, came.subject)
+        if not any(done == (*what,) and since - NEAR < came.t < until + NEAR for *what, since, until in planned):
+            yield came
 
 
 def _moved(
@@ -252,11 +186,17 @@ def _moved(
 ) -> Iterator[PlantEvent]:
     """Yield the agents that joined, left or died against the scenario, and those that should have and did not."""
     due = [*_due(scenario, meant)]
-    expected = ExpectedSilence(scenario, feeder)
+    (case,) = scenario.cases
+    netem = netem_of(scenario, case)
+    faults = [entry for entries in LISTS for entry in getattr(netem, entries.name)]
     first = {row.name for row in feeder.inverters}
     for event in events:
-        if event.kind != "roster" or expected(event):
+        if event.kind != "roster" or _AGAIN.match(event.text):
             continue
+        if _SILENCE.match(event.text) and any(
+            fault.from_s <= event.t < (inf if fault.to_s is None else fault.to_s + _NOTICED) for fault in faults
+        ):
+            continue  # a fault of the scenario may silence agents
         match = re.match(rf"{re.escape(event.subject)} (joined|left|died)", event.text)
         verb = match[1] if match else ""
         if event.t == 0.0 and verb and event.subject in first:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import platform
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
 from typing import NamedTuple
@@ -20,14 +21,7 @@ from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.scenarios.emulation.link_data import LinkCommand
 from gridpeers.scenarios.live.run_address import UsageError
 from gridpeers.scenarios.record.record_info import LIVE, RecordInfo
-from gridpeers.scenarios.results.run_files import (
-    FolderError,
-    new_folder,
-    refusal,
-    set_broken,
-    shown,
-    write_whole,
-)
+from gridpeers.scenarios.results.run_files import FolderError, new_folder, refusal, set_broken, shown, write_whole
 from gridpeers.scenarios.schema.participants import LISTS, inverters_of, netem_of
 from gridpeers.scenarios.schema.scenario_model import LONGEST_RUN, ScenarioModel
 from gridpeers.scenarios.schema.scenario_writing import to_toml, toml_lines
@@ -40,41 +34,34 @@ from gridpeers.wire.timing import rounded_up
 def ended_scenario(scenario: ScenarioModel, ended: float) -> tuple[ScenarioModel, tuple[str, ...]]:
     """Return the scenario of a live run of one case with its true end (s), and sentences for the head of its file.
 
-    What would come at or after the end is left out, as no scenario may have it: events, and faults of links and nodes.
+    Events and faults that would come at or after the end are left out, as no scenario may have them.
     """
-    begun = scenario.time.end_s
     end = min(rounded_up(ended, scenario.time.T_c_s), LONGEST_RUN)
     reached = tuple(event for event in scenario.events if event.t_s < end)
-    missed = [f'"{event.label}" at {event.t_s:g} s' for event in scenario.events[len(reached) :]]
     labels = {event.label for event in reached}
 
     def begun_by_then(netem: Netem) -> Netem:
         entries = {one.name: tuple(it for it in getattr(netem, one.name) if it.from_s < end) for one in LISTS}
         return replace(netem, **entries)
 
-    cases = {
-        name: replace(
-            case,
-            P_max_kW={label: powers for label, powers in case.P_max_kW.items() if label in labels},
-            netem=begun_by_then(case.netem),
-        )
-        for name, case in scenario.cases.items()
-    }
+    ((name, case),) = scenario.cases.items()
+    P_max_kW = {label: powers for label, powers in case.P_max_kW.items() if label in labels}
+    now = replace(case, P_max_kW=P_max_kW, netem=begun_by_then(case.netem))
     changed = replace(
         scenario,
         time=replace(scenario.time, end_s=end),
         events=reached,
         netem=begun_by_then(scenario.netem),
-        cases=cases,
+        cases={name: now},
     )
     remarks = [f"A live run: what people did in it is in events.csv and run.mcap. It lasted {ended:.2f} s."]
-    if end != begun:
-        remarks.append(f"So end_s is {end:g}, where the scenario it began with had {begun:g}.")
+    if end != scenario.time.end_s:
+        remarks.append(f"So end_s is {end:g}, where the scenario it began with had {scenario.time.end_s:g}.")
     if ended > LONGEST_RUN:
         remarks.append(f"No scenario may be longer than {LONGEST_RUN:g} s.")
-    if missed:
+    if missed := [f'"{event.label}" at {event.t_s:g} s' for event in scenario.events[len(reached) :]]:
         remarks.append(f"Events that it did not reach are left out: {', '.join(missed)}.")
-    if changed.netem != scenario.netem or any(cases[name].netem != case.netem for name, case in scenario.cases.items()):
+    if (changed.netem, now.netem) != (scenario.netem, case.netem):
         remarks.append("Faults of links and nodes that it did not reach are left out.")
     return changed, tuple(remarks)
 
@@ -86,22 +73,17 @@ class Folders(NamedTuple):
     whole: Path | None = None
 
 
-AS_BEGUN = "A live run begins with it; how long it lasted, and what people did, is in events.csv and run.mcap."
-
-
 @contextmanager
 def folders(out: Path | None, scenario: ScenarioModel) -> Iterator[Folders]:
-    """Make the folders of a run, as `--out` says.
-
-    FolderError if the folder has something in it, is a file, or cannot be made or written.
-    """
+    """Make the folders of a run, as `--out` says; FolderError if the folder is not new, or cannot be written."""
     if out is None:
         with tempfile.TemporaryDirectory(prefix="gridpeers-") as logs:
             yield Folders(Path(logs))
         return
     whole = new_folder(out, scenario.name, datetime.now().astimezone())
+    begun = "A live run begins with it; how long it lasted, and what people did, is in events.csv and run.mcap."
     try:
-        write_scenario(whole, scenario, [AS_BEGUN])
+        write_scenario(whole, scenario, [begun])
         (whole / "log").mkdir()
     except OSError as error:
         why = refusal(whole, error)
@@ -118,7 +100,7 @@ def write_scenario(folder: Path, scenario: ScenarioModel, remarks: Iterable[str]
 def live_record(
     scenario: ScenarioModel, plant: PlantConfig, agents: tuple[AgentConfig, ...], inverters: tuple[str, ...]
 ) -> RecordInfo:
-    """Return what the record of a live run says about it; the scenario has the one case that runs."""
+    """Return the head of a live run's record; the scenario has the one case that runs."""
     (case,) = scenario.cases
     return RecordInfo(
         level=plant.record,
@@ -135,15 +117,6 @@ def live_record(
     )
 
 
-LINKS_ALONE = (
-    "A live run's links, which people changed: agents, switches and loads that they changed are not in it (events.csv)."
-)
-
-COMMANDS_PER_NEW_ONE = 10
-"""The file is written anew once a new command has come for every ten that it has, so after each of the first twenty: to
-write it takes as long as there are commands, of which an hour has hundreds."""
-
-
 class LinkLog:
     """Keep the link commands of a run of one case, and write the scenario that replays them.
 
@@ -158,29 +131,7 @@ class LinkLog:
         self._replay, self._replay_if_changed = replay, replay_if_changed
         self._commands: dict[int, Change] = {}
         self._due = 1
-        """Number of commands with which the file is next written."""
-        self._closed = False
-
-    @contextmanager
-    def claimed(self) -> Iterator[None]:
-        """Make the file of `--record` for a run, so that no other takes it; remove it again if the run does not begin.
-
-        It is a scenario from the beginning, for a run that is killed. UsageError if it exists, or cannot be made.
-        """
-        file, begun = self._replay, False
-        if file is None:
-            yield
-            return
-        try:
-            with _writable(file):
-                file.touch(exist_ok=False)
-                begun = True
-                self._write_replay(0.0)
-            yield
-        except BaseException:
-            if begun and not (self._closed or self._commands):
-                file.unlink(missing_ok=True)
-            raise
+        """Number of commands with which the file is next written: to write it takes as long as there are commands."""
 
     @property
     def changes(self) -> tuple[Change, ...]:
@@ -190,19 +141,19 @@ class LinkLog:
         self._commands[message.seq] = LinkCommand.of_tree(message.link_command).at(message.t)
         count = len(self._commands)
         if count >= self._due:
-            self._due = count + max(1, count // COMMANDS_PER_NEW_ONE)
-            self._write_replay(message.t)
+            self._due = count + max(1, count // 10)
+            self._write(message.t)
 
     def close(self, t: float) -> list[str]:
         """Write the scenario at the end of a run that reached t (s); return lines for the terminal."""
-        self._write_replay(t)
-        self._closed = True
-        file = self._replay or (self._replay_if_changed if self._commands else None)
-        return [] if file is None else [f"the links as they were: {command_line('run', shown(file))}"]
+        files = self._write(t)
+        return [f"the links as they were: {command_line('run', shown(files[0]))}"] if files else []
 
-    def _write_replay(self, t: float) -> None:
-        for file in filter(None, [self._replay, self._replay_if_changed if self._commands else None]):
+    def _write(self, t: float) -> list[Path]:
+        files = list(filter(None, [self._replay, self._replay_if_changed if self._commands else None]))
+        for file in files:
             write_whole(file, replay_lines(self._scenario, self._feeder, self.changes, t))
+        return files
 
 
 def replay_lines(scenario: ScenarioModel, feeder: Feeder, changes: Sequence[Change], t: float) -> Iterator[str]:
@@ -229,30 +180,21 @@ def replay_lines(scenario: ScenarioModel, feeder: Feeder, changes: Sequence[Chan
         cases={name: replace(case, netem=Netem(), degraded_communication=ages)},
     )
     as_run = {"driver": LIVE, "python": platform.python_version()}
-    return toml_lines(replay, as_run, [LINKS_ALONE], links=replayed(netem, changes, microgrids))
+    links_alone = (
+        "A live run's links, which people changed: agents, switches and loads that they changed are not in it "
+        "(events.csv)."
+    )
+    return toml_lines(replay, as_run, [links_alone], links=replayed(netem, changes, microgrids))
 
 
 def check_new(file: Path | None) -> None:
-    """Raise UsageError if the file of `--record` is there already, or cannot be made where it is to be."""
+    """Raise UsageError if the file of `--record` exists, or cannot be made."""
     if file is None:
         return
-    with _writable(file):
-        if file.exists():
-            raise FileExistsError
-        if not file.absolute().parent.is_dir():
-            raise UsageError(f"--record {file}: there is no folder {file.parent}; make it first")
-        with suppress(FileExistsError):  # what another run was killed at
-            trial = file.with_name(f"{file.name}.partial")
-            trial.touch(exist_ok=False)
-            trial.unlink()
-
-
-@contextmanager
-def _writable(file: Path) -> Iterator[None]:
-    """Raise UsageError for what the system says of a file that is to be made."""
-    try:
-        yield
-    except FileExistsError:
-        raise UsageError(f"--record {file}: is there already; move it, or give another name") from None
-    except OSError as error:
-        raise UsageError(f"--record {file}: cannot be written: {error.strerror}; give another name") from None
+    folder = file.absolute().parent
+    if file.exists():
+        raise UsageError(f"--record {file}: already exists; move it, or give another name")
+    if not folder.is_dir():
+        raise UsageError(f"--record {file}: there is no folder {file.parent}; make it first")
+    if not os.access(folder, os.W_OK):
+        raise UsageError(f"--record {file}: cannot be written: {file.parent} is not yours; give another name")

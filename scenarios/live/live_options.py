@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import msgspec
+from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Feeder, InverterRow
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.scenarios.drivers.free_endpoint import ListenError, free_endpoint
 from gridpeers.scenarios.live.feeder_map import feeder_map
@@ -42,32 +41,28 @@ LOOKING = 1.5
 def endpoint_for_run(listen: str, credentials: Credentials | None = None, access: Access | None = None) -> str:
     """Return the endpoint where a plant will be able to listen, a free port for port 0.
 
-    UsageError if it is no endpoint, or another run is there, which is asked with these credentials and named with the
-    commands of this access; ListenError if it cannot be listened on.
+    UsageError if it is no endpoint, or another run is there; ListenError if it cannot be listened on.
     """
     try:
         return free_endpoint(check_endpoint("--listen", listen), option="--listen")
     except ListenError as error:
         where = loopback_of(listen)
-        there = runs_at(where, credentials) if error.in_use and accepting((where,)) else []
+        if not (error.in_use and accepting((where,))):
+            raise
+        with RunClient(RunAddress(run=RUN, connect=(where,), credentials=credentials)) as client:
+            client.until(lambda: bool(client.runs), LOOKING)
+            there = sorted(client.runs)
         if not there:
             raise
         found_by = RunAddress(run=there[0], connect=(where,), access=access or Access()).words
         status, down = command_line("status", *found_by), command_line("down", *found_by)
         beside = next_port(listen)
-        other = loopback_of(beside)
         raise UsageError(
             f"--listen: {' and '.join(f'run {name}' for name in there)} is there already, at {where}; "
             f"{status} shows it, {down} ends it; to have both, give this one a name and "
-            f"a port of its own (--run NAME --listen {beside}; its other commands --run NAME --connect {other})"
+            f"a port of its own (--run NAME --listen {beside}; its other commands --run NAME --connect "
+            f"{loopback_of(beside)})"
         ) from None
-
-
-def runs_at(endpoint: str, credentials: Credentials | None = None) -> list[str]:
-    """Return the names of the runs whose plants are at an endpoint, as far as they show within `LOOKING` seconds."""
-    with RunClient(RunAddress(run=RUN, connect=(endpoint,), credentials=credentials)) as client:
-        client.until(lambda: bool(client.runs), LOOKING)
-        return sorted(client.runs)
 
 
 def check_alone(
@@ -97,7 +92,7 @@ class LiveOptions(msgspec.Struct, frozen=True, kw_only=True):
     recorded: bool = False
     secured: bool = False
     strict: bool = False
-    """Whether the run breaks when the plant cannot keep pace."""
+    """The run breaks when the plant cannot keep pace."""
 
 
 def chosen_case(scenario: ScenarioModel, case: str) -> str:
@@ -132,16 +127,14 @@ def configure(
     links = plant.links or setup_of(netem_of(scenario, case), scenario, feeder, real_nodes=True).to_tree()
     level: RecordLevel = scenario.record if options.recorded else "physics"
     live = {"run": options.run, "clock": "wall", "speed": options.speed, "links": links, "record": level}
-    first = [agent for agent in agents if agent.name in plant.agents]
-    everyone = tuple(
-        msgspec.structs.replace(agent, **live, deadline=0.0) for agent in (*first, *_spares(feeder, agents[0]))
-    )
+    first = [replace(agent, **live, deadline=0.0) for agent in agents if agent.name in plant.agents]
+    everyone = (*first, *(_spare(row, first[0]) for row in feeder.spares))
     end = None if options.duration is None else max(1, round(options.duration / plant.T_c)) * plant.T_c
-    diagram = msgspec.structs.replace(feeder_map(as_in(scenario, feeder)), scenario=scenario.name, case=case)
-    plant = msgspec.structs.replace(
+    diagram = replace(feeder_map(as_in(scenario, feeder)), scenario=scenario.name, case=case)
+    plant = replace(
         plant,
         **live,
-        settings=msgspec.structs.replace(plant.settings, spares=tuple(row.name for row in feeder.spares)),
+        settings=replace(plant.settings, spares=tuple(row.name for row in feeder.spares)),
         schedule=(),  # in a live run, people let agents leave and join
         end=end,
         connect=beyond,
@@ -156,23 +149,12 @@ def configure(
 def manual_node_faults(scenario: ScenarioModel) -> str:
     """Return a note on the faults that people have to inject into processes of their own; "" if there are none."""
     (case,) = scenario.cases
-    nodes = [node for node in netem_of(scenario, case).nodes if node.kill or node.pause]
-    if not nodes:
-        return ""
-    names = ", ".join(dict.fromkeys(node.name for node in nodes))
-    return f"[[node]] of {names}: agents in other terminals are killed and paused by you (kill -KILL, -STOP, -CONT)"
+    names = ", ".join(dict.fromkeys(node.name for node in netem_of(scenario, case).nodes if node.kill or node.pause))
+    note = f"[[node]] of {names}: agents in other terminals are killed and paused by you (kill -KILL, -STOP, -CONT)"
+    return note if names else ""
 
 
-def _spares(feeder: Feeder, like: AgentConfig) -> Iterator[AgentConfig]:
-    """Yield the configurations of the spare inverters' agents: as the others', but for the nameplate."""
-    for row in feeder.spares:
-        yield msgspec.structs.replace(
-            like,
-            name=row.name,
-            kind=row.kind,
-            microgrid=row.microgrid,
-            P_rated=row.P_rated,
-            V_nom=row.V_nom,
-            m_p=row.m_p,
-            m_q=row.m_q,
-        )
+def _spare(row: InverterRow, like: AgentConfig) -> AgentConfig:
+    """Return the configuration of a spare inverter's agent: as another's, but for the nameplate."""
+    fields = ("name", "kind", "microgrid", "P_rated", "V_nom", "m_p", "m_q")
+    return replace(like, **{name: getattr(row, name) for name in fields})

@@ -1,4 +1,4 @@
-"""Run a plant, an agent, or both together, from the terminal in which they were started."""
+"""Run a plant, an agent, or both together, from the terminal where they were started; say and record what happens."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import logging
 import re
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic
@@ -22,19 +22,21 @@ from gridpeers.plant.realtime.pacer import sentence
 from gridpeers.scenarios.drivers.children import Child
 from gridpeers.scenarios.drivers.forking import release
 from gridpeers.scenarios.drivers.supervisor import Supervisor
-from gridpeers.scenarios.drivers.telemetry_client import with_recorder
+from gridpeers.scenarios.drivers.telemetry_client import RECORDER, TelemetryClient, with_recorder
+from gridpeers.scenarios.drivers.telemetry_stream import Recordable
 from gridpeers.scenarios.emulation.emulated_links import links_of
 from gridpeers.scenarios.live.live_files import LinkLog
-from gridpeers.scenarios.live.live_recorder import LiveRecorder
-from gridpeers.scenarios.live.run_address import RunAddress, UsageError, is_loopback, loopback_of, return_path
+from gridpeers.scenarios.live.run_address import RunAddress, UsageError, far_hosts, loopback_of, return_path
 from gridpeers.scenarios.live.run_client import RunClient
+from gridpeers.scenarios.live.run_monitor import line_of
 from gridpeers.scenarios.live.run_requests import ANSWER, check_free, configuration, own_code
 from gridpeers.scenarios.record.record_info import RecordInfo
-from gridpeers.scenarios.results.record import Recorded
+from gridpeers.scenarios.results.record import Recorded, Recorder, RecordError
 from gridpeers.scenarios.short_texts import short
 from gridpeers.wire.driver.drive import StoppedError
 from gridpeers.wire.driver.ending import StopSignal, stop_at_signals
-from gridpeers.wire.messages import PLANT, Pacing, PlantEvent
+from gridpeers.wire.driver.machine import keep_out_of_the_heap
+from gridpeers.wire.messages import PLANT, LinkRequest, Pacing, PlantEvent, Telemetry
 from gridpeers.wire.timing import RateLimit
 from gridpeers.wire.wording import printable
 
@@ -49,6 +51,8 @@ UNHEARD = "the plant has ended, and nothing was ever heard of it here: no link t
 
 LEAVING = 5.0
 """Time (s) that processes have to close by themselves once the plant has."""
+
+_STOP = "stop"
 
 
 def say(line: str) -> None:
@@ -69,11 +73,132 @@ class ProcessOutcome:
     failed_laws: tuple[PlantEvent, ...] = ()
 
 
-def meaning(word: str, config: PlantConfig) -> str:
-    """Return a sentence for a line that the plant prints; "" for one that needs none.
+class LiveRecorder:
+    """Say the plant's events as they come, but for `silent` kinds, and feed the `Recorder` and `LinkLog` of the run.
 
-    It prints a word at each step of its start, and Zenoh's line for each TLS handshake that has failed.
+    It works in a thread of its own while its context lasts. The plant waits for it before the start and at the end, so
+    nothing of the run is missing. Without a folder there is no record.
     """
+
+    def __init__(
+        self,
+        config: PlantConfig,
+        folder: Path | None,
+        link_log: LinkLog,
+        record: RecordInfo,
+        *,
+        silent: Collection[str] = (),
+    ) -> None:
+        self._config, self._silent = config, silent
+        self._link_log: LinkLog | None = link_log
+        self._recorder = None if folder is None else Recorder(folder, gaps=True, record=record)
+        self.recorded: Recorded | None = None
+        """The record, once it is closed, if it is whole."""
+        self.failure = ""
+        """The first reason why something could not be recorded; "" if everything was."""
+        self.failed_laws: dict[str, PlantEvent] = {}
+        self.cut_short = ""
+        """Why the plant's last message does not come, if that is known."""
+        self._limit = RateLimit()
+        self.client: TelemetryClient
+        self._thread = threading.Thread(target=self._follow, daemon=True)
+
+    def __enter__(self) -> LiveRecorder:
+        keep_out_of_the_heap()
+        config, endpoint = self._config, loopback_of(self._config.listen[0])
+        self.client = TelemetryClient(RECORDER, config.run, endpoint, "wall", self._take, config.credentials)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Take in what has come, close the session, and give the files their names."""
+        self.client.say(_STOP)
+        self._thread.join()
+        self.client.close()
+        for line in (*self._limit.left_out(), *self.client.rejects.take_lines()):
+            say(line)
+        if self._link_log is not None:
+            try:
+                for line in self._link_log.close(self.client.t):
+                    say(line)
+            except OSError as error:
+                self._fail("the link commands cannot be written", error)
+        if self._recorder is not None:
+            try:
+                self._finish(self._recorder)
+            except (RecordError, OSError) as error:
+                self._fail("the record cannot be written", error)
+            self._recorder.close()
+
+    def note_crash(self, agent: str, end: str) -> None:
+        """Note that the process of an agent crashed, with how it ended in words; from any thread."""
+        self.client.say(f"{agent} {end}")
+
+    def _fail(self, what: str, why: object, consequence: str = "") -> None:
+        text = f"{what}: {getattr(why, 'strerror', None) or why}"
+        say(text + consequence)
+        self.failure = self.failure or text
+
+    def _finish(self, recorder: Recorder) -> None:
+        """Give the files their names; those of a record that is not whole keep the partial ones."""
+        if recorder.count < 2:
+            say("nothing was recorded, so there are no numbers")
+        elif not self.client.ended:
+            self._fail(f"the record ends at {recorder.ended:.2f} s", self.cut_short or "then no word came of the plant")
+        else:
+            self.recorded = recorder.finish(recorder.ended, recorder.record_step)
+            for line in self.recorded.link_lines:
+                say(line)
+
+    def _follow(self) -> None:
+        while not self.client.ended:
+            for word in self.client.take(None):
+                if word == _STOP:
+                    return
+                self.client.note_crash(*word.split(" ", 1))
+        self.client.close()  # with it goes the token: the plant knows that the last telemetry is here
+
+    def _take(self, message: Recordable) -> None:
+        """Say and record one message; an error in it must not end the recording of the others."""
+        on = "; the run goes on without it"
+        try:
+            if isinstance(message, LinkRequest) and self._link_log is not None:
+                try:
+                    self._link_log(message)
+                except OSError as error:
+                    self._fail(f"the link commands end at {self.client.t:.2f} s", error, on)
+                    self._link_log = None
+            if isinstance(message, Telemetry):
+                self._say_events(message)
+            if (recorder := self._recorder) is None:
+                return
+            known, sound = len(recorder.missing), not recorder.record_failure
+            try:
+                recorder(message)
+            except (RecordError, OSError) as error:
+                self._fail(f"the record ends at {recorder.ended:.2f} s", error, on)
+                self._recorder = None
+                recorder.close()
+            if sound and recorder.record_failure:
+                say(recorder.record_failure + on)
+            for before, after in recorder.missing[known:]:
+                say(f"rows between {before:.2f} and {after:.2f} s are missing: for so long no word came of the plant")
+        except Exception as error:
+            self.client.rejects.failed("telemetry", error)
+
+    def _say_events(self, telemetry: Telemetry) -> None:
+        for event in telemetry.events:
+            if event.kind == "law":
+                self.failed_laws.setdefault(event.subject, event)
+            if event.kind not in self._silent and (line := self._limit.admit(line_of(event), monotonic())) is not None:
+                say(line)
+        if telemetry.final:  # before the terminal says that the run has ended
+            for line in self._limit.left_out():
+                say(line)
+
+
+def meaning(word: str, config: PlantConfig) -> str:
+    """Return a sentence for a line that the plant prints at a step of its start, or for a refused link; or ""."""
     if word == COMPILING:
         return "the plant is being built; the very first time its inner loop is compiled, which takes some seconds"
     if word == READY:
@@ -94,11 +219,8 @@ def plant_here(config: PlantConfig, folder: Path | None, link_log: LinkLog, reco
         if word == COMPILING:  # the plant's log reports the rest
             say(meaning(word, config))
 
-    def run(recorder: LiveRecorder) -> str:
-        return run_plant(config, make_links=links_of, on_word=on_word)
-
-    recorder = LiveRecorder(config, say, folder, link_log, record, silent=LOGGED)
-    outcome = _follow(recorder, run, requests)
+    recorder = LiveRecorder(config, folder, link_log, record, silent=LOGGED)
+    outcome = _followed(recorder, lambda: run_plant(config, make_links=links_of, on_word=on_word), requests)
     if outcome.interrupted:  # else the plant has said it
         _say_end(recorder, config)
     return outcome
@@ -133,7 +255,7 @@ def all_here(
         if text and (line := limit.admit(text, monotonic())):
             say(line)
 
-    def run(recorder: LiveRecorder) -> str:
+    def run() -> str:
         with supervisor:
             supervisor.start(PLANT, *(agent.name for agent in agents if agent.name in config.agents))
             release()
@@ -151,8 +273,8 @@ def all_here(
 
     configs = [replace(agent, connect=(endpoint,), listen=listen) for agent in agents]
     supervisor = Supervisor(config, configs, logs, on_exit, on_word)
-    recorder = LiveRecorder(config, say, folder, link_log, record)
-    outcome = _follow(recorder, run, requests)
+    recorder = LiveRecorder(config, folder, link_log, record)
+    outcome = _followed(recorder, run, requests)
     _say_end(recorder, config)
     return outcome
 
@@ -162,10 +284,9 @@ def agent_here(
 ) -> ProcessOutcome:
     """Run agents in this process, in one session, with the configurations that the plant hands out, until they leave.
 
-    They wait for `wait` (s) for the plant and its answers. `listen` is where other agents connect; None takes any free
-    port, of all addresses if others can reach the plant. UsageError if the plant names code that does not come with
-    gridpeers, may be on another host, and is not trusted; NobodyError if there is no plant, no such inverter, or
-    another agent of it.
+    `listen` is where other agents connect; None takes any free port, of all addresses if others can reach the plant.
+    UsageError if a plant on another host names code that does not come with gridpeers, and is not trusted; NobodyError
+    if within `wait` (s) there is no plant, no such inverter, or another agent of it.
     """
     stop_at_signals(StoppedError)
     _log()
@@ -179,27 +300,25 @@ def agent_here(
             for name in names:
                 check_free(client, name)
         named = list(dict.fromkeys(code for config in configs for code in own_code(config)))
-        if named and not (trusts or is_loopback(where.connect)):
+        if named and not trusts and far_hosts(where.connect):
             raise UsageError(
                 f"{who}: the plant of {where} has its agents run {' and '.join(named)}, which is code of whoever runs "
                 "the plant; if you trust it, say --own-code"
             )
         listen = listen or return_path((*where.connect, *configs[0].connect))
-        process = tuple(
-            replace(config, connect=where.connect, listen=listen, credentials=where.credentials) for config in configs
-        )
-        return ProcessOutcome(broke=run_agents(process, links_of))
+        own = {"connect": where.connect, "listen": listen, "credentials": where.credentials}
+        return ProcessOutcome(broke=run_agents(tuple(replace(config, **own) for config in configs), links_of))
     except (StoppedError, KeyboardInterrupt) as stop:
         return ProcessOutcome(interrupted=_signal_of(stop))
 
 
-def _follow(recorder: LiveRecorder, run: Callable[[LiveRecorder], str], requests: StopSignal) -> ProcessOutcome:
+def _followed(recorder: LiveRecorder, run: Callable[[], str], requests: StopSignal) -> ProcessOutcome:
     """Run something with its recorder until it returns why it broke, or a signal ends it."""
     broke = interrupted = ""
     try:
         with recorder:
             try:
-                broke = run(recorder)
+                broke = run()
             except (StoppedError, KeyboardInterrupt) as stop:
                 if requests.requests > 1:
                     recorder.cut_short = f"{_signal_of(stop)} came again before the plant had ended"

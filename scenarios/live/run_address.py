@@ -14,6 +14,23 @@ from gridpeers.scenarios.drivers.free_endpoint import parse_endpoint
 from gridpeers.wire.keys import check_name as check_key_part
 from gridpeers.wire.trust.credentials import Credentials
 
+RUN = "gridpeers"
+
+ENDPOINT = "tcp/127.0.0.1:7447"
+"""Default endpoint where the plant listens and the others connect; 7447 is Zenoh's own port."""
+
+LONGEST_TIME = 1e9
+"""Longest time (s) of any option, some 30 years."""
+
+PROBE = 1.0
+"""Longest wait (s) for a TCP connection, to see if anything listens."""
+
+_PROTOCOLS = ("tcp", "tls", "quic", "udp")
+
+
+class UsageError(ValueError):
+    """An option or argument cannot be used; the message says what would be right."""
+
 
 @dataclass(frozen=True)
 class Access:
@@ -23,60 +40,13 @@ class Access:
     name: str = ""
     """Name of the member; the first that fits if empty."""
     insecure: bool = False
-    """Whether an endpoint that others reach may be open to everybody."""
+    """An endpoint that others reach may be open to everybody."""
 
     @property
     def words(self) -> list[str]:
-        """The options as they are typed, for a command that this one starts or names, but for its own name."""
+        """The options as they are typed, without the command's own name."""
         keys = [] if self.keys is None else ["--keys", str(self.keys)]
         return [*keys, *(["--insecure"] if self.insecure else [])]
-
-
-def objection(option: str, endpoint: str, *, keys: bool, insecure: bool) -> str:
-    """Return why an endpoint cannot be used with or without certificates; empty if it can."""
-    parsed = parse_endpoint(endpoint)
-    assert parsed is not None
-    if keys and parsed.protocol != "tls":
-        return f"{option}: {endpoint} is open, and --keys asks for TLS: write {parsed._replace(protocol='tls')}"
-    if not keys and parsed.protocol == "tls":
-        return f"{option}: {endpoint} needs certificates: say --keys DIR, the folder that gridpeers keys init has made"
-    if not (keys or insecure or is_loopback_host(parsed.host)):
-        return (
-            f"{option}: {endpoint} is not on this host's loopback, and without certificates whoever reaches it reads "
-            f"and commands the run: say --keys DIR and {parsed._replace(protocol='tls')} (docs/security.md), or "
-            "--insecure if you trust the network"
-        )
-    return ""
-
-
-def is_loopback_host(host: str) -> bool:
-    try:
-        return host == "localhost" or ip_address(host.strip("[]")).is_loopback
-    except ValueError:  # a name that only begins like an address, as anybody may register it
-        return False
-
-
-def with_protocol(endpoint: str, *, keys: bool, default: str) -> str:
-    """Return the default endpoint as it is with certificates; any other endpoint as it was typed."""
-    return endpoint.replace("tcp/", "tls/", 1) if keys and endpoint == default else endpoint
-
-
-RUN = "gridpeers"
-
-ENDPOINT = "tcp/127.0.0.1:7447"
-"""Default endpoint where the plant listens and the others connect; 7447 is Zenoh's own port."""
-
-LONGEST_TIME = 1e9
-"""Longest time (s) of any option, some 30 years; clocks do not reach much further."""
-
-PROBE = 1.0
-"""Longest wait (s) for a TCP connection, to see whether anything listens."""
-
-_PROTOCOLS = ("tcp", "tls", "quic", "udp")
-
-
-class UsageError(ValueError):
-    """An option or argument cannot be used; the message says what would be right."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,6 +78,28 @@ def address_of(run: str, connect: list[str] | None) -> RunAddress:
     )
 
 
+def objection(option: str, endpoint: str, *, keys: bool, insecure: bool) -> str:
+    """Return why an endpoint cannot be used with or without certificates; empty if it can."""
+    parsed = parse_endpoint(endpoint)
+    assert parsed is not None
+    tls = parsed._replace(protocol="tls")
+    if keys and parsed.protocol != "tls":
+        return f"{option}: {endpoint} is open, and --keys asks for TLS: write {tls}"
+    if not keys and parsed.protocol == "tls":
+        return f"{option}: {endpoint} needs certificates: say --keys DIR, the folder that gridpeers keys init has made"
+    if not (keys or insecure or is_loopback_host(parsed.host)):
+        return (
+            f"{option}: {endpoint} is not on this host's loopback, and without certificates whoever reaches it reads "
+            f"and commands the run: say --keys DIR and {tls} (docs/security.md), or --insecure if you trust the network"
+        )
+    return ""
+
+
+def with_protocol(endpoint: str, *, keys: bool, default: str) -> str:
+    """Return the default endpoint as it is with certificates; any other endpoint as it was typed."""
+    return endpoint.replace("tcp/", "tls/", 1) if keys and endpoint == default else endpoint
+
+
 def check_name(option: str, name: str) -> str:
     """Return the name of a run or an inverter, if it can be a part of a Zenoh key."""
     try:
@@ -126,11 +118,10 @@ def check_inverters(names: Sequence[str]) -> None:
         raise UsageError(f"INVERTER: {', '.join(twice)} is given twice; one agent controls an inverter")
 
 
-def check_wait(wait: float) -> float:
-    """Return a longest wait (s), if it is one; infinity waits for ever."""
+def check_wait(wait: float) -> None:
+    """Raise UsageError if a longest wait (s) cannot be one; infinity waits for ever."""
     if not wait >= 0.0:
         raise UsageError(f"--wait: must be a time of at least 0 s, got {wait:g} s")
-    return wait
 
 
 def check_duration(seconds: float | None) -> None:
@@ -140,10 +131,7 @@ def check_duration(seconds: float | None) -> None:
 
 
 def check_endpoint(option: str, text: str) -> str:
-    """Return an endpoint if Zenoh can use it, else raise UsageError.
-
-    For the option "--listen" port 0 stands for any free one.
-    """
+    """Return an endpoint if Zenoh can use it, else raise UsageError; port 0 is any free one, for "--listen" alone."""
     endpoint = parse_endpoint(text)
     if endpoint is None:
         host = re.fullmatch(r"(?:\w+/)?([\w.-]+)(?::(\d+))?", text)
@@ -159,35 +147,37 @@ def check_endpoint(option: str, text: str) -> str:
 
 def accepting(connect: tuple[str, ...]) -> tuple[str, ...]:
     """Return the endpoints that accept a TCP connection; the system accepts those to a stopped process in its stead."""
-    return tuple(text for text in connect if _accepts(text))
+    found = []
+    for text in connect:
+        endpoint = parse_endpoint(text)
+        if endpoint is not None and endpoint.connects:
+            try:
+                socket.create_connection((endpoint.host.strip("[]"), endpoint.port), PROBE).close()
+            except OSError:
+                continue
+            found.append(text)
+    return tuple(found)
 
 
-def _accepts(text: str) -> bool:
-    endpoint = parse_endpoint(text)
-    if endpoint is None or not endpoint.connects:
-        return False
+def is_loopback_host(host: str) -> bool:
     try:
-        with socket.create_connection((endpoint.host.strip("[]"), endpoint.port), PROBE):
-            return True
-    except OSError:
+        return host == "localhost" or ip_address(host.strip("[]")).is_loopback
+    except ValueError:  # a name that only begins like an address, as anybody may register it
         return False
+
+
+def far_hosts(connect: tuple[str, ...]) -> list[str]:
+    """Return the hosts of endpoints that are not on this host's loopback."""
+    hosts = [endpoint.host for text in connect if (endpoint := parse_endpoint(text))]
+    return [host for host in hosts if not is_loopback_host(host)]
 
 
 def return_path(connect: tuple[str, ...]) -> tuple[str, ...]:
     """Return where a process must listen so that others of the run can connect to it."""
     protocol = "tls" if all(text.startswith("tls/") for text in connect) else "tcp"
-    far = [host for host in _hosts(connect) if not is_loopback_host(host)]
-    if not far:
-        return (f"{protocol}/127.0.0.1:0",)
-    return (f"{protocol}/[::]:0",) if far[0].startswith("[") else (f"{protocol}/0.0.0.0:0",)
-
-
-def is_loopback(connect: tuple[str, ...]) -> bool:
-    return all(map(is_loopback_host, _hosts(connect)))
-
-
-def _hosts(connect: tuple[str, ...]) -> list[str]:
-    return [endpoint.host for text in connect if (endpoint := parse_endpoint(text))]
+    far = far_hosts(connect)
+    host = "127.0.0.1" if not far else "[::]" if far[0].startswith("[") else "0.0.0.0"
+    return (f"{protocol}/{host}:0",)
 
 
 def loopback_of(listen: str) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from time import monotonic
 
 from gridpeers.scenarios.drivers.free_endpoint import parse_endpoint
@@ -15,110 +15,11 @@ from gridpeers.wire.keys import ANY_ALIVE_PLANT, Keys
 from gridpeers.wire.messages import PLANT, AgentStatus, Answer, AnyMessage, LinkAcknowledgement, Telemetry
 from gridpeers.wire.trust.key_folder import tls_refusal
 
-
-class PlantSearch:
-    def __init__(self, where: RunAddress, session: Session) -> None:
-        self._where, self._session = where, session
-        self._told: set[str] = set()
-        self._strangers: list[str] = []
-        """Lines on links to ends without access. The session gives each once; the error at the end needs them too."""
-
-    def refused(self) -> str:
-        """Return why no link will come, if every endpoint refuses one; else the empty string."""
-        if self._session.peers():
-            return ""
-        refusals = [_refusal(text, self._where) for text in self._where.connect]
-        return "\n".join(refusals) if all(refusals) else ""
-
-    def news(self, runs: Collection[str]) -> list[str]:
-        """Return what is wrong with links that are there, each sentence once; `runs` are those that were heard of."""
-        lines = [line for line in self._faults(runs) if line not in self._told]
-        self._told.update(lines)
-        return lines
-
-    def _faults(self, runs: Collection[str]) -> list[str]:
-        credentials = self._where.credentials
-        if credentials is None:
-            return []
-        vouched = self._session.vouches(PLANT)  # first: it looks at links that have just come, and notes their lines
-        self._strangers += self._session.take_lines()
-        if runs or not vouched:
-            return [*self._strangers]
-        own = credentials.own
-        return [
-            *self._strangers,
-            f"the plant at {self._at} takes the link, but nothing passes on it: it is still being built, or its "
-            f"members.json revokes or lacks the certificate of {own.name}, which its output says; gridpeers keys issue "
-            f"{own.name} --role {own.role}, where the site was made, gives {own.name} a new one",
-        ]
-
-    def failure(self, wait: float, runs: Collection[str], others: Collection[str]) -> str:
-        """Return why no plant was found within a wait (s).
-
-        `runs` are those whose plants have been heard of, and `others` those of them that were not sought.
-        """
-        if not self._session.peers():
-            return self.refused() or self._no_link(wait)
-        there = f"runs there: {', '.join(sorted(others))}" if others else ""
-        if faults := self._faults(runs):
-            beside = f" ({there})" if there else ""
-            return f"no plant of {self._where} within {wait:g} s{beside}: {'; '.join(faults)}"
-        start = command_line("plant", "SCENARIO", "--run", self._where.run, *self._where.access.words)
-        return (
-            f"no plant of {self._where} within {wait:g} s ({there or 'no other run is there either'}); start one "
-            f"({start}), or give another name by --run"
-        )
-
-    @property
-    def _at(self) -> str:
-        return ", ".join(self._where.connect)
-
-    def _no_link(self, wait: float) -> str:
-        where = self._where
-        mute = accepting(where.connect)
-        if mute and where.credentials is not None:
-            return (
-                f"something listens at {', '.join(mute)} and has made no link within {wait:g} s: it is of a run "
-                "without certificates, no plant, or a frozen one, which kill -CONT lets go on; say by --connect where "
-                "the plant is"
-            )
-        if mute:
-            return (
-                f"something listens at {', '.join(mute)} but has said nothing within {wait:g} s; if it is a frozen "
-                "plant, kill -CONT lets it go on, else end it by its process id; if it is something else, say by "
-                "--connect where the plant is; a plant with certificates asks for --keys DIR and tls/..."
-            )
-        return (
-            f"nothing answers at {self._at} within {wait:g} s; start a plant there "
-            f"({command_line('plant', 'SCENARIO', *where.access.words)}), or say by --connect where it is"
-        )
-
-
-def _refusal(text: str, where: RunAddress) -> str:
-    """Return why an endpoint and this process make no link; empty if they may."""
-    endpoint = parse_endpoint(text)
-    if endpoint is None or not endpoint.connects:
-        return ""
-    refusal = tls_refusal(endpoint.host.strip("[]"), endpoint.port, where.credentials, PROBE)
-    if not refusal:
-        return ""
-    if where.credentials is None:
-        advice = f"say --keys DIR and {endpoint._replace(protocol='tls')}"
-    else:
-        advice = "say by --keys the folder of its site, or by --connect where the plant of this site is"
-    return f"what listens at {text} {refusal}; {advice} (docs/security.md)"
-
-
-VISITOR = "visitor"
-
 REMINDER = 2.0
 """Time (s) after which a wait is reported again, then after twice as long, and so on."""
 
-RENEWAL = 2.0
-"""Time (s) between two checks of the session."""
-
-FIRST_LOOK = 1.0
-"""Time (s) after which it is checked first: a link takes some 50 ms, on a busy machine more."""
+FIRST_LOOK, RENEWAL = 1.0, 2.0
+"""Time (s) until the session is checked first, and between two checks: a link takes some 50 ms, or more under load."""
 
 
 class NobodyError(ValueError):
@@ -126,11 +27,7 @@ class NobodyError(ValueError):
 
 
 class RunClient:
-    """A session at a run.
-
-    It meets the agents too, to hear what they publish, if so wished; they connect to `listen` after a cut. The plant
-    alone is enough to ask it.
-    """
+    """A session at a run; with `meet_agents` it hears the agents too, which connect to `listen` after a cut."""
 
     def __init__(self, where: RunAddress, *, meet_agents: bool = False, listen: tuple[str, ...] = ()) -> None:
         self.where, self.keys = where, Keys(where.run)
@@ -140,8 +37,10 @@ class RunClient:
 
     def _open(self) -> None:
         self._tokens = RunTokens(self.where.run)
+        self._refused_links: list[str] = []
+        """Lines on links to ends without access; the session gives each once."""
         self._session = Session(
-            VISITOR,
+            "visitor",
             listen=self._listen,
             connect=self.where.connect,
             clock="wall",
@@ -174,11 +73,7 @@ class RunClient:
 
     @property
     def plant(self) -> bool:
-        return bool(self.epochs)
-
-    @property
-    def epochs(self) -> set[int]:
-        return self._tokens.epochs
+        return bool(self._tokens.epochs)
 
     @property
     def present(self) -> list[str]:
@@ -197,13 +92,11 @@ class RunClient:
             message = decode(payload)
         except RejectedError:  # nothing depends on a visitor
             return None
-        of_plant = message.sender == PLANT and message.epoch in self.epochs
+        of_plant = message.sender == PLANT and message.epoch in self._tokens.epochs
         match self.keys.parts(key), message:
             case ("status", name), AgentStatus():
                 believed = message.sender == name
-            case ("telemetry",), Telemetry():
-                believed = of_plant
-            case ("answer", _), Answer():
+            case (("telemetry",), Telemetry()) | (("answer", _), Answer()):
                 believed = of_plant
             case ("answer", _), LinkAcknowledgement():
                 believed = True
@@ -248,44 +141,114 @@ class RunClient:
                 pass
         return True
 
-    def find_plant(self, wait: float, tell: Callable[[str], None] | None = None) -> None:
+    def find_plant(self, wait: float, tell: Callable[[str], None] = lambda line: None) -> None:
         """Wait for the plant of the run, for `wait` (s) at most.
 
-        `tell` hears for what one waits: ever more rarely, and at once if plants of other runs are there, or if the
-        plant takes the link and lets nothing pass on it. NobodyError if there is none in time; at once if nobody there
-        accepts the other's certificate.
+        `tell` hears what is waited for: ever more rarely, and at once if plants of other runs are there. NobodyError
+        if there is no plant in time; at once if nobody there accepts the other's certificate.
         """
         began = monotonic()
         look, reminder = began + FIRST_LOOK, REMINDER
-        strangers: set[str] = set()
-        search = PlantSearch(self.where, self._session)
+        told: set[str] = set()
+        others: set[str] = set()
+
+        def is_news() -> bool:
+            return self.plant or not self._others <= others
+
         while True:
-            pause = min(look, began + reminder, began + wait) - monotonic()
-            self.until(lambda: self.plant or not self._others <= strangers, pause)
+            self.until(is_news, min(look, began + reminder, began + wait) - monotonic())
             now = monotonic()
             if self.plant:
                 return
-            lines = []
-            if not self._others <= strangers:
-                strangers.update(self._others)
-                lines.append(f"no plant yet of {self.where} (runs there: {', '.join(sorted(strangers))}); waits on")
+            if is_news():
+                others |= self._others
+                tell(f"no plant yet of {self.where} (runs there: {', '.join(sorted(others))}); waits on")
             if now - began >= wait:
-                raise NobodyError(search.failure(wait, self.runs, self._others))
+                raise NobodyError(self._failure(wait))
             if now >= look:
                 look = now + RENEWAL
-                if refused := search.refused():
+                if refused := self._refused():
                     raise NobodyError(refused)
                 if self._session.misplaced:
                     self.renew()
-                    search = PlantSearch(self.where, self._session)
             if now - began >= reminder:
                 reminder *= 2.0
-                lines.append(f"no plant yet of {self.where}; {now - began:.0f} of {wait:g} s waited")
-                lines += search.news(self.runs)
-            if tell is not None:
-                for line in lines:
-                    tell(line)
+                tell(f"no plant yet of {self.where}; {now - began:.0f} of {wait:g} s waited")
+                for line in self._link_faults():
+                    if line not in told:
+                        told.add(line)
+                        tell(line)
 
     @property
     def _others(self) -> set[str]:
         return self.runs - {self.where.run}
+
+    def _refused(self) -> str:
+        """Return why no link will come, if every endpoint refuses one; else the empty string."""
+        if self._session.peers():
+            return ""
+        refusals = [_refusal(text, self.where) for text in self.where.connect]
+        return "\n".join(refusals) if all(refusals) else ""
+
+    def _link_faults(self) -> list[str]:
+        """Return what is wrong with links that are there, by their certificates."""
+        credentials = self.where.credentials
+        if credentials is None:
+            return []
+        vouched = self._session.vouches(PLANT)  # first: it looks at links that have just come, and notes their lines
+        self._refused_links += self._session.take_lines()
+        if self.runs or not vouched:
+            return [*self._refused_links]
+        own = credentials.own
+        return [
+            *self._refused_links,
+            f"the plant at {', '.join(self.where.connect)} takes the link, but nothing passes on it: it is still being "
+            f"built, or its members.json revokes or lacks the certificate of {own.name}, which its output says; "
+            f"gridpeers keys issue {own.name} --role {own.role}, where the site was made, gives {own.name} a new one",
+        ]
+
+    def _failure(self, wait: float) -> str:
+        """Return why no plant was found within a wait (s)."""
+        where = self.where
+        start = command_line("plant", "SCENARIO", *where.access.words)
+        if self._session.peers():
+            missing = f"no plant of {where} within {wait:g} s"
+            there = f" (runs there: {', '.join(sorted(self._others))})" if self._others else ""
+            if faults := self._link_faults():
+                return f"{missing}{there}: {'; '.join(faults)}"
+            start = command_line("plant", "SCENARIO", "--run", where.run, *where.access.words)
+            there = there or " (no other run is there either)"
+            return f"{missing}{there}; start one ({start}), or give another name by --run"
+        if refused := self._refused():
+            return refused
+        mute = ", ".join(accepting(where.connect))
+        if not mute:
+            return (
+                f"nothing answers at {', '.join(where.connect)} within {wait:g} s; start a plant there ({start}), "
+                "or say by --connect where it is"
+            )
+        if where.credentials is not None:
+            return (
+                f"something listens at {mute} and has made no link within {wait:g} s: it is of a run without "
+                "certificates, no plant, or a frozen one, which kill -CONT lets go on; say by --connect where the "
+                "plant is"
+            )
+        return (
+            f"something listens at {mute} but has said nothing within {wait:g} s; if it is a frozen plant, kill -CONT "
+            "lets it go on, else end it by its process id; if it is something else, say by --connect where the plant "
+            "is; a plant with certificates asks for --keys DIR and tls/..."
+        )
+
+
+def _refusal(text: str, where: RunAddress) -> str:
+    """Return why an endpoint and this process make no link; empty if they may."""
+    endpoint = parse_endpoint(text)
+    if endpoint is None or not endpoint.connects:
+        return ""
+    refusal = tls_refusal(endpoint.host.strip("[]"), endpoint.port, where.credentials, PROBE)
+    if not refusal:
+        return ""
+    advice = "say by --keys the folder of its site, or by --connect where the plant of this site is"
+    if where.credentials is None:
+        advice = f"say --keys DIR and {endpoint._replace(protocol='tls')}"
+    return f"what listens at {text} {refusal}; {advice} (docs/security.md)"

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections import deque
 from collections.abc import Collection
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import msgspec
 
@@ -37,7 +37,7 @@ class RunTokens:
         return runs | {self._run} if self.epochs else runs
 
     def is_noted(self, key: str) -> bool:
-        """Whether a token is noted, so that its end must be known; any thread may ask."""
+        """Return True for a token whose end must be known; any thread may ask."""
         return key in self._noted
 
     def appeared(self, key: str) -> None:
@@ -85,7 +85,7 @@ class PlantStatus(msgspec.Struct, frozen=True, kw_only=True):
     impaired: tuple[str, ...] = ()
     """Agents whose link to or from the plant has an emulated fault."""
     switches: dict[str, bool] = {}
-    """Position of each switch, by its name: whether it is closed."""
+    """True for a closed switch, by its name."""
     loads: dict[str, tuple[float, float]] = {}
     """Real (W) and reactive power (var) at nominal voltage of each load that was set during the run."""
 
@@ -100,6 +100,12 @@ OLD = 0.2
 V_LOW, V_HIGH = 0.95, 1.05
 """Terminal voltages (pu) beyond which one is shown as off: range A of ANSI C84.1."""
 
+SILENT = 1.5
+"""An agent whose status is older than this (s of wall time) is silent: it sends three in this time."""
+
+_PER_INVERTER = 6
+"""Values of one inverter in a row of telemetry."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class InverterStatus:
@@ -107,7 +113,7 @@ class InverterStatus:
 
     name: str
     island: str = ""
-    """Name of its island: "grid", or the first inverter in it; "" if nobody has said."""
+    """Name of its island: "grid", or the first inverter in it; "" if unknown."""
     f: float | None = None  # Hz
     P: float | None = None  # kW
     P_set: float | None = None  # kW
@@ -119,9 +125,9 @@ class InverterStatus:
     """Age (s) of the latest state of each neighbour that it uses."""
     hears: int | None = None
     late: bool = False
-    """Whether the latest state of one of them is `OLD`."""
+    """The latest state of one of them is `OLD`."""
     off_voltage: bool = False
-    """Whether V is beyond `V_LOW` to `V_HIGH`."""
+    """V is beyond `V_LOW` to `V_HIGH`."""
     received: int | None = None
     sent: int | None = None
     lost: int | None = None
@@ -141,7 +147,7 @@ class Snapshot:
     impaired: tuple[str, ...] = ()
     inverters: tuple[InverterStatus, ...] = ()
     events: tuple[str, ...] = ()
-    """Events, a line each, the latest last."""
+    """A line for each event, the latest last."""
 
 
 def line_of(event: PlantEvent) -> str:
@@ -149,31 +155,19 @@ def line_of(event: PlantEvent) -> str:
     return f"{event.t:8.2f} s  {re.sub(r', at t = [0-9.e+]+ s$', '', event.text)}"
 
 
-SILENT = 1.5
-"""An agent whose status is older than this (s of wall time) is silent: it sends three in this time."""
-
-_PER_INVERTER = 6
-"""Values of one inverter in a row of telemetry."""
-
-_KEPT = 100
-
-
 class RunMonitor:
     def __init__(self, run: str) -> None:
         self._run = run
         self._configs: dict[str, AgentConfig] = {}
-        self._inverters: tuple[str, ...] = ()
+        self._telemetry: Telemetry | None = None
+        """The plant's latest."""
+        self._heard_at = 0.0
         self._row: tuple[float, ...] = ()
         self._t: float | None = None
-        self._heard_at: float | None = None
-        self._end: str | None = None
-        """Once the run has ended, why it broke; empty if it did not."""
-        self._epoch = 0
-        self._latest = 0.0
         self._pacing: Pacing | None = None
         self._impaired: tuple[str, ...] = ()
         self._plant_status: PlantStatus | None = None
-        self._events: deque[PlantEvent] = deque(maxlen=_KEPT)
+        self._events: deque[PlantEvent] = deque(maxlen=100)
         self._status: dict[str, tuple[AgentStatus, float]] = {}
         self.members: set[str] = set()
         """Inverters whose agents take part, as the plant says."""
@@ -181,15 +175,14 @@ class RunMonitor:
     @property
     def inverters(self) -> tuple[str, ...]:
         """Names of all inverters in the messages so far, in order."""
-        others = sorted(
-            (set(self._status) | set(self._configs)) - set(self._inverters), key=lambda name: (len(name), name)
-        )
-        return self._inverters + tuple(others)
+        first = self._telemetry.inverters if self._telemetry else ()
+        others = {*self._status, *self._configs}.difference(first)
+        return (*first, *sorted(others, key=lambda name: (len(name), name)))
 
     @property
     def has_configs(self) -> bool:
-        """Whether the configurations of all inverters in the telemetry are here."""
-        return self._configs.keys() >= set(self._inverters)
+        """True once the configurations of all inverters in the telemetry are here."""
+        return self._telemetry is None or self._configs.keys() >= set(self._telemetry.inverters)
 
     def config(self, config: AgentConfig) -> None:
         self._configs[config.name] = config
@@ -203,46 +196,36 @@ class RunMonitor:
 
     def telemetry(self, message: Telemetry, now: float) -> None:
         """Note the plant's telemetry; `now` is the client's clock (s)."""
-        if message.epoch != self._epoch:
-            if self._epoch:
-                self._events.clear()
-                self.members.clear()
-                self._plant_status = None
-            self._epoch, self._latest = message.epoch, 0.0
-        if message.t < self._latest:
+        before = self._telemetry
+        if before is not None and message.epoch != before.epoch:
+            self._events.clear()
+            self.members.clear()
+            self._plant_status = None
+        elif before is not None and message.t < before.t:
             return  # published again for a recorder that has missed it
-        self._latest = message.t
-        if message.inverters != self._inverters:
+        if before is not None and message.inverters != before.inverters:
             self._row = ()
-        self._inverters, self._t, self._heard_at = message.inverters, message.t, now
-        self._end = message.outcome if message.final else None
-        self._pacing = message.pacing or self._pacing
-        self._impaired = message.impaired
+        self._telemetry, self._heard_at, self._t = message, now, message.t
+        self._pacing, self._impaired = message.pacing or self._pacing, message.impaired
         if message.rows:
             self._row = message.rows[-1]
         for event in message.events:
-            if event not in self._events:
-                self._events.append(event)
-                self._count_member(event)
-
-    def _count_member(self, event: PlantEvent) -> None:
-        match = re.match(r"(\S+) (joined|left|died)\b", event.text)
-        if event.kind != "roster" or match is None or match[1] != event.subject:
-            return
-        if match[2] == "joined":
-            self.members.add(event.subject)
-        else:
-            self.members.discard(event.subject)
+            if event in self._events:
+                continue
+            self._events.append(event)
+            match = re.match(rf"{re.escape(event.subject)} (joined|left|died)\b", event.text)
+            if event.kind == "roster" and match:
+                (self.members.add if match[1] == "joined" else self.members.discard)(event.subject)
 
     def status(self, message: AgentStatus, now: float) -> None:
         self._status[message.sender] = (message, now)
 
     def snapshot(self, present: Collection[str], now: float, *, current: bool = True) -> Snapshot:
         """Return a snapshot at a time (s) of the client's clock, without the plant's values if they are not current."""
-        pace = self._pace()
-        if self._end is not None:
-            pace, current = "the run has ended" + (f": {self._end}" if self._end else ""), False
-        elif self._heard_at is not None and now - self._heard_at > SILENT:
+        pace, latest = self._pace(), self._telemetry
+        if latest is not None and latest.final:
+            pace, current = "the run has ended" + (f": {latest.outcome}" if latest.outcome else ""), False
+        elif latest is not None and now - self._heard_at > SILENT:
             pace, current = f"the plant has been silent for {now - self._heard_at:.0f} s", False
         names = dict.fromkeys((*self.inverters, *in_order(present)))
         return Snapshot(
@@ -252,41 +235,43 @@ class RunMonitor:
             speed=1.0 if self._plant_status is None else self._plant_status.speed,
             impaired=self._impaired if current else (),
             inverters=tuple(self._inverter(name, name in present, current, now) for name in names),
-            events=tuple(line_of(event) for event in self._events),
+            events=tuple(map(line_of, self._events)),
         )
 
     def _inverter(self, name: str, present: bool, current: bool, now: float) -> InverterStatus:
-        """Return the status of one inverter; with values of the plant only if they are current."""
-        f = P = Q = V = P_set = V_set = None
-        if current and name in self._inverters and self._row:
-            start = 1 + _PER_INVERTER * self._inverters.index(name)
+        one = InverterStatus(name=name)
+        config, latest = self._configs.get(name), self._telemetry
+        if current and self._row and latest is not None and name in latest.inverters:
+            start = 1 + _PER_INVERTER * latest.inverters.index(name)
             f, P, Q, V, P_set, V_set = self._row[start : start + _PER_INVERTER]
-        config = self._configs.get(name)
+            one = replace(one, f=f, P=P / 1e3, Q=Q / 1e3, P_set=P_set / 1e3)
+            if config is not None:
+                V_pu = V / config.V_nom
+                one = replace(
+                    one,
+                    P_share=P / config.P_rated,
+                    V=V_pu,
+                    V_set=V_set / config.V_nom,
+                    off_voltage=not V_LOW <= V_pu <= V_HIGH,
+                )
         status, at = self._status.get(name, (None, now))
         if not present or now - at > SILENT:
             status = None
-        ages = dict(zip(status.neighbours, status.ages, strict=False)) if status else {}
-        used = {neighbour: age for neighbour, age in ages.items() if status and neighbour in status.used}
-        V_pu = None if V is None or config is None else V / config.V_nom
-        return InverterStatus(
-            name=name,
-            island=status.island if status else "",
-            f=f,
-            P=None if P is None else P / 1e3,
-            P_set=None if P_set is None else P_set / 1e3,
-            P_share=None if P is None or config is None else P / config.P_rated,
-            Q=None if Q is None else Q / 1e3,
-            V=V_pu,
-            V_set=None if V_set is None or config is None else V_set / config.V_nom,
+        one = replace(one, note=self._note(name, present, status, now - at))
+        if status is None:
+            return one
+        ages = dict(zip(status.neighbours, status.ages, strict=False))
+        used = {neighbour: age for neighbour, age in ages.items() if neighbour in status.used}
+        return replace(
+            one,
+            island=status.island,
             ages=used,
-            hears=None if status is None else len(status.used),
+            hears=len(status.used),
             late=any(age >= OLD for age in used.values()),
-            off_voltage=V_pu is not None and not V_LOW <= V_pu <= V_HIGH,
-            received=status.received if status else None,
-            sent=status.sent if status else None,
-            lost=status.lost if status else None,
-            impaired=status.impaired if status else (),
-            note=self._note(name, present, status, now - at),
+            received=status.received,
+            sent=status.sent,
+            lost=status.lost,
+            impaired=status.impaired,
         )
 
     def _pace(self) -> str:
@@ -311,4 +296,4 @@ class RunMonitor:
         apart = [neighbour for neighbour in unused if islands.get(neighbour, "") not in ("", status.island)]
         silent = [neighbour for neighbour in unused if neighbour not in apart]
         parts = (f"apart: {short(apart)}" if apart else "", f"without {short(silent)}" if silent else "")
-        return "; ".join(part for part in parts if part)
+        return "; ".join(filter(None, parts))

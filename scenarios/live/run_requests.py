@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import secrets
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from math import inf, isfinite
@@ -13,7 +14,13 @@ import msgspec
 
 from gridpeers.agents.agent_config import AgentConfig, check_nameplate
 from gridpeers.plant.equipment.named_loads import FACTOR
-from gridpeers.scenarios.emulation.link_data import EmulationConfig, LinkCommand, LinkStatus, decode_statuses
+from gridpeers.scenarios.emulation.link_data import (
+    NO_MESSAGES,
+    EmulationConfig,
+    LinkCommand,
+    LinkStatus,
+    decode_statuses,
+)
 from gridpeers.scenarios.live.run_address import UsageError
 from gridpeers.scenarios.live.run_client import NobodyError, RunClient
 from gridpeers.scenarios.live.run_monitor import PlantStatus
@@ -29,8 +36,6 @@ T = TypeVar("T")
 
 Verb = Literal["open", "close", "synchronise", "load", "stop", "down", "status", "link", "links"]
 
-QUESTIONS = ("status", "links")
-
 ANSWER = 10.0
 """Longest wait (s) for the answer of a plant that is there; on a busy machine it may take a second."""
 
@@ -39,8 +44,6 @@ ASKED_AGAIN = 1.0
 
 ACKNOWLEDGED = 4.0
 """Longest wait (s) for the receivers of a link command; one control period, or a second more if a message was lost."""
-
-AGAIN = 0.1
 
 LEAVING = 10.0
 """Longest wait (s) for processes that were asked to leave."""
@@ -52,13 +55,12 @@ class RefusedError(ValueError):
 
 def ask(client: RunClient, verb: Verb, argument: str = "", load: LoadSetting | None = None) -> str:
     """Give the plant a command and return its answer; RefusedError if it refuses, NobodyError if it does not answer."""
-    answer, _ = request(client, lambda answer: set(), verb=verb, argument=argument, load=load)
-    return answer.text
+    return request(client, verb=verb, argument=argument, load=load)[0].text
 
 
 def request(
     client: RunClient,
-    receivers: Callable[[Answer], set[str]],
+    receivers: Callable[[Answer], set[str]] = lambda answer: set(),
     *,
     verb: Verb,
     wait: float = ANSWER,
@@ -66,57 +68,44 @@ def request(
 ) -> tuple[Answer, dict[str, LinkAcknowledgement]]:
     """Give the plant a command; return its answer, and those that come in time of the receivers that follow from it.
 
-    Anybody who may ask the plant anything may have its answer sent to this client. So the command has a number that
-    nobody else knows, which the plant repeats; acknowledgements have the number that the plant's answer names.
-
-    A question, which changes nothing, is asked again until its answer comes, for `wait` (s).
+    The command has a number that nobody else knows, which the plant repeats: anybody may have answers sent here.
+    Acknowledgements have the number that the plant's answer names. A question is asked again until its answer comes.
     """
     number = secrets.randbelow(MOST_COUNT)
     command = Command(sender="visitor", epoch=0, seq=number, t=0.0, reply_to=client.id, verb=verb, **command_fields)
     answer: Answer | None = None
-    acknowledgements: dict[int, dict[str, LinkAcknowledgement]] = {}
+    came: dict[object, dict[str, LinkAcknowledgement]] = defaultdict(dict)
     now = ask_at = monotonic()
     end = now + wait
     while now < end:
         if now >= ask_at:
             client.publish(client.keys.for_verb(verb), encode(command))
-            ask_at = now + ASKED_AGAIN if verb in QUESTIONS else inf
+            ask_at = now + ASKED_AGAIN if verb in ("status", "links") else inf
         for key, payload, _ in client.take(min(end, ask_at) - now):
             message = client.read(key, payload)
             if isinstance(message, LinkAcknowledgement):
-                acknowledgements.setdefault(message.seq, {})[message.sender] = message
+                came[message.seq][message.sender] = message
             elif isinstance(message, Answer) and message.seq == number:
                 if not message.ok:
                     raise RefusedError(message.text)
                 answer, end, ask_at = message, monotonic() + ACKNOWLEDGED, inf
-        if answer is not None and _of_number(answer, acknowledgements).keys() >= receivers(answer):
+        if answer is not None and came[answer.data.get("number")].keys() >= receivers(answer):
             break
         now = monotonic()
     if answer is None:
         raise NobodyError(
             f"the plant of {client.where} is there but has not answered within {wait:.3g} s; is it frozen?"
         )
-    return answer, _of_number(answer, acknowledgements)
-
-
-def _of_number(
-    answer: Answer, acknowledgements: Mapping[int, dict[str, LinkAcknowledgement]]
-) -> dict[str, LinkAcknowledgement]:
-    number = answer.data.get("number")
-    return acknowledgements.get(number, {}) if isinstance(number, int) else {}
+    return answer, came[answer.data.get("number")]
 
 
 def plant_status(client: RunClient, wait: float = ANSWER) -> PlantStatus:
     """Return the state of the run as the plant reports it within `wait` (s)."""
-    answer, _ = request(client, lambda answer: set(), verb="status", wait=wait)
-    return data_of(client, answer, PlantStatus)
+    return data_of(client, request(client, verb="status", wait=wait)[0], PlantStatus)
 
 
 def data_of(client: RunClient, answer: Answer, kind: type[T]) -> T:
-    """Return the data of an answer; NobodyError if they are something else.
-
-    Anybody may answer as a plant on open links, and one of another version may.
-    """
+    """Return the data of an answer; NobodyError if they are something else, as of a plant of another version."""
     try:
         return msgspec.convert(answer.data, kind)
     except msgspec.ValidationError as error:
@@ -127,30 +116,26 @@ def data_of(client: RunClient, answer: Answer, kind: type[T]) -> T:
 
 
 def has_left(client: RunClient, name: str) -> bool:
-    """Wait until an agent that was asked to leave has left; return whether it has."""
+    """Wait until an agent that was asked to leave has left; return False if it stays."""
     end = monotonic() + LEAVING
     while name in plant_status(client).agents:
         if monotonic() > end:
             return False
-        client.until(lambda: False, AGAIN)
+        client.until(lambda: False, 0.1)
     return True
 
 
 def has_ended(client: RunClient) -> bool:
-    """Wait until a run that was asked to end has ended; return whether it has. Its plant leaves last."""
+    """Wait until a run that was asked to end has ended; its plant leaves last. Return False if it goes on."""
     return client.until(lambda: not client.plant, LEAVING)
 
 
 def configuration(client: RunClient, name: str, wait: float = ANSWER) -> AgentConfig:
-    """Return the configuration that the plant hands out to the agent of an inverter within `wait` (s).
-
-    NobodyError if the plant says that there is no such inverter, or does not answer.
-    """
+    """Return the configuration that the plant hands out to the agent of an inverter in `wait` (s), or NobodyError."""
     end = monotonic() + wait
     inverters = plant_status(client, wait).inverters
     if name not in inverters:
-        there = f"inverters are {', '.join(in_order(inverters))}"
-        raise NobodyError(f'no inverter "{name}" in {client.where}; {there}')
+        raise NobodyError(f'no inverter "{name}" in {client.where}; inverters are {", ".join(in_order(inverters))}')
     return configurations(client, name, end - monotonic())[name]
 
 
@@ -194,10 +179,7 @@ def read_config(payload: bytes) -> AgentConfig | None:
 
 
 def check_free(client: RunClient, name: str) -> None:
-    """Raise NobodyError if an agent of this name takes part already, before a second one says anything in the run.
-
-    Of two that come at the same moment the plant refuses one.
-    """
+    """Raise NobodyError if an agent of this name takes part; of two at the same moment the plant refuses one."""
     if name in plant_status(client).agents:
         raise NobodyError(
             f"{name}: another agent of this name takes part in run {client.where.run} already; stop it first "
@@ -218,7 +200,7 @@ def own_code(config: AgentConfig) -> Iterator[str]:
 
 
 MOST = 1e8
-"""Largest number (kW or kvar) that is sent; what is plausible the plant knows, as it knows the feeder."""
+"""Largest number (kW or kvar) that is sent; the plant knows the plausible ones."""
 
 
 def load_setting(factor: float | None, P_kW: float | None, Q_kvar: float | None) -> LoadSetting:
@@ -252,11 +234,6 @@ class _LinkReply(msgspec.Struct, frozen=True):
     def reached(self) -> tuple[str, ...]:
         """Receivers of a command that take part: the plant, and the agents that it has sent the command."""
         return tuple(name for name in self.receivers if name == PLANT or name in self.asked)
-
-    @property
-    def answers_needed(self) -> set[str]:
-        """Receivers that answer: agents to a command, for which the plant has answered; the plant too to "links"."""
-        return {*self.reached} - {PLANT} if self.number > 0 else {*self.asked, PLANT}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -297,8 +274,7 @@ def check_link_command(command: LinkCommand, setup: EmulationConfig | None) -> N
 
 def command_links(client: RunClient, command: LinkCommand) -> LinkCommandResult:
     """Give a command and wait until every receiver concerned has taken it, or for `ACKNOWLEDGED` seconds."""
-    answer, answers = _request(client, verb="link", link_command=command.to_tree())
-    reply = data_of(client, answer, _LinkReply)
+    answer, reply, answers = _request(client, "link", link_command=command.to_tree())
     refused = {name: answers[name].text for name in reply.reached if name in answers and not answers[name].ok}
     silent = tuple(name for name in reply.reached if name != PLANT and name not in answers)
     return LinkCommandResult(
@@ -313,8 +289,7 @@ def command_links(client: RunClient, command: LinkCommand) -> LinkCommandResult:
 
 def link_states(client: RunClient) -> tuple[float, dict[tuple[str, str], LinkStatus], tuple[str, ...]]:
     """Return the run time (s), the state of every link that has or had a fault, and the receivers without an answer."""
-    answer, answers = _request(client, verb="links")
-    reply = data_of(client, answer, _LinkReply)
+    _, reply, answers = _request(client, "links")
     statuses: dict[tuple[str, str], LinkStatus] = {}
     for name, acknowledgement in answers.items():
         if acknowledgement.ok:
@@ -326,34 +301,36 @@ def link_states(client: RunClient) -> tuple[float, dict[tuple[str, str], LinkSta
     return reply.t, statuses, tuple(name for name in reply.asked if name not in answers)
 
 
-def _request(client: RunClient, **command_fields: Any) -> tuple[Answer, dict[str, LinkAcknowledgement]]:
-    return request(client, lambda answer: data_of(client, answer, _LinkReply).answers_needed, **command_fields)
+def _request(
+    client: RunClient, verb: Verb, **command_fields: Any
+) -> tuple[Answer, _LinkReply, dict[str, LinkAcknowledgement]]:
+    """Ask about links; return the plant's answer, its data, and the receivers' acknowledgements."""
+
+    def receivers(answer: Answer) -> set[str]:
+        reply = data_of(client, answer, _LinkReply)
+        if verb == "link":  # for itself the plant has answered
+            return {*reply.reached} - {PLANT}
+        return {*reply.asked, PLANT}
+
+    answer, answers = request(client, receivers, verb=verb, **command_fields)
+    return answer, data_of(client, answer, _LinkReply), answers
 
 
-_HEAD = ("link", "sent", "delivered", "dropped", "now")
-
-
-def links_text(run: str, t: float, stands: Mapping[tuple[str, str], LinkStatus]) -> str:
+def links_text(run: str, t: float, states: Mapping[tuple[str, str], LinkStatus]) -> str:
     """Return one line for each link that is impaired at t (s), one for all that once were; by sender and receiver."""
-    names = in_order({name for link in stands for name in link} - {PLANT})
-    order = {name: i for i, name in enumerate([*names, PLANT])}
-    now = {link: stands[link] for link in sorted(stands, key=lambda ends: (order[ends[0]], order[ends[1]]))}
-    now = {link: stand for link, stand in now.items() if stand.holds}
-    before = [stand for link, stand in stands.items() if link not in now]
+    order = [*in_order({name for link in states for name in link} - {PLANT}), PLANT]
+    now = {link: state for link, state in states.items() if state.holds}
     count = "no link is impaired" if not now else f"{len(now)} link{'s' if len(now) > 1 else ''} impaired"
     text = [f"run {run}   t = {t:.2f} s   {count}"]
-    rows = [_HEAD, *((f"{src} -> {dst}", *_counts(stand), ", ".join(stand.holds)) for (src, dst), stand in now.items())]
+    rows = [("link", "sent", "delivered", "dropped", "now")]
+    for src, dst in sorted(now, key=lambda link: tuple(map(order.index, link))):
+        state = now[src, dst]
+        book = state.counts or NO_MESSAGES
+        reasons = ", ".join(f"{reason} {count}" for reason, count in sorted(book.dropped.items()))
+        dropped = f"{sum(book.dropped.values())}" + (f" ({reasons})" if reasons else "")
+        rows.append((f"{src} -> {dst}", str(book.sent), str(book.delivered), dropped, ", ".join(state.holds)))
     text += aligned(rows, right=range(1, 4)) if now else ()
-    if before:
-        books = [stand.counts for stand in before if stand.counts is not None]
-        sent, dropped = sum(book.sent for book in books), sum(sum(book.dropped.values()) for book in books)
-        text.append(f"impaired before: {len(before)} links; sent over them {sent}, dropped {dropped}")
+    if before := [state.counts or NO_MESSAGES for link, state in states.items() if link not in now]:
+        sent, dropped_before = sum(book.sent for book in before), sum(sum(book.dropped.values()) for book in before)
+        text.append(f"impaired before: {len(before)} links; sent over them {sent}, dropped {dropped_before}")
     return "\n".join(text) + "\n"
-
-
-def _counts(stand: LinkStatus) -> tuple[str, str, str]:
-    book = stand.counts
-    if book is None:
-        return "0", "0", "0"
-    reasons = ", ".join(f"{reason} {count}" for reason, count in sorted(book.dropped.items()))
-    return str(book.sent), str(book.delivered), f"{sum(book.dropped.values())}" + (f" ({reasons})" if reasons else "")

@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 import select
 import sys
+import termios
+import tty
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import dataclass
 from time import monotonic
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from rich.console import Console, Group
 from rich.live import Live
@@ -27,88 +28,6 @@ from gridpeers.wire.timing import SessionDeadline
 
 EVENTS = 6
 
-
-@dataclass(frozen=True)
-class _Column:
-    head: str
-    unit: str
-    text: Callable[[InverterStatus], str]
-    right: bool = True
-
-
-def _number(value: float | None, digits: int = 0) -> str:
-    return "-" if value is None else f"{round(value, digits) + 0.0:.{digits}f}"  # + 0.0: no -0.0
-
-
-_COLUMNS = (
-    _Column("agent", "", lambda inverter: inverter.name, right=False),
-    _Column("island", "", lambda inverter: inverter.island or "-", right=False),
-    _Column("f", "Hz", lambda inverter: _number(inverter.f, 3)),
-    _Column("P", "kW", lambda inverter: _number(inverter.P, 1)),
-    _Column("P_set", "kW", lambda inverter: _number(inverter.P_set, 1)),
-    _Column("P", "pu", lambda inverter: _number(inverter.P_share, 3)),
-    _Column("Q", "kvar", lambda inverter: _number(inverter.Q, 1)),
-    _Column("V", "pu", lambda inverter: _number(inverter.V, 4)),
-    _Column("V_set", "pu", lambda inverter: _number(inverter.V_set, 4)),
-    _Column("hears", "", lambda inverter: short(list(inverter.ages)), right=False),
-    _Column("age", "s", lambda inverter: _number(max(inverter.ages.values(), default=None), 2)),
-    _Column("in", "", lambda inverter: _number(inverter.received)),
-    _Column("out", "", lambda inverter: _number(inverter.sent)),
-    _Column("lost", "", lambda inverter: _number(inverter.lost)),
-    _Column("impaired", "", lambda inverter: short(inverter.impaired) if inverter.impaired else "", right=False),
-    _Column("", "", lambda inverter: inverter.note, right=False),
-)
-"""Columns of each agent; "age" is that of the oldest state of the neighbours in use, "impaired" are the senders whose
-links to it have an emulated fault."""
-
-
-def _columns(snapshot: Snapshot) -> tuple[_Column, ...]:
-    calm = not any(inverter.impaired for inverter in snapshot.inverters)
-    return tuple(column for column in _COLUMNS if not (calm and column.head == "impaired"))
-
-
-def head(snapshot: Snapshot) -> str:
-    t = "has not begun" if snapshot.t is None else f"t = {snapshot.t:.2f} s"
-    islands = list(dict.fromkeys(inverter.island for inverter in snapshot.inverters if inverter.island))
-    parts = [f"run {snapshot.run}", t, snapshot.pace, f"islands: {', '.join(islands)}" if islands else ""]
-    parts.append(f"impaired to the plant: {short(snapshot.impaired)}" if snapshot.impaired else "")
-    return "   ".join(part for part in parts if part)
-
-
-def plain(snapshot: Snapshot) -> str:
-    """Return the text for `gridpeers status`: no colour, no line drawing, columns that `awk` can cut."""
-    columns = _columns(snapshot)
-    titles = [f"{column.head} {column.unit}".strip() for column in columns]
-    rows = [titles, *([column.text(inverter) for column in columns] for inverter in snapshot.inverters)]
-    text = [head(snapshot)]
-    text += aligned(rows, right=[i for i, column in enumerate(columns) if column.right]) if snapshot.inverters else ()
-    text += snapshot.events[-EVENTS:]
-    return "\n".join(text) + "\n"
-
-
-def table(snapshot: Snapshot, keys: str = "q: quit") -> Group:
-    """Return the table for `gridpeers watch`; `keys` says which keys can be typed."""
-    grid = Table(box=None, padding=(0, 2, 0, 0), header_style="bold")
-    columns = _columns(snapshot)
-    for column in columns:
-        title = f"{column.head}\n{column.unit}" if column.head else ""
-        grid.add_column(title, justify="right" if column.right else "left", no_wrap=column.head != "hears")
-    for inverter in snapshot.inverters:
-        grid.add_row(*(Text(column.text(inverter), style=_style(column, inverter)) for column in columns))
-    events = [Text(line, style="dim", no_wrap=True, overflow="ellipsis") for line in snapshot.events[-EVENTS:]]
-    return Group(Text(head(snapshot), style="bold"), Text(), grid, Text(), *events, Text(keys, style="dim"))
-
-
-def _style(column: _Column, inverter: InverterStatus) -> str:
-    wrong = {
-        "agent": inverter.note and not inverter.note.startswith("apart"),  # to be in another island is no fault
-        "age": inverter.late,
-        "lost": inverter.lost,
-        "impaired": True,
-    }
-    return "yellow" if wrong.get(column.head or "agent") else ""
-
-
 LOOK = 1.2
 """Longest wait (s) for one snapshot: two periods of an agent's status, and a bit."""
 
@@ -124,7 +43,81 @@ REFRESH = 0.25
 PERIOD = 1.0
 """Time (s) between two texts where the output is no terminal."""
 
-QUIT = ("q", "Q", "\x1b")
+
+class _Column(NamedTuple):
+    head: str
+    unit: str
+    text: Callable[[InverterStatus], str]
+    right: bool = True
+
+
+def _number(value: float | None, digits: int = 0) -> str:
+    return "-" if value is None else f"{round(value, digits) + 0.0:.{digits}f}"  # + 0.0: no -0.0
+
+
+_COLUMNS = (
+    _Column("agent", "", lambda one: one.name, right=False),
+    _Column("island", "", lambda one: one.island or "-", right=False),
+    _Column("f", "Hz", lambda one: _number(one.f, 3)),
+    _Column("P", "kW", lambda one: _number(one.P, 1)),
+    _Column("P_set", "kW", lambda one: _number(one.P_set, 1)),
+    _Column("P", "pu", lambda one: _number(one.P_share, 3)),
+    _Column("Q", "kvar", lambda one: _number(one.Q, 1)),
+    _Column("V", "pu", lambda one: _number(one.V, 4)),
+    _Column("V_set", "pu", lambda one: _number(one.V_set, 4)),
+    _Column("hears", "", lambda one: short(list(one.ages)), right=False),
+    _Column("age", "s", lambda one: _number(max(one.ages.values(), default=None), 2)),
+    _Column("in", "", lambda one: _number(one.received)),
+    _Column("out", "", lambda one: _number(one.sent)),
+    _Column("lost", "", lambda one: _number(one.lost)),
+    _Column("impaired", "", lambda one: short(one.impaired) if one.impaired else "", right=False),
+    _Column("", "", lambda one: one.note, right=False),
+)
+"""Columns of each agent; "age" is that of the oldest state of the neighbours in use, "impaired" are the senders whose
+links to it have an emulated fault."""
+
+
+def _columns(snapshot: Snapshot) -> tuple[_Column, ...]:
+    calm = not any(one.impaired for one in snapshot.inverters)
+    return tuple(column for column in _COLUMNS if not (calm and column.head == "impaired"))
+
+
+def head(snapshot: Snapshot) -> str:
+    t = "has not begun" if snapshot.t is None else f"t = {snapshot.t:.2f} s"
+    islands = list(dict.fromkeys(one.island for one in snapshot.inverters if one.island))
+    parts = [f"run {snapshot.run}", t, snapshot.pace, f"islands: {', '.join(islands)}" if islands else ""]
+    parts.append(f"impaired to the plant: {short(snapshot.impaired)}" if snapshot.impaired else "")
+    return "   ".join(filter(None, parts))
+
+
+def plain(snapshot: Snapshot) -> str:
+    """Return the text for `gridpeers status`: no colour, no line drawing, columns that `awk` can cut."""
+    columns = _columns(snapshot)
+    titles = [f"{column.head} {column.unit}".strip() for column in columns]
+    rows = [titles, *([column.text(one) for column in columns] for one in snapshot.inverters)]
+    text = [head(snapshot)]
+    text += aligned(rows, right=[i for i, column in enumerate(columns) if column.right]) if snapshot.inverters else ()
+    return "\n".join([*text, *snapshot.events[-EVENTS:]]) + "\n"
+
+
+def table(snapshot: Snapshot) -> Group:
+    grid = Table(box=None, padding=(0, 2, 0, 0), header_style="bold")
+    columns = _columns(snapshot)
+    for column in columns:
+        title = f"{column.head}\n{column.unit}" if column.head else ""
+        grid.add_column(title, justify="right" if column.right else "left", no_wrap=column.head != "hears")
+    for one in snapshot.inverters:
+        wrong = {
+            "": one.note and not one.note.startswith("apart"),  # to be in another island is no fault
+            "age": one.late,
+            "lost": one.lost,
+            "impaired": True,
+        }
+        wrong["agent"] = wrong[""]
+        styles = ["yellow" if wrong.get(column.head) else "" for column in columns]
+        grid.add_row(*(Text(column.text(one), style) for column, style in zip(columns, styles, strict=True)))
+    events = [Text(line, style="dim", no_wrap=True, overflow="ellipsis") for line in snapshot.events[-EVENTS:]]
+    return Group(Text(head(snapshot), style="bold"), Text(), grid, Text(), *events, Text("q: quit", style="dim"))
 
 
 class TakesMessages(Protocol):
@@ -137,13 +130,6 @@ class TakesMessages(Protocol):
     def status(self, message: AgentStatus, now: float) -> None: ...
 
 
-def leave_out(key: str, payload: bytes) -> None:
-    """Leave out what is neither telemetry nor the status or configuration of an agent."""
-
-
-_NO_LOCK = nullcontext()
-
-
 class RunSubscriber:
     """Feed the messages of a run into a monitor, under a lock if there is one; `on_other` takes all other messages."""
 
@@ -151,10 +137,10 @@ class RunSubscriber:
         self,
         client: RunClient,
         monitor: TakesMessages,
-        on_other: Callable[[str, bytes], None] = leave_out,
-        lock: AbstractContextManager[Any] = _NO_LOCK,
+        on_other: Callable[[str, bytes], None] = lambda key, payload: None,
+        lock: AbstractContextManager[Any] | None = None,
     ) -> None:
-        self._client, self._monitor, self._on_other, self._lock = client, monitor, on_other, lock
+        self._client, self._monitor, self._on_other, self._lock = client, monitor, on_other, lock or nullcontext()
         self._subscribed: set[str] = set()
         self._plant = client.plant
         self._heard_at: dict[str, float] = {}
@@ -162,12 +148,11 @@ class RunSubscriber:
         self._patience = SessionDeadline()
         self._configured: set[str] = set()
         self._ask_at = 0.0
-        """When (s, monotonic) to ask for those that are missing."""
+        """When (s, monotonic) to ask for those that are missing: a question may be lost with its link."""
         client.listen(client.keys.telemetry)
         self._ask_for_configs(monotonic())
 
     def _ask_for_configs(self, now: float) -> None:
-        """Ask for the configurations of all agents; a question may be lost with its link."""
         if now >= self._ask_at:
             self._ask_at = now + CONFIGS_AGAIN
             self._client.fetch(self._client.keys.config("*"))
@@ -177,24 +162,21 @@ class RunSubscriber:
         heard: list[Telemetry | AgentStatus] = []
         for key, payload, at in self._client.take(seconds):
             config = read_config(payload)
-            if config is not None:
-                with self._lock:
+            message = None if config else self._client.read(key, payload)
+            with self._lock:
+                if config is not None:
                     self._monitor.config(config)
-                self._configured.add(config.name)
-                continue
-            message = self._client.read(key, payload)
-            if isinstance(message, Telemetry):
-                with self._lock:
+                    self._configured.add(config.name)
+                elif isinstance(message, Telemetry):
                     self._monitor.telemetry(message, at)
-            elif isinstance(message, AgentStatus):
-                with self._lock:
+                elif isinstance(message, AgentStatus):
                     self._monitor.status(message, at)
-                self._used[message.sender] = message.used
-            else:
+                    self._used[message.sender] = message.used
+            if isinstance(message, Telemetry | AgentStatus):
+                self._heard_at[message.sender] = at
+                heard.append(message)
+            elif config is None:
                 self._on_other(key, payload)
-                continue
-            self._heard_at[message.sender] = at
-            heard.append(message)
         now = monotonic()
         if self._client.plant and not self._plant:  # it was restarted, perhaps with other inverters
             self._configured.clear()
@@ -204,18 +186,12 @@ class RunSubscriber:
             inverters = self._monitor.inverters
         if self._plant and not self._configured.issuperset(inverters):
             self._ask_for_configs(now)
-        for name in inverters:
-            self._listen_to(name)
-        for name in self._client.present:  # anybody may hold tokens of any names
-            if len(self._subscribed) < MOST_INVERTERS:
-                self._listen_to(name)
+        for name in (*inverters, *self._client.present):
+            if name not in self._subscribed and (name in inverters or len(self._subscribed) < MOST_INVERTERS):
+                self._subscribed.add(name)  # of others there may be any number: anybody may hold their tokens
+                self._client.listen(self._client.keys.status(name))
         self._renew(now)
         return heard
-
-    def _listen_to(self, name: str) -> None:
-        if name not in self._subscribed:
-            self._subscribed.add(name)
-            self._client.listen(self._client.keys.status(name))
 
     def take_until(self, end: float) -> None:
         while (left := end - monotonic()) > 0.0:
@@ -236,12 +212,16 @@ class RunSubscriber:
             self._client.renew()
 
 
-def look(client: RunClient) -> Snapshot:
-    """Listen until the plant and every agent have published their state, or for `LOOK` seconds."""
+def _following(client: RunClient) -> tuple[RunMonitor, RunSubscriber]:
     monitor = RunMonitor(client.where.run)
     monitor.plant_status(plant_status(client))
-    subscriber, heard = RunSubscriber(client, monitor), set[str]()
-    end = monotonic() + LOOK
+    return monitor, RunSubscriber(client, monitor)
+
+
+def look(client: RunClient) -> Snapshot:
+    """Listen until the plant and every agent have published their state, or for `LOOK` seconds."""
+    monitor, subscriber = _following(client)
+    heard, end = set[str](), monotonic() + LOOK
     while (left := end - monotonic()) > 0.0:
         heard.update(message.sender for message in subscriber.take(left))
         if heard >= {PLANT, *client.present, *monitor.members} and monitor.has_configs:
@@ -251,45 +231,32 @@ def look(client: RunClient) -> Snapshot:
 
 def watch(client: RunClient, console: Console, seconds: float | None) -> None:
     """Show a run, whose agents the client meets, until the user quits, or for a time (s)."""
-    monitor = RunMonitor(client.where.run)
-    monitor.plant_status(plant_status(client))
-    subscriber = RunSubscriber(client, monitor)
+    monitor, subscriber = _following(client)
     end = float("inf") if seconds is None else monotonic() + seconds
     if not console.is_terminal:
         while monotonic() < end:
             subscriber.take_until(min(end, monotonic() + PERIOD))
-            text = plain(monitor.snapshot(client.present, monotonic()))
-            console.print(text, soft_wrap=True)
+            console.print(plain(monitor.snapshot(client.present, monotonic())), soft_wrap=True)
         return
-    with keyboard() as key, Live(console=console, screen=True, auto_refresh=False) as live:
+    with _keyboard() as key, Live(console=console, screen=True, auto_refresh=False) as live:
         while monotonic() < end:
             subscriber.take_until(monotonic() + REFRESH)
             live.update(table(monitor.snapshot(client.present, monotonic())), refresh=True)
-            if key(0.0) in QUIT:
+            if key() in ("q", "Q", "\x1b"):
                 return
 
 
 @contextmanager
-def keyboard() -> Iterator[Callable[[float], str]]:
-    """Yield a function that waits (s) for a key typed without Enter; "" if none came. Ctrl-C stays Ctrl-C.
-
-    Where standard input is no terminal, or the system has no termios, it returns "" at once.
-    """
-    try:
-        import termios
-        import tty
-    except ImportError:
-        yield lambda seconds: ""
+def _keyboard() -> Iterator[Callable[[], str]]:
+    """Yield a function that returns a key typed without Enter, or "" at once. Ctrl-C stays Ctrl-C."""
+    file = sys.stdin.fileno()
+    if not os.isatty(file):
+        yield lambda: ""
         return
-    try:
-        file = sys.stdin.fileno()
-        before = termios.tcgetattr(file)
-    except (OSError, ValueError, termios.error):
-        yield lambda seconds: ""
-        return
+    before = termios.tcgetattr(file)
 
-    def read(seconds: float) -> str:
-        ready, _, _ = select.select([file], [], [], seconds)
+    def read() -> str:
+        ready, _, _ = select.select([file], [], [], 0.0)
         return os.read(file, 1).decode(errors="replace") if ready else ""
 
     tty.setcbreak(file)

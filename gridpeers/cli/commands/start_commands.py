@@ -127,7 +127,7 @@ def _start(
             require_room(out, sizes, "--out")
         replay = None if out is None else out / "replay.toml"
         link_log = LinkLog(scenario=spec, feeder=feeder, replay=record, replay_if_changed=replay)
-        with link_log.claimed(), folders(out, spec) as kept:
+        with folders(out, spec) as kept:
             say(f"run {run}: {spec.name}, case {', '.join(spec.cases)}; the plant listens on {endpoint}")
             if kept.whole is not None and sizes.sentence:
                 say(f"run {run}: {'an hour' if duration is None else f'{duration:g} s'} {sizes.sentence}")

@@ -55,7 +55,7 @@ def test_the_defaults_in_the_help_are_those_of_the_place() -> None:
         (["watch", "--for", "-1"], "--for: must be a time of more than 0 s and at most 1e+09 s, got -1 s"),
         (["up", "islanding", "--out", "full"], "--out full: the folder is not empty"),
         (["up", "islanding", "--record", "nowhere/it.toml"], "there is no folder nowhere; make it first"),
-        (["up", "islanding", "--record", "full"], "--record full: is there already"),
+        (["up", "islanding", "--record", "full"], "--record full: already exists"),
         (["agent"], "INVERTER is missing"),
         (["agent", "inv 2"], 'INVERTER: "inv 2" cannot be part of a Zenoh key'),
         (["agent", "inv2", "--connect", "lab"], '--connect: "lab" is no endpoint; write PROTOCOL/HOST:PORT'),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -34,7 +33,6 @@ from gridpeers.scenarios.results.record import Recorded
 from gridpeers.scenarios.schema import ScenarioModel, find_scenario, load_scenario
 from gridpeers.scenarios.schema.participants import netem_of, setup_of
 from gridpeers.scenarios.schema.scenario_model import LONGEST_RUN
-from gridpeers.wire.driver.drive import StoppedError
 from gridpeers.wire.messages import PLANT, LinkRequest
 from gridpeers.wire.timing import rounded_up
 
@@ -162,27 +160,6 @@ def cuts_in(file: Path) -> int:
     return len(load_scenario(file)[0].netem.links)
 
 
-def test_the_first_twenty_commands_are_written_at_once_and_later_ones_by_the_tenth(tmp_path: Path) -> None:
-    """A run that is killed has its first twenty commands in the file, and after them all but a tenth at most."""
-    log, file = a_log(tmp_path)
-    written = []
-    for number in range(1, 61):
-        log(cut(number))
-        if file.exists():
-            written.append(cuts_in(file))
-            file.unlink()
-    assert written == [*range(1, 21), 22, 24, 26, 28, 30, 33, 36, 39, 42, 46, 50, 55, 60]
-
-
-def test_a_command_that_the_plant_repeats_is_not_written_again(tmp_path: Path) -> None:
-    """It does so every second as long as an agent does not acknowledge it."""
-    log, file = a_log(tmp_path)
-    log(cut(1))
-    file.unlink()
-    log(cut(1))
-    assert not file.exists()
-
-
 def test_a_partition_by_islands_stays_one_and_another_becomes_cuts(tmp_path: Path) -> None:
     """Islands follow the switches, which the replay operates as the scenario does."""
     scenario, feeder = load_scenario(find_scenario("islanding"))
@@ -199,13 +176,14 @@ def test_a_partition_by_islands_stays_one_and_another_becomes_cuts(tmp_path: Pat
     assert {(entry.cut is not None, entry.from_s, entry.to_s) for entry in again.links} == {(True, 2.0, 3.0)}
 
 
-def test_the_end_writes_what_is_not_yet_written(tmp_path: Path) -> None:
-    """However the run ends by itself, its file has all commands."""
+def test_commands_are_written_at_once_and_from_the_twentieth_on_by_the_tenth(tmp_path: Path) -> None:
+    """A run that is killed has all but a tenth of them in the file; the end writes the rest."""
     log, file = a_log(tmp_path)
-    for number in range(1, 24):
+    for number in (*range(1, 24), 22):
         log(cut(number))
     before = cuts_in(file)
     (line,) = log.close(24.0)
+
     assert (before, cuts_in(file)) == (22, 23)
     assert line.endswith("replay.toml")
 
@@ -215,34 +193,17 @@ def test_without_a_command_only_a_file_that_was_asked_for_is_written(tmp_path: P
     """`--record FILE` is there after every run; a folder of results has a replay only of links that were changed."""
     log, file = a_log(tmp_path, record=record)
     lines = log.close(5.0)
+
     assert (file.exists(), bool(lines)) == (there, there)
 
 
-def test_a_file_of_record_belongs_to_the_run_that_was_first(tmp_path: Path) -> None:
-    """A second run with the same name is refused, and leaves the first one's file as it is."""
-    first, file = a_log(tmp_path, record=True)
-    second, _ = a_log(tmp_path, record=True)
-    with first.claimed():
-        claim = file.read_bytes()
-        with pytest.raises(
-            UsageError, match=r"--record .*replay.toml: is there already; move it, or give another name"
-        ):
-            check_new(file)
-        with pytest.raises(UsageError, match=r"--record .*replay.toml: is there already"), second.claimed():
-            pytest.fail("two runs write one file")
-        assert (file.read_bytes(), cuts_in(file)) == (claim, 0)
-        first(cut(1))
-    assert cuts_in(file) == 1
+def test_a_file_of_record_must_be_new(tmp_path: Path) -> None:
+    """What another run has left is never overwritten."""
+    file = tmp_path / "replay.toml"
+    check_new(file)
+    file.touch()
 
-
-def test_a_run_that_does_not_begin_leaves_no_file_of_record(tmp_path: Path) -> None:
-    """The reason for the refusal is gone, and the same command starts the run."""
-    log, file = a_log(tmp_path, record=True)
-    with pytest.raises(RuntimeError), log.claimed():
-        raise RuntimeError
-    assert list(tmp_path.iterdir()) == []
-
-    with suppress(StoppedError), log.claimed():
-        log.close(3.0)
-        raise StoppedError
-    assert cuts_in(file) == 0, "of a run that has begun it stays"
+    with pytest.raises(UsageError, match=r"--record .*replay.toml: already exists; move it, or give another name"):
+        check_new(file)
+    with pytest.raises(UsageError, match="there is no folder"):
+        check_new(tmp_path / "none" / "replay.toml")

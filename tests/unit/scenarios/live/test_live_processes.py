@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 from contextlib import nullcontext
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import cast
 
 import pytest
 from msgspec.structs import replace
@@ -16,8 +16,7 @@ from gridpeers.netem.schema.netem import Netem
 from gridpeers.plant.known_names import COMPILING, LISTENING
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.live import live_processes
-from gridpeers.scenarios.live.live_processes import UNHEARD, _follow, meaning
-from gridpeers.scenarios.live.live_recorder import LiveRecorder
+from gridpeers.scenarios.live.live_processes import UNHEARD, LiveRecorder, _followed, meaning
 from gridpeers.scenarios.live.run_address import RunAddress, UsageError
 from gridpeers.scenarios.live.run_requests import own_code
 from gridpeers.wire.driver.drive import StoppedError
@@ -129,14 +128,14 @@ def test_a_record_that_a_second_ctrl_c_cuts_short_says_so(later: float, why: str
     times = [5.0, 5.0 + later]
     requests = StopSignal(StoppedError, lambda: times.pop(0))
 
-    def run(recorder: Any) -> str:
+    def run() -> str:
         try:
             requests(signal.SIGINT, None)
         finally:  # as processes are ended
             requests(signal.SIGINT, None)
         return ""
 
-    outcome = _follow(cast("LiveRecorder", CutRecorder()), run, requests)
+    outcome = _followed(cast("LiveRecorder", CutRecorder()), run, requests)
 
     assert (outcome.interrupted, outcome.broke) == ("SIGINT", f"the record ends at 9.20 s: {why}")
 
@@ -148,6 +147,6 @@ def test_a_run_of_which_nothing_was_heard_has_failed() -> None:
         def __exit__(self, *_: object) -> None:
             """End as a recorder that writes no files."""
 
-    outcome = _follow(cast("LiveRecorder", DeafRecorder()), lambda recorder: "", StopSignal(StoppedError))
+    outcome = _followed(cast("LiveRecorder", DeafRecorder()), lambda: "", StopSignal(StoppedError))
 
     assert outcome.broke == UNHEARD

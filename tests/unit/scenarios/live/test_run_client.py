@@ -17,7 +17,7 @@ from gridpeers.scenarios.live.run_address import (
     accepting,
     address_of,
     check_endpoint,
-    is_loopback,
+    far_hosts,
     is_loopback_host,
     loopback_of,
     next_port,
@@ -119,7 +119,7 @@ def test_only_an_address_of_the_loopback_counts_as_one() -> None:
     hosts = ("127.0.0.1", "[::1]", "localhost", "0.0.0.0", "127.lab.example")
 
     assert [is_loopback_host(host) for host in hosts] == [True, True, True, False, False]
-    assert not is_loopback(("tcp/127.0.0.1:7447", "tcp/192.168.1.10:7447"))
+    assert far_hosts(("tcp/127.0.0.1:7447", "tcp/192.168.1.10:7447")) == ["192.168.1.10"]
 
 
 def test_endpoints_as_other_commands_need_them() -> None:
@@ -168,8 +168,6 @@ def waiting(monkeypatch: pytest.MonkeyPatch) -> Waiting:
         credentials: Credentials | None = None,
         links: int = 1,
         strangers: tuple[str, ...] = (),
-        *,
-        hears: bool = True,
     ) -> list[str]:
         clock, told, unseen, lines = Clock(comes), list[str](), [*strangers], list[str]()
 
@@ -193,8 +191,7 @@ def waiting(monkeypatch: pytest.MonkeyPatch) -> Waiting:
         monkeypatch.setattr(client, "monotonic", lambda: clock.now)
         try:
             where = replace(address_of("lab", None), credentials=credentials)
-            tell = (lambda line: told.append(f"{clock.now:g}: {line}")) if hears else None
-            RunClient(where).find_plant(longest, tell)
+            RunClient(where).find_plant(longest, lambda line: told.append(f"{clock.now:g}: {line}"))
         except NobodyError as error:
             told.append(str(error))
         return told
@@ -235,23 +232,13 @@ STRANGER = "a link to tls/127.0.0.1:7447: its certificate is revoked; nothing pa
 """A line that a session gives once."""
 
 
-@pytest.mark.parametrize("hears", [True, False])
-@pytest.mark.parametrize(("comes", "there"), [({}, ""), ({0.5: "lab2"}, " (runs there: lab2)")])
-def test_a_link_to_an_end_without_access_is_the_reason_at_the_end(
-    waiting: Waiting, comes: dict[float, str], there: str, *, hears: bool
-) -> None:
-    """Whether or not somebody was told of it during the wait; who was, was told once."""
-    *reminders, last = waiting({**comes}, 10.0, SHOWN, strangers=(STRANGER,), hears=hears)
+def test_a_link_to_an_end_without_access_is_the_reason_at_the_end(waiting: Waiting) -> None:
+    """It is told once during the wait; a short wait has it too."""
+    *reminders, last = waiting({}, 10.0, SHOWN, strangers=(STRANGER,))
 
-    assert [line for line in reminders if STRANGER in line] == [f"2: {STRANGER}"] * hears
-    assert last == f"no plant of run lab at tcp/127.0.0.1:7447 within 10 s{there}: {STRANGER}"
-
-
-def test_a_short_wait_has_the_reason_too(waiting: Waiting) -> None:
-    """Its only look at the links is the one at its end."""
-    assert waiting({}, 0.5, SHOWN, strangers=(STRANGER,)) == [
-        f"no plant of run lab at tcp/127.0.0.1:7447 within 0.5 s: {STRANGER}"
-    ]
+    assert [line for line in reminders if STRANGER in line] == [f"2: {STRANGER}"]
+    assert last == f"no plant of run lab at tcp/127.0.0.1:7447 within 10 s: {STRANGER}"
+    assert waiting({}, 0.5, SHOWN, strangers=(STRANGER,))[0].endswith(STRANGER)
 
 
 def test_a_refused_certificate_ends_the_wait(waiting: Waiting, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,8 +1,9 @@
-"""What those who only look on and record believe: commands, `watch`, the record of links."""
+"""What those who only look on and record believe: commands, `watch`, the record of links; the tokens that they keep."""
 
 from __future__ import annotations
 
 import random
+from collections.abc import Iterable
 from typing import Any
 
 import msgspec
@@ -14,14 +15,17 @@ from gridpeers.scenarios.emulation.link_data import LinkReportData, encode_data
 from gridpeers.scenarios.live import run_client as client
 from gridpeers.scenarios.live.run_address import address_of
 from gridpeers.scenarios.live.run_client import RunClient
-from gridpeers.scenarios.live.run_monitor import RunMonitor
+from gridpeers.scenarios.live.run_monitor import RunMonitor, RunTokens
 from gridpeers.scenarios.live.run_requests import read_config
 from gridpeers.scenarios.live.watching import RunSubscriber, plain
 from gridpeers.scenarios.results.link_record import LinkRecord
+from gridpeers.wire.bounds import MOST_INVERTERS
 from gridpeers.wire.codec import RejectedError, decode, encode
-from gridpeers.wire.driver.inbox import Inbox
+from gridpeers.wire.driver.inbox import MOST_TOKENS, Inbox
 from gridpeers.wire.keys import Keys
+from gridpeers.wire.membership import MOST_PROCESSES
 from gridpeers.wire.messages import AgentStatus, LinkReport, LinkRequest, Message, Telemetry
+from gridpeers.wire.node import MOST_PLANTS
 from tests.hostile.cases import Truth, hostile
 from tests.toy.link_traces import by_link
 from tests.toy.toy_configs import agent_config
@@ -40,11 +44,18 @@ class Line:
     def __init__(self) -> None:
         self.events: list[Event] = []
         self.inbox = Inbox()
+        self.subscribed: list[str] = []
+        self.subscribe = self.subscribed.append
 
     def take(self, count: int, seconds: float) -> list[Event]:
         """All that is there."""
         events, self.events = self.events, []
-        return events
+        return [*events, *self.inbox.take(0, 0.0)]
+
+    def put(self, kind: str, tokens: Iterable[str]) -> None:
+        """Let tokens appear or vanish, as far as the inbox has room."""
+        for token in tokens:
+            self.inbox.put((kind, token, b""))
 
     def __getattr__(self, name: str) -> Any:
         return lambda *_, **__: None
@@ -91,12 +102,12 @@ def test_a_visitor_shows_the_same_whatever_else_is_published(line: Line) -> None
     ]
     subscriber.take(0.1)
     before = plain(monitor.snapshot((), 0.0))
-    flood = list(hostile(keys, {"plant": 7, **dict.fromkeys(NAMES, 7)}, random.Random(1)))
+    flood = list(hostile(keys, {"plant": 7, **dict.fromkeys(NAMES, 7)}, random.Random(1)))[::10]
     line.events = [("message", key, payload, 0.0) for key, payload in flood if not is_status(payload, key)]
     sent = len(line.events)
     subscriber.take(0.1)
 
-    assert sent > 30_000
+    assert sent > 3_000
     assert plain(monitor.snapshot((), 0.0)) == before
     assert before.replace("\n", "").isprintable()
 
@@ -175,3 +186,96 @@ def test_every_message_that_is_sent_can_be_read_by_a_visitor_of_that_plant(line:
     assert at.read(KEYS.telemetry, encode(said)) == said
     assert at.read(KEYS.telemetry, encode(replace(telemetry(1.0), epoch=6))) is None
     assert at.read(KEYS.telemetry, b"nonsense") is None
+
+
+def take_all(at: RunClient) -> None:
+    """Let the client see all that has come."""
+    assert list(at.take(0.0)) == []
+
+
+def strangers(names: int, instances: int) -> list[str]:
+    """Tokens of names that no run has."""
+    return [KEYS.alive_agent(f"who{name}", f"a{one}") for one in range(instances) for name in range(names)]
+
+
+def test_a_client_keeps_a_bounded_number_of_tokens(line: Line) -> None:
+    """Of strangers' tokens as many wait as with an agent, and each kind has the room that it has there."""
+    at = RunClient(address_of("lab", None))
+    line.put("appeared", [KEYS.alive_plant(7), *strangers(3 * MOST_TOKENS, 1)])
+    (loss,) = line.inbox.take_losses()
+
+    assert loss.number == 2 * MOST_TOKENS + 1
+    take_all(at)
+    assert (at.plant, len(at.present)) == (True, MOST_INVERTERS)
+
+
+def test_what_a_client_has_noted_is_seen_to_go_and_to_come_back_in_a_flood(line: Line) -> None:
+    """`gridpeers watch` shows an agent as gone although thousands of strangers' tokens wait."""
+    at = RunClient(address_of("lab", None))
+    own = [KEYS.alive_plant(7), KEYS.alive_agent("inv1", "a"), KEYS.alive_agent("inv2", "b")]
+    line.put("appeared", own)
+    take_all(at)
+    line.put("appeared", strangers(MOST_INVERTERS // 2, 3 * MOST_TOKENS // MOST_INVERTERS * 2))
+    line.put("vanished", [own[0], own[2]])
+    _ = list(at.take(0.0))
+
+    assert (at.plant, "inv1" in at.present, "inv2" in at.present) == (False, True, False)
+    line.put("appeared", [own[0], own[2]])
+    take_all(at)
+    assert (at.plant, {"inv1", "inv2"} <= set(at.present)) == (True, True)
+
+
+def test_a_watcher_subscribes_to_a_bounded_number_of_strangers_and_to_every_inverter(line: Line) -> None:
+    """Each subscription is known to every process of the run; the run's own inverters have theirs whatever comes."""
+    at, monitor = RunClient(address_of("lab", None)), RunMonitor("lab")
+    subscriber = RunSubscriber(at, monitor)
+    for turn in range(3):
+        names = [KEYS.alive_agent(f"who{turn}-{name}", "a") for name in range(MOST_INVERTERS)]
+        line.put("appeared", names)
+        subscriber.take(0.0)
+        line.put("vanished", names)
+        subscriber.take(0.0)
+    monitor.config(agent_config("inv1", 3))
+    subscriber.take(0.0)
+    statuses = [key for key in line.subscribed if key.startswith(KEYS.status(""))]
+
+    assert len(statuses) == len(set(statuses)) == MOST_INVERTERS + 1
+    assert statuses[-1] == KEYS.status("inv1")
+
+
+def test_each_kind_of_token_has_room_of_its_own() -> None:
+    """Plants that hold many epochs, runs that do not exist, a name that many claim: none keeps the others out."""
+    tokens = RunTokens("lab")
+    for number in range(2 * MOST_PLANTS):
+        tokens.appeared(KEYS.alive_plant(number))
+        tokens.appeared(Keys(f"run{number}").alive_plant(1))
+        tokens.appeared(KEYS.alive_agent("inv1", f"a{number}"))
+        tokens.appeared(KEYS.alive_recorder(f"r{number}"))
+    tokens.appeared(KEYS.alive_agent("inv2", "a"))
+
+    assert tokens.epochs == set(range(MOST_PLANTS))
+    assert tokens.runs == {"lab", *(f"run{number}" for number in range(MOST_PLANTS))}
+    assert {name: len(of) for name, of in tokens.agents.items()} == {"inv1": MOST_PROCESSES, "inv2": 1}
+    assert not tokens.is_noted(KEYS.alive_recorder("r1"))
+
+
+def test_what_has_gone_leaves_nothing() -> None:
+    """Nor does the end of a token for which there was no room; of two plants of another run one stays."""
+    tokens = RunTokens("lab")
+    there = [
+        KEYS.alive_plant(7),
+        Keys("mine").alive_plant(1),
+        Keys("mine").alive_plant(2),
+        *strangers(1, MOST_PROCESSES + 1),
+        KEYS.alive_agent("inv1", "a"),
+    ]
+    for key in there:
+        tokens.appeared(key)
+    tokens.vanished(Keys("mine").alive_plant(1))
+
+    assert tokens.runs == {"lab", "mine"}
+    assert [key for key in there if not tokens.is_noted(key)] == [there[1], there[2 + MOST_PROCESSES + 1]]
+    for key in there:
+        tokens.vanished(key)
+    assert (tokens.epochs, tokens.runs, tokens.agents) == (set(), set(), {})
+    assert not any(map(tokens.is_noted, there))
