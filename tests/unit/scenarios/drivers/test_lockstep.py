@@ -47,7 +47,7 @@ def test_a_run_goes_to_its_end() -> None:
     assert rows[-1][1] == pytest.approx(60.0, abs=1e-3)
 
 
-@settings(max_examples=30)
+@settings(max_examples=10)
 @given(SEEDS, st.sampled_from(["full", "none", "GFM-only", "clustered", "ring"]))
 def test_who_is_faster_changes_nothing(seed: int, graph: GraphRule) -> None:
     """The rows are the same to the last bit in any order of delivery, and nothing stalls."""
@@ -60,7 +60,7 @@ def test_who_is_faster_changes_nothing(seed: int, graph: GraphRule) -> None:
     assert not run.plant.rejects.counts
 
 
-@settings(max_examples=30)
+@settings(max_examples=10)
 @given(SEEDS, st.integers(0, 19), st.sampled_from(["full", "ring", "clustered"]))
 def test_the_run_survives_any_death_at_any_moment(seed: int, steps: int, graph: GraphRule) -> None:
     """An agent that dies once ticks have begun is taken off the roster, which is said; the others go on to the end."""
@@ -122,7 +122,7 @@ def test_who_dies_before_the_start_breaks_the_run() -> None:
     assert not run.agents
 
 
-@settings(max_examples=30)
+@settings(max_examples=10)
 @given(SEEDS)
 def test_a_second_agent_of_a_name_is_refused(seed: int) -> None:
     """Of two processes that claim a name one takes part; the other is told so by name, and the rows are the same."""
@@ -149,7 +149,7 @@ def test_an_agent_of_an_unknown_name_is_refused() -> None:
     assert run.plant.outcome == ""
 
 
-@settings(max_examples=20)
+@settings(max_examples=5)
 @given(SEEDS)
 def test_garbage_on_every_key_changes_nothing(seed: int) -> None:
     """Any bytes on any key are counted, raise nothing, and leave the rows the same."""

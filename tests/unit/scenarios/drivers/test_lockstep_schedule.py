@@ -39,7 +39,7 @@ def in_one_process(*args: Any, **kwargs: Any) -> tuple[Outcome, list[tuple[float
     return run_inprocess(plant, agents, lambda message: rows.extend(message.rows), plant=ToyPlant(plant)), rows
 
 
-@settings(max_examples=20)
+@settings(max_examples=5)
 @given(SEEDS, st.sampled_from(["full", "none", "GFM-only", "clustered", "ring"]))
 def test_who_is_faster_changes_nothing(seed: int, graph: GraphRule) -> None:
     """Leaving and returning gives the same rows and events to the last bit, whoever is heard first."""
@@ -111,7 +111,7 @@ def test_everybody_may_leave_and_return_at_once() -> None:
     assert rows[-1][0] == 0.4
 
 
-@settings(max_examples=20)
+@settings(max_examples=5)
 @given(SEEDS, st.integers(0, 40))
 def test_a_death_around_a_move_does_not_stall_the_run(seed: int, steps: int) -> None:
     """When another agent dies just as one leaves or joins, the rest go on to the end."""
