@@ -17,12 +17,13 @@ from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.equipment.named_loads import set_power
 from gridpeers.plant.tables import FeederError, read_feeder
 from gridpeers.rooms import ROOMS
+from gridpeers.scenarios.emulation.link_data import NO_MESSAGES
 from gridpeers.scenarios.live.feeder_map import FeederMap, MapInverter, feeder_map
 from gridpeers.scenarios.live.run_monitor import InverterStatus, PlantStatus
 from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.viewer.agent_moments import AgentMoment, AgentMoments
-from gridpeers.viewer.link_faults import NO_MESSAGES, LinkFaults
+from gridpeers.viewer.link_faults import LinkFaults
 from gridpeers.viewer.link_states import LinkView
 from gridpeers.viewer.plant_rows import PlantRows
 from gridpeers.viewer.run_view import Cursor, EventView, Frame, LivenessView, RunView
