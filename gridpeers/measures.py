@@ -13,13 +13,13 @@ from gridpeers.scenarios.results.metrics import (
     MPSI,
     MPSI_BAND,
     MQSI,
+    STEADY,
     Settling,
     Steady,
     V_error,
     mean_frequency,
     mean_voltage,
 )
-from gridpeers.scenarios.results.steadiness import STEADY
 
 if TYPE_CHECKING:
     from gridpeers.plant.equipment import Feeder

@@ -8,8 +8,9 @@ were set in the run. What is left for the one inverter is generation as it shoul
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 from math import inf
-from typing import Annotated, NamedTuple, TypeVar
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -40,9 +41,6 @@ FIRST = 0.1
 
 KEPT = 32  # Number of factored networks to keep: loads of a long run may change hundreds of times
 
-Key = TypeVar("Key")
-Value = TypeVar("Value")
-
 
 class NetworkState(NamedTuple):
     """Switches and loads of a feeder at a time of a run."""
@@ -55,7 +53,7 @@ class NetworkState(NamedTuple):
 class IslandBalance(NamedTuple):
     """Generation of one island in one row, beside what its loads and losses take."""
 
-    inverters: tuple[int, ...]
+    inverters: tuple[str, ...]
     generated: complex
     """Power that its inverters delivered (VA)."""
     taken: complex
@@ -70,8 +68,8 @@ class IslandPowerFlow:
         self.network = Network(feeder, spares=spares)
         self._at = [names.index(unit.name) for unit in self.network.inverters]
         self._units = installed_inverters(self.network, settings)
-        self._circuits: dict[NetworkState, Circuit] = {}
-        self._flows: dict[tuple[NetworkState, bytes], tuple[PowerFlow, Inverters]] = {}
+        self._circuit = lru_cache(maxsize=KEPT)(self._circuit_in)
+        self._flow = lru_cache(maxsize=KEPT)(self._flow_in)
 
     def balances(self, state: NetworkState, P: Floats, Q: Floats, V: Floats, present: Flags) -> list[IslandBalance]:
         """Return the balance of each island without the substation that has a three-phase grid-forming inverter.
@@ -79,15 +77,11 @@ class IslandPowerFlow:
         Raise RuntimeError if no state of the network has these powers (`gridpeers.plant.dynamics.PlantError`).
         """
         P, Q, V, online = P[self._at], Q[self._at], V[self._at], present[self._at]
-        flow, units = self._flow(state, online)
+        flow, units = self._flow(state, tuple(online.tolist()))
         reduction = flow.reduction
-        swings = [
-            int(of[0])
-            for island in np.unique(reduction.inverter_island[reduction.online])
-            if not reduction.has_source[island]
-            for of in [np.flatnonzero(self._forming(units, reduction.online) & (reduction.inverter_island == island))]
-            if of.size
-        ]
+        forming = np.flatnonzero(units.forming & ~units.single & reduction.online)
+        islands, first = np.unique(reduction.inverter_island[forming], return_index=True)
+        swings = [int(i) for island, i in zip(islands, forming[first], strict=True) if not reduction.has_source[island]]
         if not swings:
             return []
         frozen = np.zeros(len(units), bool)
@@ -112,31 +106,19 @@ class IslandPowerFlow:
             members = np.flatnonzero(reduction.online & (reduction.inverter_island == reduction.inverter_island[swing]))
             generated = complex(S[members].sum())
             taken = generated - complex(S[swing]) + complex(delivered[swing])
-            found.append(IslandBalance(tuple(self._at[i] for i in members), generated, taken))
+            names = tuple(self.network.inverters[i].name for i in members)
+            found.append(IslandBalance(names, generated, taken))
         return found
 
-    def _forming(self, units: Inverters, online: Flags) -> Flags:
-        whole: Flags = units.forming & ~units.single & online
-        return whole
+    def _circuit_in(self, state: NetworkState) -> Circuit:
+        network = self.network
+        if state.powers:
+            network = network.with_loads(with_powers(network.feeder, dict(state.powers)))
+        return circuit_of(network, state.closed, network.loads())
 
-    def _flow(self, state: NetworkState, online: Flags) -> tuple[PowerFlow, Inverters]:
-        key = state, online.tobytes()
-        if key not in self._flows:
-            if state not in self._circuits:
-                _make_room(self._circuits)
-                network = self.network
-                if state.powers:
-                    network = network.with_loads(with_powers(network.feeder, dict(state.powers)))
-                self._circuits[state] = circuit_of(network, state.closed, network.loads())
-            _make_room(self._flows)
-            units = Inverters(self._units, online.tolist())
-            self._flows[key] = PowerFlow(self._circuits[state], units, np.zeros(len(units), bool)), units
-        return self._flows[key]
-
-
-def _make_room(kept: dict[Key, Value]) -> None:
-    if len(kept) == KEPT:
-        del kept[next(iter(kept))]
+    def _flow_in(self, state: NetworkState, online: tuple[bool, ...]) -> tuple[PowerFlow, Inverters]:
+        units = Inverters(self._units, list(online))
+        return PowerFlow(self._circuit(state), units, np.zeros(len(units), bool)), units
 
 
 _latest: list[tuple[Feeder, tuple[str, ...], PlantSettings, IslandPowerFlow]] = []
@@ -158,30 +140,21 @@ class PowerBalance(Check):
         flows, history, judged = _flows_of(case), case.history, 0
         worst: dict[tuple[str, str], Violation] = {}
         for row in _rows(case):
+            t, values = float(history.t[row]), (history.P[row], history.Q[row], history.V[row], history.present[row])
             try:
-                balances = flows.balances(
-                    _state_at(case, float(history.t[row])),
-                    history.P[row],
-                    history.Q[row],
-                    history.V[row],
-                    history.present[row],
-                )
+                balances = flows.balances(_state_at(case, t), *values)
             except RuntimeError as error:
-                yield Violation(
-                    text=f"no state of the network has the recorded powers: {error}", t=float(history.t[row])
-                )
+                yield Violation(text=f"no state of the network has the recorded powers: {error}", t=t)
                 continue
+            judged += len(balances)
             for balance in balances:
-                judged += 1
-                off, size = balance.generated - balance.taken, abs(balance.generated)
+                off, size, name = balance.generated - balance.taken, abs(balance.generated), balance.inverters[0]
                 for kind, part in (("real power", off.real), ("reactive power", off.imag)):
-                    found = 100.0 * abs(part) / size if size else 0.0
-                    name = history.inverters[balance.inverters[0]]
-                    before = worst.get((name, kind))
+                    found, before = 100.0 * abs(part) / size if size else 0.0, worst.get((name, kind))
                     if not found <= self.tolerance_percent and (before is None or found > (before.value or 0.0)):
                         worst[name, kind] = Violation(
                             text=f"generation minus load and losses, {kind}, island of {name}",
-                            t=float(history.t[row]),
+                            t=t,
                             agent=name,
                             value=found,
                             unit="%",
@@ -227,7 +200,7 @@ def _state_at(case: CheckedCase, t: float) -> NetworkState:
         for event in case.events
         if event.kind == "load" and event.t < t - 1e-9 and (S := _power_of(event)) is not None
     }
-    until = (event for event in case.switch_events if event.t <= t + 1e-9)
+    until = (event for event in case.events if event.kind == "switch" and event.t <= t + 1e-9)
     return NetworkState(closed_switches(case.feeder, until), frozenset(powers.items()))
 
 

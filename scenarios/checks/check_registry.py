@@ -44,16 +44,16 @@ CHECKS: Registry[Any] = Registry(
     own={
         name: f"gridpeers.scenarios.checks.{place}"
         for name, place in {
-            "frequency": "band_checks:Frequency",
-            "voltage": "band_checks:Voltage",
-            "power_sharing": "sharing_checks:PowerSharing",
-            "var_sharing": "sharing_checks:VarSharing",
-            "rating": "band_checks:Rating",
-            "oscillation": "rest_checks:Oscillation",
-            "steady": "rest_checks:SteadyEnd",
+            "frequency": "window_checks:Frequency",
+            "voltage": "window_checks:Voltage",
+            "power_sharing": "window_checks:PowerSharing",
+            "var_sharing": "window_checks:VarSharing",
+            "rating": "run_checks:Rating",
+            "oscillation": "run_checks:Oscillation",
+            "steady": "window_checks:SteadyEnd",
             "power_balance": "balance_check:PowerBalance",
-            "returns": "event_checks:Returned",
-            "law_failed": "event_checks:LawFailed",
+            "returns": "run_checks:Returned",
+            "law_failed": "run_checks:LawFailed",
         }.items()
     },
     reserved=ALWAYS,
@@ -88,24 +88,12 @@ def chosen_checks(entries: Iterable[str | Mapping[str, Any]]) -> dict[str, Plugi
 
 
 def switched_off(entries: Iterable[str | Mapping[str, Any]]) -> tuple[str, ...]:
-    """Return the names of the checks of every run that a scenario's entries take out.
-
-    Examples
-    --------
-    >>> switched_off([{"use": "steady", "off": True}, {"use": "rating", "P_limit_pu": 1.2}])
-    ('steady',)
-    """
+    """Return the names of the checks of every run that a scenario's entries take out."""
     chosen = chosen_checks(entries)
     return tuple(name for name in ALWAYS if name not in chosen)
 
 
 def check_name(entry: str | Mapping[str, Any]) -> str:
-    """Return the name of an entry in the verdict: its own, or the last part of its reference.
-
-    Examples
-    --------
-    >>> check_name("mine:Calm"), check_name({"use": "frequency", "name": "tight"})
-    ('Calm', 'tight')
-    """
+    """Return the name of an entry in the verdict: its own, or the last part of its reference."""
     table = table_of(entry)
     return str(table.get("name") or str(table.get("use", "")).rpartition(":")[2].rpartition(".")[2])

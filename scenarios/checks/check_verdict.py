@@ -15,9 +15,7 @@ if TYPE_CHECKING:
     from gridpeers.scenarios.checks.checked_case import CheckedCase
 
 
-CheckStatus = Literal["passed", "failed", "not judged", "off"]
-"""Not judged: the record has no data for the check, or the run never was in a state that it is about. Off: the scenario
-takes the check out of the verdict."""
+CheckStatus = Literal["passed", "failed", "not judged", "off"]  # Off: the scenario takes it out of the verdict
 
 SHOWN_VIOLATIONS = 20  # Most violations that a verdict keeps; it counts up to `MOST_VIOLATIONS`
 
@@ -38,10 +36,7 @@ class Check:
     """A check: its limits are annotated attributes, with unit, range and default (docs/plugins.md)."""
 
     def __call__(self, case: CheckedCase) -> Iterable[Violation]:
-        """Return, or yield, the violations of a recorded case; none if it passes.
-
-        Raise NotJudgedError if the record has no data for the check, or the run never was in a state that it is about.
-        """
+        """Return the violations of a recorded case; raise NotJudgedError where it cannot be judged."""
         raise NotImplementedError
 
 
@@ -56,21 +51,18 @@ class Violation(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """
 
     text: str
-    """What is out of its limit, and when it is judged."""
     t: float | None = None
-    """When (s of run time)."""
+    """Run time (s)."""
     agent: str = ""
     """Agent or inverter; of a link its receiver. Empty for one of the whole network."""
     value: float | None = None
-    """What was found, in `unit`."""
     unit: str = ""
     """Unit of value and limit; empty for a pure number."""
     limit: float | None = None
-    """What would have passed, in `unit`."""
+    """What would have passed."""
 
     @property
     def sentence(self) -> str:
-        """The violation on one line."""
         unit = f" {self.unit}" if self.unit else ""
         found = [self.agent] if self.agent else []
         found += [f"{self.value:.3g}{unit}"] if self.value is not None else []
@@ -87,13 +79,12 @@ class CheckVerdict(msgspec.Struct, frozen=True, kw_only=True):
     reason: str = ""
     """Why it was not judged, is off, or what a check that failed has raised, also behind its violations."""
     violations: tuple[Violation, ...] = ()
-    """The violations, the first `SHOWN_VIOLATIONS` as the check gave them."""
+    """The first `SHOWN_VIOLATIONS`."""
     count: int = 0
     """Number of all violations, at most `MOST_VIOLATIONS`."""
 
     @property
     def sentence(self) -> str:
-        """The verdict on one line."""
         more = f", and {self.count - 1} more" if self.count > 1 else ""
         found = [self.violations[0].sentence + more] if self.violations else []
         detail = "; ".join([*found, *filter(None, [self.reason])])
@@ -101,15 +92,7 @@ class CheckVerdict(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def summary(verdicts: tuple[CheckVerdict, ...]) -> str:
-    """Return the verdict of a case on one line: how many passed, each that is off, and each that failed.
-
-    Examples
-    --------
-    >>> summary((CheckVerdict(check="rating", status="passed"), CheckVerdict(check="heal", status="not judged")))
-    '1 of 1 checks passed, 1 not judged'
-    >>> summary((CheckVerdict(check="rating", status="passed"), CheckVerdict(check="steady", status="off")))
-    '1 of 1 checks passed, steady switched off'
-    """
+    """Return the verdict of a case on one line: how many passed, each that is off, and each that failed."""
     passed = sum(verdict.status == "passed" for verdict in verdicts)
     failed = [verdict for verdict in verdicts if verdict.status == "failed"]
     off = [verdict.check for verdict in verdicts if verdict.status == "off"]
@@ -124,8 +107,6 @@ def summary(verdicts: tuple[CheckVerdict, ...]) -> str:
 FILE = "checks.json"  # Name of the file in the run folder
 Verdicts = Mapping[str, tuple[CheckVerdict, ...]]  # Verdicts of a run by case, in the order of the checks
 
-_decoder = msgspec.json.Decoder(dict[str, tuple[CheckVerdict, ...]])
-
 
 def verdicts_json(verdicts: Verdicts) -> str:
     return msgspec.json.format(msgspec.json.encode(verdicts), indent=1).decode() + "\n"
@@ -133,7 +114,7 @@ def verdicts_json(verdicts: Verdicts) -> str:
 
 def read_verdicts(path: Path) -> dict[str, tuple[CheckVerdict, ...]]:
     """Read a checks.json. Raise ValueError if it is none."""
-    return _decoder.decode(path.read_bytes())
+    return msgspec.json.decode(path.read_bytes(), type=dict[str, tuple[CheckVerdict, ...]])
 
 
 Since = Annotated[float, Unit("s"), Plausible("a time of the run", 0.0, 86_400.0)]

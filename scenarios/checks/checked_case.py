@@ -12,10 +12,10 @@ import numpy as np
 
 from gridpeers.plant.equipment import Feeder
 from gridpeers.scenarios.checks.check_registry import READERS
-from gridpeers.scenarios.checks.check_verdict import NotJudgedError
+from gridpeers.scenarios.checks.check_verdict import NotJudgedError, Violation
 from gridpeers.scenarios.results.event_windows import CaseRecord, Window
 from gridpeers.scenarios.results.history import Flags, History, Nameplates, read_only
-from gridpeers.scenarios.results.island_membership import island_intervals, islands_at_end, part_of, switch_events
+from gridpeers.scenarios.results.island_membership import island_intervals, islands_at_end, part_of
 from gridpeers.scenarios.schema.configs import limits_of
 from gridpeers.scenarios.schema.participants import netem_of, without_agent
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
@@ -28,7 +28,7 @@ _RESTARTS = ("switch", "inverter", "load")
 connected later than the scenario says, a load that somebody changed."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class IslandWindow:
     """One island in the window of one event: its own columns of the window's rows, of which there is one at least."""
 
@@ -36,9 +36,16 @@ class IslandWindow:
     label: str
     """Label of the event, with the island where there are several."""
     fed: bool
-    """Whether the substation feeds it: secondary control is on hold then."""
+    """True if the substation feeds it: secondary control is on hold then."""
     history: History
     nameplates: Nameplates
+
+    def violation(
+        self, text: str, i: int, value: float, limit: float, unit: str = "", t: float | None = None
+    ) -> Violation:
+        """Return a violation by the inverter of column i at a time (s), by default the end of the window."""
+        at, name = self.window.end if t is None else float(t), self.history.inverters[i]
+        return Violation(text=text, t=at, agent=name, value=float(value), unit=unit, limit=limit)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,9 +57,8 @@ class CheckedCase:
     feeder: Feeder
     case: str
     history: History
-    """All rows, as read-only arrays (rows, inverters): t (s), f (Hz), P (W), Q (var), V (V), P_set (W), V_set (V)."""
+    """All rows, as read-only arrays (rows, inverters)."""
     windows: Sequence[Window]
-    """Windows of the events: label, start and end (s)."""
     events: tuple[PlantEvent, ...]
     """Events of plant, roster and links."""
     folder: Path | None = None
@@ -60,22 +66,11 @@ class CheckedCase:
 
     @classmethod
     def of(
-        cls,
-        scenario: ScenarioModel,
-        feeder: Feeder,
-        case: str,
-        record: CaseRecord,
-        folder: Path | None = None,
+        cls, scenario: ScenarioModel, feeder: Feeder, case: str, record: CaseRecord, folder: Path | None = None
     ) -> CheckedCase:
-        """Return a recorded case, in its folder if it has one; its arrays refuse writes."""
+        rows, windows, events = read_only(record.history), record.windows, tuple(record.events)
         return cls(
-            scenario=scenario,
-            feeder=feeder,
-            case=case,
-            history=read_only(record.history),
-            windows=record.windows,
-            events=tuple(record.events),
-            folder=folder,
+            scenario=scenario, feeder=feeder, case=case, history=rows, windows=windows, events=events, folder=folder
         )
 
     @cached_property
@@ -124,11 +119,6 @@ class CheckedCase:
         return late
 
     @cached_property
-    def switch_events(self) -> tuple[PlantEvent, ...]:
-        """Operations of switches as they happened: one that waits for synchronism has none until it closes."""
-        return switch_events(self.scenario, self.feeder, self.events)
-
-    @cached_property
     def parts(self) -> tuple[IslandWindow, ...]:
         """Each island with inverters at the end of each window, see `islands_at_end`.
 
@@ -144,9 +134,7 @@ class CheckedCase:
             for name, island in at_end.items():
                 history, nameplates = part_of(rows, self.nameplates, island.inverters)
                 label = window.label + (f", island of {name}" if len(at_end) > 1 else "")
-                found.append(
-                    IslandWindow(window=window, label=label, fed=island.fed, history=history, nameplates=nameplates)
-                )
+                found.append(IslandWindow(window, label, island.fed, history, nameplates))
         return tuple(found)
 
     def killed(self, history: History) -> Flags:
@@ -159,10 +147,7 @@ class CheckedCase:
         return found
 
     def at_limit(self, part: IslandWindow) -> Flags:
-        """Return which inverters of an island deliver all power that they have available, by row: they cannot share.
-
-        Only limits that an event changed count; shape (T, N).
-        """
+        """Return which inverters of an island deliver all power that an event left them, by row; shape (T, N)."""
         names = part.history.inverters
         found: Flags = np.zeros(part.history.P.shape, bool)
         for limit in limits_of(self.scenario, self.case):  # in the order of time: a later one replaces an earlier one

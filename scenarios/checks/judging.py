@@ -60,19 +60,18 @@ def judge_by(
     has yielded before counts, whatever it raises then, also `NotJudgedError`. A `stop` takes a request to end: this
     check and all further ones are not judged; without it the request goes through.
     """
-    with np.errstate(all="ignore"):  # a value that is no number is within no limit, or has its own reason
-        return tuple(_unless_stopped(name, plugin, case, stop) for name, plugin in checks.items())
-
-
-def _unless_stopped(name: str, plugin: Plugin, case: CheckedCase, stop: JudgingStop | None) -> CheckVerdict:
-    if stop is None:
-        return _verdict(name, plugin, case)
-    if stop.raised is None:
-        try:
-            return _verdict(name, plugin, case)
-        except stop.requests as request:
-            stop.raised = request
-    return CheckVerdict(check=name, status="not judged", reason=INTERRUPTED)
+    found, requests = [], stop.requests if stop else ()
+    for name, plugin in checks.items():
+        verdict = CheckVerdict(check=name, status="not judged", reason=INTERRUPTED)
+        if stop is None or stop.raised is None:
+            try:
+                with np.errstate(all="ignore"):  # a value that is no number is within no limit
+                    verdict = _verdict(name, plugin, case)
+            except requests as request:
+                assert stop is not None
+                stop.raised = request
+        found.append(verdict)
+    return tuple(found)
 
 
 @contextmanager
@@ -140,8 +139,4 @@ def _checked(violation: Any) -> Violation:
 
 
 def _number(value: Any) -> float | None:
-    """Return a value as a finite number; None where there is none."""
-    if value is None:
-        return None
-    number = float(value)
-    return number if math.isfinite(number) else None
+    return None if value is None or not math.isfinite(number := float(value)) else number

@@ -14,7 +14,7 @@ from gridpeers.plant.equipment.named_loads import load_name, named_loads
 from gridpeers.scenarios.live.run_monitor import line_of
 from gridpeers.scenarios.results.event_windows import Window, as_they_came, windows
 from gridpeers.scenarios.results.island_membership import is_closed
-from gridpeers.scenarios.results.steadiness import STEADY
+from gridpeers.scenarios.results.metrics import STEADY
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.scenarios.schema.participants import LISTS, netem_of
 from gridpeers.wire.messages import PlantEvent

@@ -17,9 +17,9 @@ from gridpeers.scenarios.results.event_windows import CaseRecord, Window, as_the
 from gridpeers.scenarios.results.findings import find
 from gridpeers.scenarios.results.history import History
 from gridpeers.scenarios.results.island_membership import taken_part
+from gridpeers.scenarios.results.metrics import STEADY
 from gridpeers.scenarios.results.recorded_events import law_failures
 from gridpeers.scenarios.results.report import RunReport
-from gridpeers.scenarios.results.steadiness import STEADY
 from gridpeers.scenarios.schema import ScenarioError, ScenarioModel
 from gridpeers.scenarios.schema.configs import as_in
 from gridpeers.scenarios.schema.loading import read_tables

@@ -5,17 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from gridpeers.plant.equipment import F_NOM, Feeder
 from gridpeers.scenarios.results.claims import Published
 from gridpeers.scenarios.results.event_windows import CaseRecord
-from gridpeers.scenarios.results.history import Nameplates
+from gridpeers.scenarios.results.history import Nameplates, read_only
 from gridpeers.scenarios.results.island_membership import island_intervals, islands_at_end, part_of
-from gridpeers.scenarios.results.metric import Measured, label
-from gridpeers.scenarios.results.metrics import Settling, Steady, measure, settling
-from gridpeers.scenarios.results.window_metrics import own_measures
+from gridpeers.scenarios.results.metric import Measured, label, make_metrics, measured
+from gridpeers.scenarios.results.metrics import Settling, Steady, measure
+from gridpeers.scenarios.results.window_metrics import WindowData
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.scenarios.schema.configs import limits_of
 from gridpeers.scenarios.schema.participants import without_agent
+from gridpeers.scenarios.schema.plugin_keys import metrics_of
 
 SteadyValues = Mapping[str, Mapping[str, Steady]]
 
@@ -32,12 +35,9 @@ class Findings:
     """First P_set of every inverter (pu)."""
     GFL: tuple[str, ...] = ()
     settled: Mapping[str, Mapping[str, Settling]] = field(default_factory=dict)
-    """Settling after each event, by case and event."""
+    """Settling by case and event."""
     islands: Mapping[str, Mapping[str, Mapping[str, Steady]]] = field(default_factory=dict)
-    """Steady values of each island, by case, event and the island's first inverter; only where there are several.
-
-    Islands are those at the end of the event's window, as its switches were recorded (`islands_at_end`).
-    """
+    """Steady values of each island at the end of a window, by case, event and its first inverter; where several are."""
     available: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     """Available power at the end, by case and inverter (pu of rating); only where it was changed."""
     without_agent: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
@@ -47,9 +47,14 @@ class Findings:
     own: Mapping[str, Mapping[str, Measured]] = field(default_factory=dict)
     """The scenario's own metrics, by case and event."""
 
-    def apart(self, case: str, event: str) -> bool:
-        """Return whether a window ends with several islands: each shares for itself, and that of all means nothing."""
-        return bool(self.islands.get(case, {}).get(event))
+    def apart(self, case: str, event: str) -> Mapping[str, Steady]:
+        """Return the islands at the end of a window if there are several: each shares for itself."""
+        return self.islands.get(case, {}).get(event, {})
+
+    def parts(self, case: str, event: str) -> dict[str, Steady]:
+        """Return the steady values of a window, and of each island beside by ", island of NAME"."""
+        islands = {f", island of {name}": steady for name, steady in self.apart(case, event).items()}
+        return {"": self.results[case][event]} | islands
 
     def value(self, cell: Published) -> float:
         """Return our number at the place of one of the paper's."""
@@ -70,24 +75,19 @@ class Findings:
 
     def unsteady(self, cases: Sequence[str], events: Sequence[str], measures: Sequence[str]) -> list[str]:
         """Return the reasons of those measures that are not steady, with their places; islands each for itself."""
-        reasons = []
-        for case in cases:
-            for event in events:
-                apart = self.islands.get(case, {}).get(event, {})
-                parts = {f", island of {name}": steady for name, steady in apart.items()}
-                for where, steady in (parts or {"": self.results[case][event]}).items():
-                    reasons += [
-                        f"case {case}, {event}{where}: {label(name, self.f_nom)} {steady.reasons[name]}"
-                        for name in measures
-                        if name in steady.reasons
-                    ]
-        return reasons
+        return [
+            f"case {case}, {event}{where}: {label(name, self.f_nom)} {steady.reasons[name]}"
+            for case in cases
+            for event in events
+            for where, steady in self.parts(case, event).items()
+            if where or not self.apart(case, event)
+            for name in measures
+            if name in steady.reasons
+        ]
 
     def has(self, cell: Published) -> bool:
-        events = self.results.get(cell.case, {})
-        return cell.event in events and (
-            not cell.island or cell.island in self.islands.get(cell.case, {}).get(cell.event, {})
-        )
+        islands = self.apart(cell.case, cell.event)
+        return cell.event in self.results.get(cell.case, {}) and (not cell.island or cell.island in islands)
 
 
 def find(scenario: ScenarioModel, feeder: Feeder, cases: Mapping[str, CaseRecord]) -> Findings:
@@ -99,23 +99,38 @@ def find(scenario: ScenarioModel, feeder: Feeder, cases: Mapping[str, CaseRecord
     settled: dict[str, dict[str, Settling]] = {}
     islands: dict[str, dict[str, dict[str, Steady]]] = {}
     available: dict[str, dict[str, float]] = {}
+    own: dict[str, dict[str, Measured]] = {}
+    metrics = make_metrics(metrics_of(scenario))
     for case, record in cases.items():
         everybody = Nameplates.of_columns(record.history.inverters, feeder)
-        nameplates = everybody.without(without_agent(scenario, case))
+        nameplates = read_only(everybody.without(without_agent(scenario, case)))
         results[case], settled[case], islands[case] = {}, {}, {}
+        own |= {case: {}} if metrics else {}
         intervals = island_intervals(scenario, feeder, record.history.inverters, record.events)
         within = record.history.until(scenario.time.end_s)
         for window in record.windows:
             history = within if window.end <= scenario.time.end_s else record.history
-            inside = window.cut(history)
-            results[case][window.label] = measure(inside, nameplates, window, feeder.f_nom)
-            settled[case][window.label] = settling(inside, nameplates, window, feeder.f_nom)
             at_end = islands_at_end(intervals, window)
-            if len(at_end) > 1:
-                islands[case][window.label] = {
-                    name: measure(*part_of(inside, nameplates, island.inverters), window, feeder.f_nom)
-                    for name, island in at_end.items()
-                }
+            parts = {
+                name: measure(*part_of(window.cut(history), nameplates, island.inverters), window, feeder.f_nom)
+                for name, island in at_end.items()
+                if len(at_end) > 1
+            }
+            islands[case] |= {window.label: parts} if parts else {}
+            data = WindowData.cut(
+                read_only(history),
+                window,
+                case=case,
+                islands=parts,
+                nameplates=nameplates,
+                f_nom=feeder.f_nom,
+                T_c=scenario.time.T_c_s,
+                messages_saved=record.messages_saved.get(window.label, 0.0),
+            )
+            results[case][window.label], settled[case][window.label] = data.steady, data.settled
+            if metrics:
+                with np.errstate(all="ignore"):  # a value that is no number has its reason
+                    own[case][window.label] = measured(metrics, data)
         rating = dict(zip(everybody.names, everybody.s.tolist(), strict=True))
         available[case] = {limit.inverter: limit.P_max / rating[limit.inverter] for limit in limits_of(scenario, case)}
     return Findings(
@@ -132,5 +147,5 @@ def find(scenario: ScenarioModel, feeder: Feeder, cases: Mapping[str, CaseRecord
             if (without := without_agent(scenario, case))
         },
         messages_saved={case: record.messages_saved for case, record in cases.items()},
-        own=own_measures(scenario, feeder, cases, islands),
+        own=own,
     )

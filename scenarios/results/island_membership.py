@@ -14,7 +14,7 @@ from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.equipment.connectivity import bus_islands, switch_name, switch_names
 from gridpeers.plant.simulators import SIMULATORS
 from gridpeers.scenarios.results.event_windows import Window
-from gridpeers.scenarios.results.history import Floats, History, Nameplates
+from gridpeers.scenarios.results.history import UNITS, Floats, History, Nameplates
 from gridpeers.scenarios.schema.participants import inverters_of
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.wire.messages import PlantEvent
@@ -137,11 +137,7 @@ def islands_at_end(intervals: Sequence[IslandInterval], window: Window) -> Islan
 def part_of(history: History, nameplates: Nameplates, names: tuple[str, ...]) -> tuple[History, Nameplates]:
     """Return the columns of some inverters alone, as if there were no others."""
     at = np.array([history.inverters.index(name) for name in names])
-    columns = {
-        field.name: getattr(history, field.name)[:, at]
-        for field in fields(history)
-        if field.name not in ("inverters", "t")
-    }
+    columns = {name: getattr(history, name)[:, at] for name in UNITS if name != "t"}
     mine = {field.name: getattr(nameplates, field.name)[at] for field in fields(nameplates) if field.name != "names"}
     return replace(history, inverters=names, **columns), replace(nameplates, names=names, **mine)
 

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from itertools import groupby
+from typing import NamedTuple
 
 from rich.console import Console, RenderableType
 from rich.table import Table
@@ -15,20 +18,17 @@ from gridpeers.scenarios.console import text_of
 from gridpeers.scenarios.results.claims import NO_BENCHMARK, Benchmark, Verdict
 from gridpeers.scenarios.results.findings import Findings
 from gridpeers.scenarios.results.metric import DIGITS, UNITS, Quantity, heading, label
-from gridpeers.scenarios.results.metrics import SHARING, Steady
+from gridpeers.scenarios.results.metrics import SHARING, STEADY, Steady
 from gridpeers.scenarios.results.recorded_events import LawFailure, first_of
-from gridpeers.scenarios.results.steadiness import STEADY
 
 GAP = 2  # Spaces behind a column
 
 
-@dataclass(frozen=True, kw_only=True)
-class Grid:
-    """A table as text."""
+class Grid(NamedTuple):
+    """A table as text; the first column names the rows, the first line of each other header its event."""
 
     title: str
     header: tuple[str, ...]
-    """The first column names the rows; the first line of each other one names its event."""
     rows: tuple[tuple[str, ...], ...]
     legend: str = ""
     """Lines below it; may be empty."""
@@ -37,14 +37,12 @@ class Grid:
 def folded(grid: Grid, width: int) -> Iterator[Grid]:
     r"""Yield a table in parts that are at most so wide (characters), one below the other; no event is torn apart.
 
-    Each part begins with the first column, has the rows that say something in it, and neither title nor legend. An
-    event that is wider has a part of its own.
+    Each part begins with the first column and has the rows that say something in it. An event that is wider has a part
+    of its own.
 
     Examples
     --------
-    >>> grid = Grid(title="", header=("case", "a\nf", "a\nMPSI", "b\nf"), rows=(("I", "0.1", "0.2", "0.3"),))
-    >>> [part.header for part in folded(grid, 22)]
-    [('case', 'a\nf', 'a\nMPSI', 'b\nf')]
+    >>> grid = Grid("", ("case", "a\nf", "a\nMPSI", "b\nf"), (("I", "0.1", "0.2", "0.3"),))
     >>> [part.header for part in folded(grid, 21)]
     [('case', 'a\nf', 'a\nMPSI'), ('case', 'b\nf')]
     """
@@ -53,23 +51,16 @@ def folded(grid: Grid, width: int) -> Iterator[Grid]:
         for column in zip(grid.header, *grid.rows, strict=True)
     ]
     parts: list[list[int]] = []
-    events: dict[str, list[int]] = {}
-    for i, text in enumerate(grid.header[1:], 1):
-        events.setdefault(text.partition("\n")[0], []).append(i)
-    for columns in events.values():
+    for _, event in groupby(range(1, len(grid.header)), lambda i: grid.header[i].partition("\n")[0]):
+        columns = list(event)
         if parts and sum(widths[i] for i in (0, *parts[-1], *columns)) <= width:
             parts[-1] += columns
         else:
-            parts.append(list(columns))
+            parts.append(columns)
     for columns in parts:
-        rows = [row for row in grid.rows if len(parts) == 1 or any(row[i] for i in columns)]
-        yield replace(
-            grid,
-            title="",
-            header=(grid.header[0], *(grid.header[i] for i in columns)),
-            rows=tuple((row[0], *(row[i] for i in columns)) for row in rows),
-            legend="",
-        )
+        rows = (row for row in grid.rows if len(parts) == 1 or any(row[i] for i in columns))
+        header, *cells = (tuple(row[i] for i in (0, *columns)) for row in (grid.header, *rows))
+        yield Grid("", header, tuple(cells))
 
 
 _TABLE = 140  # Characters of a table in a file: with four events it would have 200 and more
@@ -79,19 +70,15 @@ _COLOURS = {"PASS": "green", "FAIL": "bold red", "MISS": "yellow", "NOT RUN": "d
 
 @dataclass(frozen=True, kw_only=True)
 class RunReport:
-    """The content of the report at the end of a run."""
-
     scenario: str
     titles: Mapping[str, str]
     findings: Findings
     verdicts: Sequence[Verdict]
-    """Claims judged; empty for a scenario without a benchmark."""
     benchmark: Benchmark = NO_BENCHMARK
     """The publication of the experiment; its numbers stand beside ours."""
     checks: Mapping[str, tuple[CheckVerdict, ...]] = field(default_factory=dict)
     failures: Mapping[str, tuple[LawFailure, ...]] = field(default_factory=dict)
     notes: Sequence[str]
-    """Other facts that a reader must know, e.g. that an agent died."""
     folder: str
     """Folder of the results; "" for one that goes with them."""
 
@@ -100,19 +87,15 @@ class RunReport:
         return any(verdict.status == "failed" and check in ("", verdict.check) for verdict in verdicts)
 
 
-_GRIDS: tuple[tuple[str, tuple[Quantity, ...]], ...] = (
-    ("Frequency and power sharing", ("f_error_Hz", "MPSI")),
-    ("Voltage and var sharing", ("V_error", "MQSI")),
-)
-"""Titles and columns of the two tables."""
-
-
 def grids(report: RunReport) -> tuple[Grid, ...]:
     """Return the tables of our results, laid out as the paper's Tables I and II, with its numbers beside ours."""
     if not any(report.findings.results.values()):
         return ()  # without events there is no window to measure in
-    tables = [_grid(report, title, quantities) for title, quantities in _GRIDS]
-    return (*tables, _own_grid(report)) if report.findings.own else tuple(tables)
+    tables = (
+        _grid(report, "Frequency and power sharing", ("f_error_Hz", "MPSI")),
+        _grid(report, "Voltage and var sharing", ("V_error", "MQSI")),
+    )
+    return (*tables, _own_grid(report)) if report.findings.own else tables
 
 
 def plain(report: RunReport) -> str:
@@ -159,7 +142,6 @@ def _verdict_of(case: str, verdicts: tuple[CheckVerdict, ...]) -> Text:
 
 
 def _rendered(grid: Grid, width: int) -> Iterator[RenderableType]:
-    """Yield the lines and tables of a grid, whose parts are at most so wide (characters)."""
     yield Text(grid.title, style="bold")
     for part in folded(grid, width):
         table = Table(box=None, padding=(0, GAP, 0, 0))
@@ -173,7 +155,6 @@ def _rendered(grid: Grid, width: int) -> Iterator[RenderableType]:
 
 
 def _all_notes(report: RunReport) -> list[str]:
-    """Return the notes of a report, after those on inverters that its sharing indices leave out."""
     agentless = [
         f"case {case}: {', '.join(names)} without an agent: MPSI, MQSI and the time to restore leave "
         f"{'it' if len(names) == 1 else 'them'} out; frequency and voltage do not"
@@ -183,35 +164,29 @@ def _all_notes(report: RunReport) -> list[str]:
 
 
 def _grid(report: RunReport, title: str, quantities: tuple[Quantity, ...]) -> Grid:
-    results = report.findings.results
-    events = list(dict.fromkeys(event for steady in results.values() for event in steady))
-    timed = quantities[0] == "f_error_Hz"
-    header = ["case"]
+    findings = report.findings
+    events = list(dict.fromkeys(event for steady in findings.results.values() for event in steady))
+    header, rows = ["case"], []
     for event in events:
-        header += [f"{event}\n{heading(quantity, report.findings.f_nom)}" for quantity in quantities]
-        header += [f"{event}\nrestored in"] if timed else []
-    rows = []
-    for case, steady in results.items():
-        rows.append(_row(report, f"{case} {report.titles.get(case, '')}".strip(), case, steady, events, quantities))
-        islands = report.findings.islands.get(case, {})
-        for name in dict.fromkeys(name for parts in islands.values() for name in parts):
-            parts = {event: islands[event][name] for event in islands if name in islands[event]}
-            rows.append(_row(report, f"  island of {name}", case, parts, events, quantities, name))
-    beside = [one for one in report.benchmark.numbers if one.quantity in quantities and report.findings.has(one)]
+        header += [f"{event}\n{heading(quantity, findings.f_nom)}" for quantity in quantities]
+        header += [f"{event}\nrestored in"] if "f_error_Hz" in quantities else []
+    for case in findings.results:
+        islands = dict.fromkeys(name for parts in findings.islands.get(case, {}).values() for name in parts)
+        for island in ("", *islands):
+            words = f"  island of {island}" if island else _case(report, case)
+            cells = (cell for event in events for cell in _cells(report, case, event, island, quantities))
+            rows.append((words, *cells))
+    beside = [one for one in report.benchmark.numbers if one.quantity in quantities and findings.has(one)]
     sources = dict.fromkeys(one.source for one in beside)
     against = f", ours | paper's {' and '.join(sources)}" if sources else ""
-    apart = any(report.findings.apart(case, event) for case, steady in results.items() for event in steady)
-    return Grid(
-        title=f"{title} after each event{against}",
-        header=tuple(header),
-        rows=tuple(rows),
-        legend="\n".join(
-            [
-                *(["-: where there are several islands, each shares for itself; see its own row"] if apart else []),
-                *_reasons(report, quantities),
-            ]
-        ),
-    )
+    legend = list(_reasons(report, quantities))
+    if any(findings.islands.values()):
+        legend.insert(0, "-: where there are several islands, each shares for itself; see its own row")
+    return Grid(f"{title} after each event{against}", tuple(header), tuple(rows), "\n".join(legend))
+
+
+def _case(report: RunReport, case: str) -> str:
+    return f"{case} {report.titles.get(case, '')}".strip()
 
 
 def _own_grid(report: RunReport) -> Grid:
@@ -219,39 +194,26 @@ def _own_grid(report: RunReport) -> Grid:
     places = dict.fromkeys((event, name) for of in own.values() for event in of for name in of[event].values)
     rows, reasons = [], []
     for case, of in own.items():
-        row = [f"{case} {report.titles.get(case, '')}".strip()]
-        for event, name in places:
-            value = of[event].values.get(name) if event in of else None
-            row.append("-" if value is None else f"{value:.5g}")
-        rows.append(tuple(row))
+        values = [of[event].values.get(name) if event in of else None for event, name in places]
+        rows.append((_case(report, case), *("-" if value is None else f"{value:.5g}" for value in values)))
         reasons += [f"case {case}, {event}: {name} {text}" for event in of for name, text in of[event].reasons.items()]
     header = ("case", *(f"{event}\n{name}" for event, name in places))
-    return Grid(title="Metrics of the scenario", header=header, rows=tuple(rows), legend="\n".join(reasons))
+    return Grid("Metrics of the scenario", header, tuple(rows), "\n".join(reasons))
 
 
-def _row(
-    report: RunReport,
-    title: str,
-    case: str,
-    steady: Mapping[str, Steady],
-    events: Sequence[str],
-    quantities: tuple[Quantity, ...],
-    island: str = "",
-) -> tuple[str, ...]:
-    row = [title]
-    for event in events:
-        if event not in steady:
-            row += [""] * (len(quantities) + (quantities[0] == "f_error_Hz"))
-            continue
-        values, mixed = steady[event], not island and report.findings.apart(case, event)
-        row += [
-            "-" if mixed and name in SHARING else _cell(report, case, event, name, values, island)
-            for name in quantities
-        ]
-        if quantities[0] == "f_error_Hz":
-            restored = "never" if values.t_restore_s is None else f"{values.t_restore_s:.2f} s"
-            row.append("-" if mixed or _nothing_shared(values, "MPSI") else restored)
-    return tuple(row)
+def _cells(report: RunReport, case: str, event: str, island: str, quantities: tuple[Quantity, ...]) -> Iterator[str]:
+    """Yield the cells of an event in a row; one that means nothing over several islands is a dash."""
+    islands, timed = report.findings.apart(case, event), "f_error_Hz" in quantities
+    values = islands.get(island) if island else report.findings.results[case].get(event)
+    if values is None:
+        yield from [""] * (len(quantities) + timed)
+        return
+    mixed = bool(islands) and not island
+    for name in quantities:
+        yield "-" if mixed and name in SHARING else _cell(report, case, event, name, values, island)
+    if timed:
+        restored = "never" if values.t_restore_s is None else f"{values.t_restore_s:.2f} s"
+        yield "-" if mixed or _nothing_shared(values, "MPSI") else restored
 
 
 def _nothing_shared(values: Steady, name: str) -> bool:
@@ -269,33 +231,27 @@ def _cell(report: RunReport, case: str, event: str, quantity: Quantity, values: 
     text = reason.partition(":")[0] or f"{ours:.{(paper.digits if paper else DIGITS[quantity]) + 1}f}"
     if paper is None:
         return text
-    off = report.findings.within(paper) is False
-    return f"{text} | {paper.paper:.{paper.digits}f}{' !' if off else ''}"
+    return f"{text} | {paper.paper:.{paper.digits}f}{' !' if report.findings.within(paper) is False else ''}"
 
 
-def _reasons(report: RunReport, quantities: tuple[Quantity, ...]) -> list[str]:
-    """Return a line for every number that is not shown, with the mean of the last 0.2 s."""
-    lines = []
-    for case, steady in report.findings.results.items():
-        for event, whole in steady.items():
-            apart = report.findings.islands.get(case, {}).get(event, {})
-            parts = {"": whole} | {f", island of {name}": values for name, values in apart.items()}
-            for where, values in parts.items():
+def _reasons(report: RunReport, quantities: tuple[Quantity, ...]) -> Iterator[str]:
+    """Yield a line for every number that is not shown, with the mean of the last 0.2 s."""
+    findings = report.findings
+    for case, steady in findings.results.items():
+        for event in steady:
+            for where, values in findings.parts(case, event).items():
+                mixed = bool(findings.apart(case, event)) and not where
                 for name in quantities:
-                    if name not in values.reasons or (apart and not where and name in SHARING):
+                    if name not in values.reasons or (mixed and name in SHARING):
                         continue
-                    mean = getattr(values, name)
+                    mean, measure = getattr(values, name), label(name, findings.f_nom)
                     dust = math.isnan(mean) or _nothing_shared(values, name)
                     last = "" if dust else f" (mean of the last {STEADY:g} s: {mean:.3f}{UNITS[name]})"
-                    measure = label(name, report.findings.f_nom)
-                    lines.append(f"case {case}, {event}{where}: {measure} {values.reasons[name]}{last}")
-    return lines
+                    yield f"case {case}, {event}{where}: {measure} {values.reasons[name]}{last}"
 
 
 def _count(verdicts: Sequence[Verdict]) -> str:
-    held = sum(verdict.status == "PASS" for verdict in verdicts)
-    left = sum(verdict.status == "NOT RUN" for verdict in verdicts)
-    missed = sum(verdict.status == "MISS" for verdict in verdicts)
-    rest = f", {missed} missed for a known reason" if missed else ""
-    rest += f", {left} not run" if left else ""
-    return f"{held} of {len(verdicts) - left} claims hold{rest}."
+    of = Counter(verdict.status for verdict in verdicts)
+    rest = f", {of['MISS']} missed for a known reason" if of["MISS"] else ""
+    rest += f", {of['NOT RUN']} not run" if of["NOT RUN"] else ""
+    return f"{of['PASS']} of {len(verdicts) - of['NOT RUN']} claims hold{rest}."

@@ -15,11 +15,6 @@ def eta(x: Floats, s: Floats, m: Floats, present: Flags | None = None) -> Floats
     r"""Return the equal-sharing value of each row, (9): of powers x (W or var), ratings s (W) and droops m (pu per pu).
 
     .. math:: \eta = \frac{\sum_i x_i}{\sum_i s_i / m_i}
-
-    Examples
-    --------
-    >>> eta(np.array([[300.0, 700.0]]), np.array([600.0, 1400.0]), np.array([0.01, 0.01]))
-    array([0.005])
     """
     everybody = np.ones(x.shape, bool) if present is None else present
     total: Floats = np.where(everybody, x, 0.0).sum(axis=1)
@@ -49,13 +44,7 @@ def sharing_index(x: Floats, s: Floats, m: Floats, present: Flags | None = None)
 
 
 def mean_over(x: Floats, present: Flags) -> Floats:
-    """Return the mean of each row over the inverters that are present in it; nan where there are none.
-
-    Examples
-    --------
-    >>> mean_over(np.array([[1.0, 3.0], [1.0, 3.0]]), np.array([[True, True], [True, False]]))
-    array([2., 1.])
-    """
+    """Return the mean of each row over the inverters that are present in it; nan where there are none."""
     count = present.sum(axis=1)
     total: Floats = np.where(present, x, 0.0).sum(axis=1)
     return total / np.where(count > 0, count, np.nan)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.checks.rest_checks import modes
+from gridpeers.scenarios.checks.run_checks import modes
 from gridpeers.wire.messages import PlantEvent
 from tests.unit.scenarios.checks.cases import changed, ran, ran_with, verdict
 

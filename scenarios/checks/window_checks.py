@@ -1,0 +1,187 @@
+"""Checks of each island in the window of each event: f and V in their bands, equal sharing, and steady values."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Annotated
+
+import numpy as np
+
+from gridpeers.scenarios.checks.check_verdict import Check, NotJudgedError, Since, Violation
+from gridpeers.scenarios.checks.checked_case import CheckedCase, IslandWindow
+from gridpeers.scenarios.results.history import Flags, Floats
+from gridpeers.scenarios.results.metrics import FEWEST, STEADY, Ends, ends_of
+from gridpeers.scenarios.results.sharing_index import NO_LOAD, sharing_index
+from gridpeers.wire.schema.plausible import Plausible, Unit
+from gridpeers.wire.schema.table_schema import Below
+
+_SETTLING = Plausible("a settling time", 0.0, 3600.0)
+_RATE = Plausible("a rate", 1e-6, 100.0, above_zero=True)
+
+
+class _WindowCheck(Check):
+    since_s: Since = 0.0
+    """Run time (s) from which on it is judged: the end of the last fault of links or agents, say."""
+
+    def _each_island(
+        self,
+        case: CheckedCase,
+        delay_s: float,
+        judge: Callable[[IslandWindow, Flags], list[Violation] | None],
+        unjudged: str = "no event has a window of more than {:g} s",
+    ) -> Iterator[Violation]:
+        """Judge the islands of all windows, each with its rows from `delay_s` after the event on; None: not judged."""
+        if not case.windows:
+            raise NotJudgedError("the run has no event")
+        judged = 0
+        for part in case.parts:
+            found = judge(part, case.rows_from(part, delay_s, self.since_s))
+            if found is not None:
+                judged += 1
+                yield from found
+        if not judged:
+            raise NotJudgedError(unjudged.format(delay_s))
+
+
+def _worst(
+    part: IslandWindow, x: Floats, out: Flags, name: str, unit: str, limit: float, *, least: bool = False
+) -> list[Violation]:
+    """Return the row of each column that is farthest out of a limit."""
+    found = []
+    for i in range(len(part.history.inverters)):
+        rows = np.flatnonzero(out[:, i])
+        if rows.size:
+            row = rows[x[rows, i].argmin() if least else x[rows, i].argmax()]
+            found.append(part.violation(f"{name}, {part.label}", i, x[row, i], limit, unit, part.history.t[row]))
+    return found
+
+
+class Frequency(_WindowCheck):
+    """Each grid-forming inverter is within a band of nominal frequency some time after each event, and stays there."""
+
+    band_Hz: Annotated[float, Unit("Hz"), Plausible("a band of frequency", 1e-4, 10.0, above_zero=True)] = 0.01
+    """Largest abs(f - f_nom) (Hz): what the paper calls restored."""
+    within_s: Annotated[float, Unit("s"), _SETTLING] = 2.0
+    """Time (s) after the event from which on it holds."""
+
+    def __call__(self, case: CheckedCase) -> Iterator[Violation]:
+        def judge(part: IslandWindow, late: Flags) -> list[Violation] | None:
+            history, error = part.history, np.abs(part.history.f - case.f_nom)
+            forming = history.present & part.nameplates.GFM
+            out = ~(error <= self.band_Hz) & forming & late[:, None]
+            found = _worst(part, error, out, f"abs(f - {case.f_nom:g})", "Hz", self.band_Hz)
+            dark = late & ~forming.any(axis=1)
+            if not part.fed and dark.any():
+                text = f"no grid-forming inverter is on the network, {part.label}"
+                found.append(Violation(text=text, t=float(history.t[dark][0]), agent=history.inverters[0]))
+            return found if late.any() else None
+
+        return self._each_island(case, self.within_s, judge)
+
+
+class Voltage(_WindowCheck):
+    """The terminal voltage of each inverter is within a band some time after each event, and stays there."""
+
+    low_pu: Annotated[float, Unit("pu"), Plausible("a least voltage", 0.3, 1.2), Below("high_pu")] = 0.88
+    """Least voltage (pu of nominal): the end of continuous operation of IEEE 1547-2018."""
+    high_pu: Annotated[float, Unit("pu"), Plausible("a greatest voltage", 0.8, 1.5)] = 1.10
+    """Greatest voltage (pu of nominal), of the same."""
+    within_s: Annotated[float, Unit("s"), _SETTLING] = 2.0
+    """Time (s) after the event from which on it holds: the clearing time of OV1 of IEEE 1547-2018."""
+
+    def __call__(self, case: CheckedCase) -> Iterator[Violation]:
+        def judge(part: IslandWindow, late: Flags) -> list[Violation] | None:
+            V, judged = part.history.V / part.nameplates.V_nom, part.history.present & late[:, None]
+            high = _worst(part, V, ~(self.high_pu >= V) & judged, "V", "pu", self.high_pu)
+            low = _worst(part, V, (self.low_pu > V) & judged, "V", "pu", self.low_pu, least=True)
+            return high + low if late.any() else None
+
+        return self._each_island(case, self.within_s, judge)
+
+
+class _Sharing(_WindowCheck):
+    after_s: Annotated[float, Unit("s"), _SETTLING] = 2.0
+    """Shortest time (s) from the event to the end of a window that is judged."""
+    with_killed: bool = True
+    """Whether inverters count whose agents the scenario has killed: they stay at their last set-points."""
+
+    def _unequal(self, case: CheckedCase, index: str, limit: float) -> Iterator[Violation]:
+        def judge(part: IslandWindow, late: Flags) -> list[Violation] | None:
+            history, plates = part.history, part.nameplates
+            end = late & ends_of(history.t, part.window.start, part.window.end).steady
+            shares = history.present & plates.shares & ~case.at_limit(part)
+            shares = (shares if self.with_killed else shares & ~case.killed(history))[end]
+            if part.fed or not end.any() or not (shares.sum(axis=1) >= 2).all():
+                return None
+            power, m = (history.P, plates.m_p) if index == "MPSI" else (history.Q, plates.m_q)
+            x, s = power[end], plates.s
+            total, rated = np.where(shares, x, 0.0).sum(axis=1), np.where(shares, s, 0.0).sum(axis=1)
+            if (np.abs(total) / rated).mean() < NO_LOAD:
+                return None
+            found = float(np.nanmean(sharing_index(x, s, m, shares)))
+            equal = total.sum() / np.where(shares, s / m, 0.0).sum()
+            far = int(np.abs(np.where(shares, m * x / s - equal, 0.0)).sum(axis=0).argmax())
+            return [part.violation(f"{index}, {part.label}", far, found, limit)] if found > limit else []
+
+        nothing = "no island of two inverters shares anything {:g} s after an event"
+        return self._each_island(case, self.after_s, judge, nothing)
+
+
+class PowerSharing(_Sharing):
+    """At the end of each window, the inverters of an island deliver equal real power per unit of their ratings."""
+
+    limit: Annotated[float, Plausible("a sharing index", 1e-4, 2.0, above_zero=True)] = 0.01
+    """Largest MPSI, (16): what the paper calls shared."""
+
+    def __call__(self, case: CheckedCase) -> Iterator[Violation]:
+        return self._unequal(case, "MPSI", self.limit)
+
+
+class VarSharing(_Sharing):
+    """At the end of each window, the inverters of an island deliver equal vars per unit of their ratings."""
+
+    limit: Annotated[float, Plausible("a sharing index", 1e-4, 2.0, above_zero=True)] = 0.2
+    """Largest MQSI, (17): a fifth of what islanding leaves without coordination, as in the paper."""
+
+    def __call__(self, case: CheckedCase) -> Iterator[Violation]:
+        return self._unequal(case, "MQSI", self.limit)
+
+
+class SteadyEnd(_WindowCheck):
+    """At the end of each window, frequency, power and voltage of every inverter stand still: they can be measured."""
+
+    f_Hz_per_s: Annotated[float, Unit("Hz/s"), _RATE] = 0.05
+    """Fastest change of a grid-forming inverter's frequency (Hz/s) between the means of the last two parts of 0.2 s:
+    that of `docs/results.md`, as the next two."""
+    P_pu_per_s: Annotated[float, Unit("pu/s"), _RATE] = 0.05
+    """Fastest change of real power (pu of rating per s)."""
+    V_pu_per_s: Annotated[float, Unit("pu/s"), _RATE] = 0.005
+    """Fastest change of the terminal voltage (pu of nominal per s)."""
+    after_s: Annotated[float, Unit("s"), _SETTLING] = 2.0
+    """Shortest time (s) from the event to the end of a window that is judged."""
+
+    def __call__(self, case: CheckedCase) -> Iterator[Violation]:
+        def judge(part: IslandWindow, late: Flags) -> list[Violation] | None:
+            history, plates = part.history, part.nameplates
+            ends = ends_of(history.t, part.window.start, part.window.end)
+            if not late[ends.steady].all() or min(ends.last.sum(), ends.before.sum()) < FEWEST:
+                return None
+            there: Flags = np.all(history.present[ends.last | ends.before], axis=0)
+            return [
+                *_fastest(part, ends, history.f, there & plates.GFM, "f", "Hz/s", self.f_Hz_per_s),
+                *_fastest(part, ends, history.P / plates.s, there, "P", "pu/s", self.P_pu_per_s),
+                *_fastest(part, ends, history.V / plates.V_nom, there, "V", "pu/s", self.V_pu_per_s),
+            ]
+
+        return self._each_island(case, self.after_s, judge)
+
+
+def _fastest(
+    part: IslandWindow, ends: Ends, x: Floats, which: Flags, name: str, unit: str, limit: float
+) -> Iterator[Violation]:
+    """Yield the inverter that moves fastest, if it moves too fast to be measured."""
+    rate = np.where(which, (x[ends.last].mean(axis=0) - x[ends.before].mean(axis=0)) / ends.apart, 0.0)
+    i = int(np.abs(rate).argmax())
+    if abs(rate[i]) > limit * (1.0 + 1e-9):
+        text = f"{name} still moves in the last {STEADY:g} s of {part.label}"
+        yield part.violation(text, i, rate[i], limit, unit)
