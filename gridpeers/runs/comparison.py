@@ -97,7 +97,7 @@ class Comparison:
 
     def plot(self) -> Figure:
         """Draw f, MPSI, V and MQSI of both, case by case."""
-        from gridpeers.scenarios.results.plots.case_figures import comparison
+        from gridpeers.scenarios.results.plots.run_figures import comparison
 
         shown_in_notebooks()
         return comparison(

@@ -9,14 +9,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gridpeers.scenarios.results.history import Floats
-from gridpeers.scenarios.results.plots.case_figures import MEASURES, measured
 from gridpeers.scenarios.results.plots.drawing import Drawing
-from gridpeers.scenarios.results.plots.marks import mark_events
+from gridpeers.scenarios.results.plots.run_figures import MEASURES, measured
 from gridpeers.scenarios.results.plots.style import (
-    OTHER_STYLES,
     PAGE,
+    STYLES,
     from_zero,
     legend_below,
+    mark_events,
     name_panel,
     nominal_line,
     time_axis,
@@ -30,7 +30,7 @@ PALE = 0.65
 """Part of white in the colour of a faint line. It is no transparency: lines of several inverters on top of each other
 would be strong again."""
 
-BLUE, GREEN = OTHER_STYLES[0][0], OTHER_STYLES[2][0]
+BLUE, GREEN = STYLES[0][0], STYLES[2][0]
 
 KINDS = {True: BLUE, False: GREEN}
 """Colours of inverters: grid-forming, or not."""

@@ -22,7 +22,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from pandas.api.types import is_bool_dtype, is_numeric_dtype
 
-from gridpeers.scenarios.results.plots.style import PAGE, case_style, save
+from gridpeers.scenarios.results.plots.style import PAGE, STYLES, save
 from gridpeers.scenarios.sweep.sweep_case import FATE
 from gridpeers.scenarios.sweep.sweep_table import INDEXES, label_of
 
@@ -140,7 +140,7 @@ def curves(frame: pd.DataFrame, window: str, x: str) -> Figure:
 
 def _curve(panel: Axes, spread: pd.DataFrame, case: str, number: int, at: pd.Series, y: pd.Series) -> None:
     """Draw median and range of one case over a number, with a point per run where the number was drawn."""
-    colour, dashes = case_style(case, number)
+    colour, dashes = STYLES[number % len(STYLES)]
     x, median = spread.index.to_numpy(), spread["median"].where(np.isfinite(spread["median"]))
     panel.fill_between(x, spread["low"], spread["high"], color=colour, alpha=0.18, linewidth=0)
     panel.plot(x, median, linestyle=dashes, color=colour, lw=1.8, marker="o", ms=3.5, label=f"case {case}")
@@ -150,7 +150,7 @@ def _curve(panel: Axes, spread: pd.DataFrame, case: str, number: int, at: pd.Ser
 
 
 def _bars(panel: Axes, spread: pd.DataFrame, case: str, number: int, order: Sequence[Any]) -> None:
-    colour = case_style(case, number)[0]
+    colour = STYLES[number % len(STYLES)][0]
     x = [order.index(value) + 0.12 * number for value in spread.index]
     panel.vlines(x, spread["low"], spread["high"], color=colour, alpha=0.5, lw=3)
     panel.plot(x, spread["median"].where(np.isfinite(spread["median"])), "o", color=colour, label=f"case {case}")

@@ -21,7 +21,7 @@ class Mark(NamedTuple):
     """An event in a figure."""
 
     label: str
-    """Name of its window; "" for none."""
+    """Label of its window; "" for none."""
     t: float
     what: str = ""
     """The event in a few words: "13-152 opens"."""
@@ -32,7 +32,6 @@ class Drawing:
     """Data that all figures of a run share."""
 
     histories: Mapping[str, History]
-    """Recorded cases by name."""
     titles: Mapping[str, str]
     nameplates: Nameplates
     events: Sequence[Mark]
@@ -54,6 +53,15 @@ class Drawing:
         """Return the islands of a case when there are most of them; they have a figure of their own."""
         return max((interval.islands for interval in self.island_intervals[case]), key=len)
 
+    @property
+    def end(self) -> float:
+        """End of the longest case (s)."""
+        return max(float(history.t[-1]) for history in self.histories.values())
+
+    def words(self, case: str) -> str:
+        title = self.titles.get(case, "")
+        return f"{case}: {title}" if title else case
+
     def island_title(self, island: Island) -> str:
         """Return a few words on an island: its microgrid if it lies in one, or its first inverter."""
         microgrids = {self.microgrid_of.get(name, "") for name in island.inverters}
@@ -69,7 +77,6 @@ def drawing_of(
     recorded: Mapping[str, Iterable[PlantEvent]],
     events: Sequence[tuple[str, float]],
 ) -> Drawing:
-    """Return the data for the figures of a run: those of all experiments, and those of the events in this one."""
     what = {event.label: happening(event, scenario) for event in scenario.events}
     limited = dict.fromkeys(limit.inverter for case in scenario.cases for limit in limits_of(scenario, case))
     islands = {
@@ -101,16 +108,13 @@ def happening(event: Event, scenario: ScenarioModel) -> str:
     >>> [happening(event, scenario) for event in scenario.events]
     ['13-152 opens', 'sw1_2, sw2_3 open']
     """
-    parts = [
-        f"{', '.join(names)} {verb}{'s' if len(names) == 1 else ''}"
-        for names, verb in ((event.open, "open"), (event.close, "close"))
-        if names
-    ]
-    parts += [
-        f"{short(in_order(names))} {verb}{'s' if len(names) == 1 else ''}"
-        for names, verb in ((event.leave, "leave"), (event.join, "join"))
-        if names
-    ]
+    done = (
+        (event.open, ", ".join(event.open), "open"),
+        (event.close, ", ".join(event.close), "close"),
+        (event.leave, short(in_order(event.leave)), "leave"),
+        (event.join, short(in_order(event.join)), "join"),
+    )
+    parts = [f"{text} {verb}{'s' if len(names) == 1 else ''}" for names, text, verb in done if names]
     limits = [limit for case in scenario.cases for limit in limits_of(scenario, case) if limit.t == event.t_s]
     if limits:
         names, powers = short(in_order({limit.inverter for limit in limits})), {limit.P_max for limit in limits}
@@ -123,13 +127,6 @@ def happening(event: Event, scenario: ScenarioModel) -> str:
 
 
 def _power_in_short(change: LoadChange) -> str:
-    """Return a load's new power in two words.
-
-    Examples
-    --------
-    >>> _power_in_short(LoadChange(factor=1.5)), _power_in_short(LoadChange(P_kW=300, Q_kvar=90))
-    ('1.5 times', '300 kW, 90 kvar')
-    """
     if change.factor is not None:
         return f"{change.factor:g} times"
     given = ((change.P_kW, "kW"), (change.Q_kvar, "kvar"))

@@ -12,7 +12,7 @@ import pickle
 import sys
 import threading
 
-from gridpeers.scenarios.results.plots.run_figures import draw_share
+from gridpeers.scenarios.results.plots.run_figures import draw_all
 
 
 def _end_with_the_command() -> None:
@@ -23,4 +23,4 @@ def _end_with_the_command() -> None:
 if __name__ == "__main__":
     share = pickle.load(sys.stdin.buffer)
     threading.Thread(target=_end_with_the_command, daemon=True).start()
-    draw_share(*share)
+    draw_all(*share)

@@ -1,15 +1,16 @@
-"""Style of all figures: one line style per case, the page, axes of time, reproducible files.
+"""Style of all figures: line styles, the page, axes, marks of events, legends, reproducible files.
 
-One colour and one dash pattern per case, the same in every figure, after Okabe and Ito's palette, which stays apart
-for colour-blind readers; with the patterns the curves can be told in a black-and-white print too.
+Colours are those of Okabe and Ito's palette, which stays apart for colour-blind readers; with the dash patterns the
+curves can be told in a black-and-white print too.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import accumulate
 from math import inf
 from pathlib import Path
-from textwrap import wrap
+from types import MappingProxyType
 from typing import Any, Literal, NamedTuple
 
 import matplotlib as mpl
@@ -18,38 +19,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gridpeers.scenarios.results.history import Floats
-from gridpeers.scenarios.results.plots.drawing import Drawing
+from gridpeers.scenarios.results.plots.drawing import Drawing, Mark
 
 LineStyle = tuple[str, Any]
 
 Style = tuple[str, Any, float]  # Colour, dash pattern and line width (pt)
 
-CASE_STYLES: dict[str, LineStyle] = {
-    "I": ("#7a7a7a", "-"),
-    "II": ("#d55e00", "-"),
-    "III": ("#009e73", "--"),
-    "IV": ("#0072b2", "-"),
-    "full": ("#0072b2", "-"),
-    "untuned": ("#e69f00", "-"),
-    "reduced": ("#d55e00", "-"),
-    "adaptive": ("#000000", (0, (4, 2))),
-    "link-failure": ("#56d6ae", (0, (2, 2))),
-    "350kW": ("#0072b2", "-"),
-    "275kW": ("#440154", "-"),
-    "250kW": ("#31688e", "-"),
-    "225kW": ("#21918c", "-"),
-    "200kW": ("#8fbc3f", "-"),
-    "175kW": ("#d55e00", ":"),
-    "none": ("#d55e00", "-"),
-    "clamp": ("#0072b2", "-"),
-    "conditional": ("#000000", (0, (1, 3))),
-}
-"""Styles of the paper's cases. The full graph under full coordination is always blue. Less and less available power
-goes from dark to light, after the palette viridis."""
-
-TITLE_LENGTH = 48  # Characters of a panel's title that fit above half a page
-
-OTHER_STYLES: tuple[LineStyle, ...] = (
+STYLES: tuple[LineStyle, ...] = (
     ("#0072b2", "-"),
     ("#d55e00", "-"),
     ("#009e73", "--"),
@@ -57,13 +33,10 @@ OTHER_STYLES: tuple[LineStyle, ...] = (
     ("#e69f00", "-"),
     ("#56b4e9", "--"),
 )
-"""Styles of other cases, and of inverters, in turn."""
+"""Styles of cases, and of inverters, in turn."""
 
-MOVER: Style = ("#d55e00", "-", 2.2)
-"""Style of an inverter that leaves or joins, among all others."""
-
-STAYERS: dict[bool, Style] = {True: ("#0072b2", "-", 1.6), False: ("#56b4e9", "--", 1.2)}
-"""Styles of the others: grid-forming, or not."""
+BLACK, GREY = "#000000", "#444444"
+"""Colours of lines and words."""
 
 PAGE: Any = {
     "font.size": 8,
@@ -83,44 +56,17 @@ PAGE: Any = {
 }
 
 
-def case_style(case: str, number: int) -> LineStyle:
-    """Return the style of a case: fixed for the paper's four, else in turn.
+def stacked_styles(count: int) -> list[Style]:
+    """Return styles of curves that are drawn one on top of the other: where they coincide, all of them are seen.
 
     Examples
     --------
-    >>> case_style("IV", 0) == CASE_STYLES["IV"], case_style("ring", 1) == OTHER_STYLES[1]
-    (True, True)
-    """
-    return CASE_STYLES.get(case, OTHER_STYLES[number % len(OTHER_STYLES)])
-
-
-def case_styles(cases: Iterable[str]) -> dict[str, Style]:
-    """Return the styles of cases that are drawn one on top of the other: where curves coincide, all of them are seen.
-
-    Examples
-    --------
-    >>> [width for _, _, width in case_styles(["I", "II", "III", "IV"]).values()]
+    >>> [width for _, _, width in stacked_styles(4)]
     [3.0, 2.5, 2.0, 1.5]
-
-    A case of a fixed style takes its colour from the others:
-
-    >>> len({colour for colour, _, _ in case_styles(["none", "ring", "star"]).values()})
-    3
     """
-    names = list(cases)
-    taken = {CASE_STYLES[case][0] for case in names if case in CASE_STYLES}
-    free = [style for style in OTHER_STYLES if style[0] not in taken] or list(OTHER_STYLES)
-    others = [case for case in names if case not in CASE_STYLES]
-    styles = CASE_STYLES | {case: free[k % len(free)] for k, case in enumerate(others)}
-    return {case: (*styles[case], width) for case, width in zip(names, widths(len(names)), strict=True)}
-
-
-def widths(count: int) -> list[float]:
-    """Return the widths (pt) of curves that are drawn one on top of the other, the lowest first."""
-    if count < 2:
-        return [2.0] * count
-    step = min(0.5, 1.8 / (count - 1))
-    return [1.5 + step * above for above in reversed(range(count))]
+    step = min(0.5, 1.8 / max(count - 1, 1))
+    widths = [1.5 + step * above for above in reversed(range(count))] if count > 1 else [2.0] * count
+    return [(*STYLES[number % len(STYLES)], width) for number, width in enumerate(widths)]
 
 
 class Bounds(NamedTuple):
@@ -133,20 +79,12 @@ class Bounds(NamedTuple):
     most: float = inf
 
 
-SHARING = Bounds(most=5.0)
-"""Of MPSI and MQSI, which have no bound where little is shared. The paper's go up to 2, ours after an event to 4."""
-
-VOLTAGE = Bounds(least=0.01, shown=0.98)
-"""Of V_error (pu), whose spikes at a switching are ten times what is left of it, and last longer."""
-
-
 def from_zero(axes: Axes, curves: Iterable[Floats], bounds: Bounds) -> None:
     """Start the axis at 0, and let spikes of a few ms at a switching leave the frame instead of flattening the rest.
 
     A curve that settles beyond the frame is told.
     """
-    finite = [curve[np.isfinite(curve)] for curve in curves]
-    finite = [curve for curve in finite if curve.size]
+    finite = [some for curve in curves if (some := curve[np.isfinite(curve)]).size]
     if not finite:
         return
     values = np.concatenate(finite)
@@ -162,14 +100,14 @@ def from_zero(axes: Axes, curves: Iterable[Floats], bounds: Bounds) -> None:
             ha="right",
             va="top",
             fontsize=7,
-            color="#444444",
+            color=GREY,
             bbox={"facecolor": "#ffffff", "edgecolor": "none", "pad": 1.0},
         )
 
 
 def time_axis(axes: Axes, drawing: Drawing) -> None:
     axes.set_xlabel("time (s)")
-    axes.set_xlim(0.0, max(float(history.t[-1]) for history in drawing.histories.values()))
+    axes.set_xlim(0.0, drawing.end)
 
 
 def name_panel(axes: Axes, title: str, label: str) -> None:
@@ -179,31 +117,118 @@ def name_panel(axes: Axes, title: str, label: str) -> None:
 
 def nominal_line(axes: Axes, value: float) -> None:
     """Draw a fine line at a nominal value, and write numbers near it in full."""
-    axes.axhline(value, color="#000000", linewidth=0.6, zorder=1)
+    axes.axhline(value, color=BLACK, linewidth=0.6, zorder=1)
     axes.ticklabel_format(axis="y", useOffset=False)
 
 
-def words(drawing: Drawing, case: str) -> str:
-    title = drawing.titles.get(case, "")
-    return f"{case}: {title}" if title else case
-
-
-def case_title(drawing: Drawing, case: str) -> str:
-    return "\n".join(wrap(f"Case {words(drawing, case)}", TITLE_LENGTH))
-
-
-def columns(labels: Sequence[str], width: float) -> int:
-    """Return how many columns of a legend fit below a figure of this width (inches), without a lonely last entry."""
-    longest = max((len(label) for label in labels), default=1)
-    fit = max(1, int(width / (0.058 * longest + 0.42)))
-    rows = -(-len(labels) // fit)
-    return -(-len(labels) // rows) if labels else 1
-
-
 def legend_below(figure: Figure, axes: Axes, *, one_row: bool = False) -> None:
+    """Write the legend of some axes below a figure, in as many columns as fit, without a lonely last entry."""
     handles, labels = axes.get_legend_handles_labels()
-    ncols = max(len(labels), 1) if one_row else columns(labels, figure.get_figwidth())
-    figure.legend(handles, labels, loc="outside lower center", ncols=ncols)
+    longest = max((len(label) for label in labels), default=1)
+    fit = len(labels) if one_row else int(figure.get_figwidth() / (0.058 * longest + 0.42))
+    rows = -(-len(labels) // max(fit, 1))
+    figure.legend(handles, labels, loc="outside lower center", ncols=-(-len(labels) // rows) if labels else 1)
+
+
+TextSide = Literal["left", "center", "right"]  # Which part of a text stands at the line
+
+LETTER = 0.056  # Width of a letter of these texts (inches), a little more than the mean of DejaVu Sans at 7 pt
+LONGEST = 20  # Letters of a word that is written whole
+GAP = 0.06  # Least distance between two texts (inches)
+ROUNDING = 1e-9  # By how much less (inches) is no less: an edge at GAP from a text may come out so by the last bit
+MOST = 12.0  # Lines in an inch of a frame that leave its curves to be seen
+FRAME = 0.78  # Part of a column of panels that is the frame of one; the rest are its axis and margins
+
+_SIDES: tuple[tuple[TextSide, float, float], ...] = (("center", 0.5, 0.0), ("left", 0.0, 1.0), ("right", 1.0, 1.0))
+"""Sides, with the part of a text that stands before its line, and their price."""
+
+
+class EventText(NamedTuple):
+    text: str
+    mark: Mark
+    side: TextSide
+
+
+def mark_events(
+    axes: Axes, drawing: Drawing, *, labelled: bool, colours: Mapping[Mark, str] = MappingProxyType({})
+) -> None:
+    """Draw a fine line at each event; if labelled, say above the frame what happens, as far as there is room.
+
+    Of so many events that lines would hide the curves, only those have one for whose words there is room.
+    """
+    place, figure = axes.get_subplotspec(), axes.get_figure(root=True)
+    assert figure is not None
+    columns = 1 if place is None else place.get_gridspec().ncols
+    width = float(figure.get_size_inches()[0]) / columns * FRAME  # roughly: the layout is made when it is drawn
+    texts = place_texts(drawing.events, width / max(drawing.end, 1e-9))
+    crowded = len(drawing.events) > MOST * width
+    for mark in (one.mark for one in texts) if crowded else drawing.events:
+        axes.axvline(mark.t, color=colours.get(mark, BLACK), linewidth=0.7, linestyle=(0, (1, 2)), zorder=1)
+    lines = 0
+    for text, mark, side in texts if labelled else ():
+        colour = colours.get(mark, BLACK)
+        note_above(axes, text, mark.t, "data", side, colour=GREY if colour == BLACK else colour)
+        lines = max(lines, text.count("\n") + 1)
+    axes.set_title(axes.get_title(loc="left"), loc="left", pad=5.0 + 9.0 * lines)
+
+
+def note_above(axes: Axes, text: str, x: float, of: str, side: TextSide, *, colour: str = GREY) -> None:
+    """Write small words above the frame, at x of the data or of the frame."""
+    at: Any = {"xycoords": (of, "axes fraction"), "xytext": (0, 2), "textcoords": "offset points"}
+    axes.annotate(text, (x, 1.0), **at, ha=side, fontsize=7, color=colour)
+
+
+class _Option(NamedTuple):
+    """One way to write at a mark, or to leave it out; its edges (inches) are infinite then."""
+
+    price: float
+    texts: tuple[EventText, ...] = ()
+    start: float = inf
+    end: float = -inf
+
+
+def place_texts(marks: Sequence[Mark], inches_per_s: float) -> list[EventText]:
+    r"""Place texts so that none covers another: beside its line where need be, shorter, and at last left out.
+
+    Examples
+    --------
+    >>> found = place_texts([Mark("event1", 1.0, "13-152 opens"), Mark("leave", 1.1)], inches_per_s=1.0)
+    >>> [(text, side) for text, _, side in found]
+    [('event1\n13-152 opens', 'right'), ('leave', 'left')]
+    """
+    options = [_options(mark, inches_per_s) for mark in sorted(marks, key=lambda mark: mark.t)]
+    first = [*accumulate((min(one.start for one in each) for each in reversed(options)), min)][::-1]
+    best: dict[float, tuple[float, tuple[EventText, ...]]] = {-inf: (0.0, ())}
+    """Cost and texts by the right edge (inches): those that no other beats in both edge and cost, sorted by edge."""
+    for each, leftmost in zip(options, first, strict=True):
+        found: dict[float, tuple[float, tuple[EventText, ...]]] = {}
+        for right, (cost, texts) in best.items():
+            edge = max(right, leftmost - GAP)  # nothing stands further left any more, so these are alike
+            for option in each:
+                if option.start >= edge + GAP - ROUNDING:
+                    end, total = max(edge, option.end), cost + option.price
+                    if end not in found or total < found[end][0]:
+                        found[end] = total, (*texts, *option.texts)
+        best, least = {}, inf
+        for end, (cost, texts) in sorted(found.items()):
+            if cost < least:
+                best[end], least = (cost, texts), cost
+    return list([*best.values()][-1][1])
+
+
+def _options(mark: Mark, inches_per_s: float) -> list[_Option]:
+    what = " ".join(word if len(word) <= LONGEST else f"{word[:9]}...{word[-8:]}" for word in mark.what.split(" "))
+    both = "\n".join(text for text in (mark.label, what) if text)
+    narrow = "\n".join(text for text in (mark.label, what.replace(" ", "\n", 1)) if text)
+    prices = {mark.label: 10.0, narrow: 5.0} | {both: 0.0}  # of equal texts the last, cheapest price counts
+    found = [_Option(30.0 if both else 0.0)]
+    for text, price in prices.items():
+        width = LETTER * max(map(len, text.split("\n")))
+        for side, before, more in _SIDES:
+            start = mark.t * inches_per_s - before * width
+            if text:
+                found.append(_Option(price + more, (EventText(text, mark, side),), start, start + width))
+    return found
 
 
 Format = Literal["png", "pdf", "svg"]  # Kind of file, as its name ends
@@ -212,11 +237,7 @@ _REPRODUCIBLE: Any = {"svg.hashsalt": "gridpeers", "svg.fonttype": "path", "pdf.
 """The salt stands in place of a random number from which an SVG's inner names are made. An SVG has letters as curves,
 which look the same on every machine; a PDF has the font inside."""
 
-_UNDATED: Mapping[Format, Mapping[str, Any]] = {
-    "png": {},
-    "pdf": {"CreationDate": None},
-    "svg": {"Date": None},
-}
+_UNDATED: Mapping[Format, dict[str, Any]] = {"png": {}, "pdf": {"CreationDate": None}, "svg": {"Date": None}}
 """Metadata that leave the time of writing out of a file."""
 
 
@@ -229,7 +250,7 @@ def save(
     for kind in formats:
         unfinished, file = folder / f".{name}.{kind}", folder / f"{name}.{kind}"
         with mpl.rc_context(PAGE | _REPRODUCIBLE), unfinished.open("wb") as stream:  # closed whatever goes wrong
-            figure.savefig(stream, format=kind, metadata=dict(_UNDATED[kind]), dpi=dpi or PAGE["savefig.dpi"])
+            figure.savefig(stream, format=kind, metadata=_UNDATED[kind], dpi=dpi or PAGE["savefig.dpi"])
         unfinished.replace(file)
         files.append(file)
     return tuple(files)

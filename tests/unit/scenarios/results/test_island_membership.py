@@ -10,9 +10,8 @@ import pytest
 import gridpeers as gp
 from gridpeers.scenarios.results.event_windows import Window
 from gridpeers.scenarios.results.island_membership import island_intervals, islands_at_end
-from gridpeers.scenarios.results.plots.case_figures import measured
 from gridpeers.scenarios.results.plots.drawing import drawing_of
-from gridpeers.scenarios.results.plots.run_figures import figures_of
+from gridpeers.scenarios.results.plots.run_figures import figures_of, measured
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.wire.messages import PlantEvent
 

@@ -13,9 +13,8 @@ from gridpeers.plant.tables import read_feeder
 from gridpeers.scenarios.results.history import History, Nameplates
 from gridpeers.scenarios.results.island_membership import Island, IslandInterval
 from gridpeers.scenarios.results.plots.drawing import Drawing, Mark
-from gridpeers.scenarios.results.plots.marks import GAP, LETTER, place_texts
 from gridpeers.scenarios.results.plots.run_figures import draw, draw_all
-from gridpeers.scenarios.results.plots.style import CASE_STYLES, SHARING, Format, case_style, from_zero, save
+from gridpeers.scenarios.results.plots.style import GAP, LETTER, STYLES, Bounds, Format, from_zero, place_texts, save
 from gridpeers.scenarios.schema import catalogue, load_scenario
 
 
@@ -60,14 +59,13 @@ def test_every_figure_of_the_paper_is_drawn(tmp_path: Path, cases: tuple[str, ..
 
 
 def test_a_case_has_one_colour_everywhere_and_no_two_share_it() -> None:
-    """A reader who knows a case in one figure knows it in all, whichever cases are shown beside it."""
+    """A reader who knows a case in one panel knows it in all."""
     page = draw(drawing("IV", "II"), "overview")
 
     for axes in page.axes:
         colours = {line.get_label(): line.get_color() for line in axes.get_lines() if " " in str(line.get_label())}
-        assert colours == {"IV: made up": CASE_STYLES["IV"][0], "II: made up": CASE_STYLES["II"][0]}
-    assert len({CASE_STYLES[case][0] for case in ("I", "II", "III", "IV")}) == 4
-    assert len({case_style("x", number) for number in range(6)}) == 6
+        assert colours == {"IV: made up": STYLES[0][0], "II: made up": STYLES[1][0]}
+    assert len({colour for colour, _ in STYLES}) == 6
 
 
 def catalogue_cases() -> list[list[str]]:
@@ -243,7 +241,7 @@ def test_a_curve_that_settles_beyond_the_frame_is_told() -> None:
     spike[:3] = 14.0
     axes = Figure().add_subplot()
 
-    from_zero(axes, [spike, settled], SHARING)
+    from_zero(axes, [spike, settled], Bounds(most=5.0))
 
     assert [text.get_text() for text in axes.texts] == ["one rests at 7"]
 
@@ -254,6 +252,6 @@ def test_a_short_spike_leaves_the_frame() -> None:
     curve[:3] = 14.0
     axes = Figure().add_subplot()
 
-    from_zero(axes, [curve], SHARING)
+    from_zero(axes, [curve], Bounds(most=5.0))
 
     assert axes.get_ylim()[1] < 1.0
