@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from math import inf
 from typing import Annotated
 
-import msgspec
-
 from gridpeers.agents.agent_config import MAX_AGE
+from gridpeers.lab.communication.accounts import Missing
 from gridpeers.lab.communication.communication_summary import CommunicationSummary
-from gridpeers.lab.communication.heals import Heal
-from gridpeers.lab.communication.link_accounts import Missing
-from gridpeers.lab.communication.record_pass import Link
-from gridpeers.netem.ledger import LinkCounts
+from gridpeers.lab.communication.heals import planned_faults
+from gridpeers.lab.communication.sent_states import Link
 from gridpeers.scenarios.checks.check_verdict import (
     Check,
     NotJudgedError,
@@ -24,9 +21,7 @@ from gridpeers.scenarios.checks.check_verdict import (
     require_time,
 )
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.record.record_info import LIVE
-from gridpeers.wire.messages import PlantEvent
 from gridpeers.wire.schema.plausible import Plausible, Unit
 
 _NO_ARRIVALS = 'in real time a record = "decisions" does not have what arrived'
@@ -39,9 +34,8 @@ class MessageAccount(Check):
 
     Of emulated links the accounts and verdicts of their receivers count; of others in simulated time every decision
     has the neighbours' states of the tick before; in real time every number arrives, from the first one on that
-    does between two processes, or once both have been there for 7 s (`LINKED_WITHIN`), unless its receiver says at that
-    time that it dropped as many. A process that is silent for long, as it is frozen, begins anew: its links are given
-    up.
+    does between two processes, or once both have been there for 7 s (`LINKED_WITHIN`), unless its receiver says that
+    it dropped as many. A process that is silent for long, as it is frozen, begins anew: its links are given up.
     """
 
     in_flight_s: Annotated[float, Unit("s"), Plausible("the time of a message on its way", 0.0, 60.0)] = 1.0
@@ -53,50 +47,46 @@ class MessageAccount(Check):
         found: CommunicationSummary = case.communication
         if found.unreadable:
             yield Violation(text="messages or parts of the record that cannot be read", value=found.unreadable, limit=0)
-        for link, counts in sorted(found.counts.items()):
-            yield from _closes(link, counts)
-            text = f"states of {link[0]} without a verdict of the emulated link"
-            yield from _missing(link, found.unjudged.get(link, Missing()), text)
+        for (src, dst), counts in sorted(found.counts.items()):
+            if not counts.closes:
+                sent = counts.sent + counts.duplicated
+                text = f"messages of {src} delivered, dropped or in flight, of {sent} sent"
+                there = counts.delivered + sum(counts.dropped.values()) + counts.in_flight
+                yield Violation(text=text, agent=dst, value=there, limit=sent)
+            text = f"states of {src} without a verdict of the emulated link"
+            yield from _missing((src, dst), found.unjudged.get((src, dst), Missing()), text)
         links = self._without_account(found)
         for agent in found.info.agent_names:
             for link, missing in links.items():
                 if link[1] == agent:
                     yield from _missing(link, missing, f"states of {link[0]} neither heard nor lost")
         if not (found.counts or links):
-            raise NotJudgedError("no agent listens to another" if found.has_arrivals else _NO_ARRIVALS)
+            has_arrivals = found.simulated or found.info.level == "all"
+            raise NotJudgedError("no agent listens to another" if has_arrivals else _NO_ARRIVALS)
         if links and not (found.counts or found.simulated):
             require_longer(found.t_end, "in_flight_s", self.in_flight_s)
 
     def _without_account(self, found: CommunicationSummary) -> dict[Link, Missing]:
-        """Return what is missing on each link whose receiver keeps no account of it."""
+        """Return the missing states of each link whose receiver keeps no account of it."""
         if found.simulated:
             return {link: missing for link, missing in found.unheard.items() if link not in found.counts}
-        if not found.has_arrivals:
-            return {}
-        return {link: self._not_arrived(found, link) for link in sorted(found.arrivals)}
-
-    def _not_arrived(self, found: CommunicationSummary, link: Link) -> Missing:
-        missing = Missing()
-        for account in found.arrivals[link]:
-            until = min(account.until, found.t_end) - self.in_flight_s
-            for t in account.missing.values():
-                if t <= until:
-                    missing.add(t)
-        return missing
+        links: dict[Link, Missing] = {}
+        for link in sorted(found.arrivals) if found.info.level == "all" else ():
+            links[link] = Missing()
+            late = [
+                t
+                for account in found.arrivals[link]
+                for t in account.missing.values()
+                if t <= min(account.until, found.t_end) - self.in_flight_s
+            ]
+            for t in late[found.dropped.get(link, 0) :]:
+                links[link].add(t)
+        return links
 
 
 def _missing(link: Link, missing: Missing, text: str) -> Iterator[Violation]:
     if missing.count:
         yield Violation(text=text, t=missing.first, agent=link[1], value=missing.count, limit=0)
-
-
-def _closes(link: Link, counts: LinkCounts) -> Iterator[Violation]:
-    """Yield the difference of an account: sent + duplicated = delivered + dropped + in flight."""
-    src, dst = link
-    found = counts.delivered + sum(counts.dropped.values()) + counts.in_flight
-    if not counts.closes:
-        text = f"messages of {src} delivered, dropped or in flight, of {counts.sent + counts.duplicated} sent"
-        yield Violation(text=text, agent=dst, value=found, limit=counts.sent + counts.duplicated)
 
 
 class Rejoined(Check):
@@ -113,11 +103,13 @@ class Rejoined(Check):
         judged = 0
         for agent in found.info.agent_names:
             for heal in found.heals:
-                if heal.link[1] != agent:
+                took = heal.took
+                if took is None and heal.waited > self.within_s:
+                    took = inf
+                if heal.link[1] != agent or took is None:
                     continue
-                took = self._took(heal)
-                judged += took is not None
-                if took is not None and took > self.within_s:
+                judged += 1
+                if took > self.within_s:
                     yield Violation(
                         text=f"no new value of {heal.link[0]} is used after the cut ended at {heal.t:g} s",
                         t=heal.t + self.within_s,
@@ -130,12 +122,6 @@ class Rejoined(Check):
             raise NotJudgedError(
                 f"after no cut was its link whole, and both of its agents at work, for {self.within_s:g} s"
             )
-
-    def _took(self, heal: Heal) -> float | None:
-        """Return after what time (s) a new value was used, infinity if never; None if there was no time for it."""
-        if heal.took is not None:
-            return heal.took
-        return inf if heal.waited > self.within_s else None
 
 
 class StaleValues(Check):
@@ -152,7 +138,7 @@ class StaleValues(Check):
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
         """Yield the oldest value that was used of each link."""
         found: CommunicationSummary = case.communication
-        if not found.used:
+        if not found.oldest:
             raise NotJudgedError("no decision used a neighbour's value")
         require_time(case.history, self.since_s)
         limits = {
@@ -193,7 +179,17 @@ class LastWords(Check):
         if not any(sent.epochs for sent in found.sent.values()):
             raise NotJudgedError("the record has no states of agents")
         joining = {name for event in case.scenario.events for name in event.join}
-        killed = _killed(found)
+        setup = planned_faults(found.info)
+        ended = (
+            [(node.name, node.from_s, self.silent_s + 2.0 * case.T_c) for node in setup.netem.nodes if node.kill]
+            if setup
+            else []
+        )
+        ended += [
+            (event.subject, event.t, self.silent_s)
+            for event in case.events
+            if event.kind == "roster" and _SAID.match(event.text)
+        ]
         end = min(float(case.history.t[-1]), found.t_end)
         for agent in found.info.agent_names:
             sent = found.sent.get(agent)
@@ -201,7 +197,9 @@ class LastWords(Check):
             if not epochs and agent not in joining and found.info.driver != LIVE:
                 yield Violation(text="never sends a state", agent=agent, t=0.0)
             for _, last in epochs.values():
-                if last >= end - self.silent_s or self._explained(case, agent, last, killed):
+                if last >= end - self.silent_s:
+                    continue
+                if any(name == agent and abs(last - t) <= within for name, t, within in ended):
                     continue
                 later = [max(0.0, first - last) for first, then in epochs.values() if then > last]
                 yield Violation(
@@ -215,25 +213,3 @@ class LastWords(Check):
                     limit=None if later else self.silent_s,
                 )
         require_longer(end, "silent_s", self.silent_s)
-
-    def _explained(self, case: CheckedCase, agent: str, last: float, killed: Collection[tuple[str, float]]) -> bool:
-        """Whether an event, or a fault of the scenario, explains that an agent ends at a time (s)."""
-        if any(name == agent and abs(last - t) <= self.silent_s + 2.0 * case.T_c for name, t in killed):
-            return True
-        return any(_ends(event, agent) and abs(event.t - last) <= self.silent_s for event in case.events)
-
-
-def _ends(event: PlantEvent, agent: str) -> bool:
-    return event.kind == "roster" and event.subject == agent and bool(_SAID.match(event.text))
-
-
-def _killed(found: CommunicationSummary) -> Collection[tuple[str, float]]:
-    """Return the agents that the scenario kills, and when (s)."""
-    for tree in (found.info.plant.links, *(config.links for config in found.info.agents)):
-        if not tree:
-            continue
-        try:
-            return [(node.name, node.from_s) for node in EmulationConfig.of_tree(tree).netem.nodes if node.kill]
-        except msgspec.ValidationError:
-            continue
-    return ()

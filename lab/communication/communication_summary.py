@@ -14,12 +14,11 @@ from math import inf
 from pathlib import Path
 from types import MappingProxyType
 
-from gridpeers.lab.communication.arrival_accounts import ArrivalAccount, ArrivalAccounts
+from gridpeers.lab.communication.accounts import ArrivalAccount, ArrivalAccounts, Missing, TickAccounts, VerdictAccounts
 from gridpeers.lab.communication.heals import Heal, Heals
-from gridpeers.lab.communication.link_accounts import Missing, TickAccounts, VerdictAccounts
-from gridpeers.lab.communication.neighbour_use import DecidedStates, DecidedTicks, NeighbourUse, Uses
-from gridpeers.lab.communication.record_pass import DroppedStates, Link, RecordSink, end_of, opened, read_into
-from gridpeers.lab.communication.sent_states import SentState, SentStates
+from gridpeers.lab.communication.record_pass import RecordSink, end_of, opened, read_into
+from gridpeers.lab.communication.sent_states import Link, SentState, SentStates
+from gridpeers.lab.communication.uses import DecidedStates, DecidedTicks, NeighbourUse, Uses
 from gridpeers.netem.ledger import LinkCounts, LinkTrace
 from gridpeers.scenarios.record.decision_entries import Hole
 from gridpeers.scenarios.record.record_info import RecordInfo
@@ -40,10 +39,10 @@ LINKED_WITHIN = 2.0 * PATIENCE
 
 @dataclass
 class OldUse:
-    """A value of a neighbour that an agent used, and that was older than all that it used of it later."""
+    """A value of a neighbour that an agent used, older than all that it used of it later."""
 
     age: float
-    """Its age (s); infinite if there was none."""
+    """Infinite if there was no value (s)."""
     t: float
     """Run time of the first decision that used one of this age (s)."""
     last: float
@@ -69,31 +68,28 @@ class CommunicationSummary:
     """Simulated time: decisions without the state of the tick before, by link; for those without faults."""
     arrivals: Mapping[Link, Sequence[ArrivalAccount]]
     """Real time: what came over each link, for each time in which both of its ends were there."""
+    dropped: Mapping[Link, int]
+    """Real time: how many states their receivers dropped unread."""
     oldest: Mapping[Link, list[OldUse]]
     """The oldest value that was used of each link, then the oldest of what was used later, and so on: ages fall."""
-    used: bool
-    """Whether a decision used a neighbour's value."""
     heals: list[Heal]
     """Ends of cuts."""
 
     @property
     def simulated(self) -> bool:
-        """Whether the run kept simulated time."""
         return self.info.simulated
-
-    @property
-    def has_arrivals(self) -> bool:
-        """Whether the record has what arrived: in simulated time decisions say it."""
-        return self.simulated or self.info.level == "all"
 
 
 def summarise(path: Path) -> CommunicationSummary:
     """Go through the file of a record once, twice if parts of it are lost; NotJudgedError if it has no decisions."""
     file = opened(path)
-    sums = SummaryPass(file.info, end_of(file))
+    t_end = end_of(file)
+    sums = SummaryPass(file.info, t_end)
     end = read_into(file, sums)
-    if any(end.lost.values()):  # it is damaged: what is lost is known now, and left out the second time
-        sums = SummaryPass(file.info, end_of(file), end.lost)
+    last = t_end - 2.0 * file.info.T_c
+    lost = {name: holes for name, found in end.holes.items() if (holes := [hole for hole in found if hole[0] < last])}
+    if lost:  # known only now, and left out the second time
+        sums = SummaryPass(file.info, t_end, lost)
         read_into(opened(path), sums)
     return sums.finish(end.unreadable)
 
@@ -106,36 +102,33 @@ class SummaryPass(RecordSink):
     ) -> None:
         self._info, self._t_end, self._lost = info, t_end, lost
         self._simulated = simulated = info.simulated
-        self._delay = DELAY_TICKS * info.T_c if simulated else DELAY * max(1.0, info.plant.speed)
+        speed = max(1.0, info.plant.speed)
+        self._delay = DELAY_TICKS * info.T_c if simulated else DELAY * speed
         self._names = frozenset(info.agent_names)
         self._sent: defaultdict[str, SentStates] = defaultdict(lambda: SentStates(simulated=simulated))
         self._decided: dict[str, DecidedTicks | DecidedStates] = {}
         self._ticks = TickAccounts(self._sent, info.T_c, lost.get(PLANT, ()))
         self._verdicts = VerdictAccounts(self._sent)
-        speed = max(1.0, info.plant.speed)
         self._arrivals = ArrivalAccounts(PAUSE * speed, LINKED_WITHIN * speed)
         self._heals = Heals(info, t_end, self._sent)
         self._counts: dict[Link, LinkCounts] = {}
+        self._dropped: defaultdict[Link, int] = defaultdict(int)
         self._oldest: defaultdict[Link, list[OldUse]] = defaultdict(list)
-        self._used = False
         self._alike: dict[str, tuple[Uses, list[OldUse]]] = {}
         """What each agent's decision in force uses, and the last entries in `oldest` of these links; not where quiet
         states change the ages from tick to tick."""
         self._t = self._flushed = 0.0
 
-    def state(self, agent: str, state: SentState) -> None:
+    def take_state(self, agent: str, state: SentState) -> None:
         if agent not in self._names or not self._sent[agent].put(state):
             return
         self._of(agent).state(state)
-        if self._simulated:
-            self._ticks.state(agent, state)
-        else:
-            self._arrivals.state(agent, state)
+        (self._ticks if self._simulated else self._arrivals).state(agent, state)
         self._t = max(self._t, state.t)
         if self._t > self._flushed + 1.25 * self._delay:
             self._flush(self._t - self._delay)
 
-    def decision(self, agent: str, epoch: int, decision: Decision) -> None:
+    def take_decision(self, agent: str, epoch: int, decision: Decision) -> None:
         if agent not in self._names:
             return
         self._of(agent).decision(epoch, decision)
@@ -143,82 +136,69 @@ class SummaryPass(RecordSink):
             for name in self._names.intersection(decision.neighbours):
                 self._arrivals.listens((name, agent))
 
-    def heard(self, link: Link, epoch: int, number: int, rejected: str) -> None:
+    def take_heard(self, link: Link, epoch: int, number: int, rejected: str) -> None:
         if not self._simulated and self._names.issuperset(link):
             self._arrivals.heard(link, epoch, number)
 
-    def dropped(self, link: Link, states: DroppedStates) -> None:
-        if not self._simulated and self._names.issuperset(link):
-            self._arrivals.dropped(link, states)
+    def take_dropped(self, link: Link, count: int) -> None:
+        self._dropped[link] += count
 
-    def renewed(self, agent: str, t: float) -> None:
-        if agent in self._names:
-            self._arrivals.renewed(agent, t)
+    def take_renewed(self, agent: str, t: float) -> None:
+        self._arrivals.renewed(agent, t)
 
-    def counts(self, link: Link, counts: LinkCounts) -> None:
+    def take_counts(self, link: Link, counts: LinkCounts) -> None:
         self._counts[link] = counts
 
-    def trace(self, trace: LinkTrace) -> None:
+    def take_trace(self, trace: LinkTrace) -> None:
         self._heals.trace(trace)
         if self._simulated:
             self._verdicts.trace(trace)
 
-    def known_until(self, agent: str, t: float) -> None:
-        if agent in self._names and isinstance(decided := self._of(agent), DecidedTicks):
-            decided.known_until = t
-
     def finish(self, unreadable: int) -> CommunicationSummary:
         self._flush(inf)
-        self._decided.clear()  # they tell this object what they find: in a cycle all of it would stay
         return CommunicationSummary(
             info=self._info,
             t_end=self._t_end,
             unreadable=unreadable,
             sent=self._sent,
             counts=self._counts,
-            unjudged=self._verdicts.missing() if self._simulated else {},
+            unjudged=self._verdicts.missing(),
             unheard=self._ticks.missing,
             arrivals=self._arrivals.accounts,
+            dropped=self._dropped,
             oldest=self._oldest,
-            used=self._used,
             heals=self._heals.found(),
         )
 
     def _of(self, agent: str) -> DecidedTicks | DecidedStates:
         if agent not in self._decided:
-
-            def tell(state: SentState, uses: Uses, new: bool) -> None:
-                self._use(agent, state, uses, new=new)
-
             T_c = self._info.T_c
-            if self._simulated:
-                self._decided[agent] = DecidedTicks(agent, T_c, tell, self._lost.get(agent, ()))
-            else:
-                self._decided[agent] = DecidedStates(agent, T_c, self._sent[agent].window_of, tell)
+            self._decided[agent] = (
+                DecidedTicks(agent, T_c, self._lost.get(agent, ()))
+                if self._simulated
+                else DecidedStates(agent, T_c, self._sent[agent])
+            )
         return self._decided[agent]
 
     def _flush(self, until: float) -> None:
         self._flushed = until
-        for decided in self._decided.values():
-            decided.flush(until)
+        for agent, decided in self._decided.items():
+            for state, uses, new in decided.flush(until):
+                self._note_ages(agent, state, uses)
+                if self._simulated:
+                    self._ticks.use(agent, state, uses, new=new)
+                self._heals.use(agent, state, uses, new=new)
         if not self._simulated:
             self._arrivals.flush(until)
 
-    def _use(self, agent: str, state: SentState, uses: Uses, *, new: bool) -> None:
+    def _note_ages(self, agent: str, state: SentState, uses: Uses) -> None:
         alike = self._alike.get(agent)
         if alike is not None and alike[0] is uses:
             for old in alike[1]:
                 old.last = state.t
-        else:
-            self._note_ages(agent, state, uses)
-        if self._simulated:
-            self._ticks.use(agent, state, uses, new=new)
-        self._heals.use(agent, state, uses, new=new)
-
-    def _note_ages(self, agent: str, state: SentState, uses: Uses) -> None:
+            return
         used = [use for use in uses.each if not use.unused]
         for use in used:
-            self._used = True
             self._note_age(state, use)
         if all(self._is_plain(use.age) for use in used):
             self._alike[agent] = uses, [self._oldest[use.link][-1] for use in used]

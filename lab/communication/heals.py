@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections import defaultdict, deque
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from math import inf
 
 import msgspec
 
-from gridpeers.lab.communication.neighbour_use import Uses
-from gridpeers.lab.communication.record_pass import Link
-from gridpeers.lab.communication.sent_states import SentState, SentStates, StateWindow
+from gridpeers.lab.communication.sent_states import Link, SentState, SentStates, StateWindow
+from gridpeers.lab.communication.uses import Uses
 from gridpeers.netem.ledger import LinkTrace
 from gridpeers.netem.schema.fault import Span
 from gridpeers.netem.schema.pattern import Link as LinkEnds
@@ -24,6 +23,17 @@ LOSSES = (*CUTS, "loss", "flap")  # Faults during which a link that was cut does
 STANDSTILL, PERIODS = 0.5, 5.0
 """Real time: an agent that decides nothing for so long (s of run time), and for so many control periods, stood
 still. Its numbers have no gap then. Shorter pauses are those of a busy host, and count as work."""
+
+
+def planned_faults(info: RecordInfo) -> EmulationConfig | None:
+    """Return the emulation that the scenario plans, from the first configuration that can be read."""
+    for tree in (info.plant.links, *(config.links for config in info.agents)):
+        if tree:
+            try:
+                return EmulationConfig.of_tree(tree)
+            except msgspec.ValidationError:
+                continue
+    return None
 
 
 @dataclass
@@ -47,27 +57,22 @@ class Heal:
 
 
 class Heals:
-    """The heals of all links over which agents listen up to t_end (s): planned ones, and those that verdicts tell."""
+    """The heals of all links over which agents listen up to t_end (s): planned ones, and those that verdicts show."""
 
     def __init__(self, info: RecordInfo, t_end: float, sent: Mapping[str, SentStates]) -> None:
-        self._sent = sent
-        self._T_c = info.T_c if info.simulated else None
+        self._sent, self._simulated = sent, info.simulated
         self._standstill = inf if info.simulated else max(STANDSTILL, PERIODS * info.T_c)
         """Time (s) between states of successive numbers in which an agent stood still; simulated time has a gap."""
-        self._coming: dict[Link, deque[Heal]] = defaultdict(deque)
-        """Heals of each link, in the order of time."""
-        self._waiting: dict[str, list[Heal]] = defaultdict(list)
-        """Those that have happened, by receiver, after which nothing new has been used yet."""
         self._healed: dict[Link, list[Heal]] = defaultdict(list)
-        self._whole: dict[Link, list[Heal]] = defaultdict(list)
-        """Those after which no verdict has told of another cut yet."""
-        self._known: set[tuple[Link, int]] = set()
+        self._open: dict[str, list[Heal]] = defaultdict(list)
+        """Those after which nothing new has been used yet, by receiver."""
         self._was_cut: set[Link] = set()
         self._listens: set[Link] = set()
-        self._receivers: set[str] = set()
         self._losses: dict[Link, list[Span]] = {}
         """Planned cuts and losses of each link."""
-        for link, spans in _planned(info):
+        setup, names = planned_faults(info), info.agent_names
+        for link in ((src, dst) for src in names for dst in names if setup is not None and src != dst):
+            spans = setup.netem.spans(LinkEnds(*link), setup.microgrids)
             self._losses[link] = [span for span in spans if span.kind in LOSSES]
             for t, again in _ends(self._losses[link]):
                 if t < t_end:
@@ -79,54 +84,48 @@ class Heals:
         for t, outcome in zip(trace.t, trace.outcome, strict=True):
             if outcome in CUTS:
                 self._was_cut.add(link)
-                if link in self._whole:
-                    self._whole[link] = [heal for heal in self._whole[link] if not self._lost_again(heal, t)]
+                for heal in self._healed.get(link, ()):
+                    if heal.t < t:
+                        heal.lost_again = min(heal.lost_again, t)
             elif link in self._was_cut and not isinstance(outcome, str) and not self._is_lossy(link, t):
                 self._was_cut.discard(link)
                 self._add(Heal(link, t))
 
     def use(self, agent: str, state: SentState, uses: Uses, *, new: bool) -> None:
-        """Note the states that an own state came of."""
+        """Note the states from which an agent decided one of its own."""
         if new:
             self._listens.update(use.link for use in uses.each)
-        if agent not in self._receivers:
-            return
-        for use in uses.each:
-            coming = self._coming.get(use.link)
-            while coming and coming[0].t <= state.t:
-                self._waiting[agent].append(coming.popleft())
-        waiting = self._waiting[agent]
+        waiting = [heal for heal in self._open.get(agent, ()) if heal.t <= state.t and heal.link in self._listens]
         if not waiting:
             return
         number = {use.link: use.number_at(state.number) for use in uses.each if use.unused not in ("silent", "stale")}
         for heal in waiting:
             used = number.get(heal.link)
-            sent_at = None if used is None else self._sent[heal.link[0]].window_at(state.t).t(used)
+            src, dst = (self._sent[name].window_at(state.t) for name in heal.link)
+            sent_at = None if used is None else src.t(used)
             if used is not None and sent_at is not None and sent_at >= heal.t - 1e-9:
-                src, dst = (self._sent[name].window_at(state.t) for name in heal.link)
                 begins = max(
                     _at_work_since(src, used, heal.t, self._standstill),
                     _at_work_since(dst, state.number, heal.t, self._standstill),
                 )
                 heal.took = max(0.0, state.t - begins)
             else:
-                self._note_work(heal, state)
-        self._waiting[agent] = [heal for heal in waiting if heal.took is None and state.t <= heal.lost_again]
+                self._note_work(heal, state, src, dst)
+        self._open[agent] = [heal for heal in self._open[agent] if heal.took is None and state.t <= heal.lost_again]
 
-    def _note_work(self, heal: Heal, state: SentState) -> None:
+    def _note_work(self, heal: Heal, state: SentState, src: StateWindow, dst: StateWindow) -> None:
         """Note for how long both have been at work, with an own state of the receiver that uses nothing new."""
-        src, dst = (self._sent[name] for name in heal.link)
-        window, number, T_c = dst.window_at(state.t), state.number, self._T_c
-        goes_on = _goes_on(window, number, self._standstill)
-        if T_c is not None:  # numbers are ticks, so that pauses of the sender show, and states that it did not tell
-            theirs = src.window_at(state.t)
-            speaks, works = theirs.spoke(number - 1), theirs.decided(number - 1)
+        number, goes_on = state.number, _goes_on(dst, state.number, self._standstill)
+        if self._simulated:  # numbers are ticks, so that pauses of the sender show, and states that it kept to itself
+            speaks, works = src.spoke(number - 1), src.decided(number - 1)
         else:
-            speaks, works = src.spoke_at >= heal.t, any(first <= state.t <= last for first, last in src.epochs.values())
+            sender = self._sent[heal.link[0]]
+            speaks = sender.spoke_at >= heal.t
+            works = any(first <= state.t <= last for first, last in sender.epochs.values())
         if not works:
             heal.at_work_since = None
         elif heal.at_work_since is None or not goes_on:
-            before = (window.t(number - 1) or 0.0) if goes_on else inf
+            before = (dst.t(number - 1) or 0.0) if goes_on else inf
             heal.at_work_since = (heal.t if before <= heal.t else state.t) if speaks else None
         if heal.at_work_since is not None:
             heal.waited = max(heal.waited, min(state.t, heal.lost_again) - heal.at_work_since)
@@ -135,29 +134,14 @@ class Heals:
         """Return whether a link is planned to lose messages at a time (s): a cut may hold one and give it later."""
         return any(span.from_s - 1e-9 <= t < span.to_s - 1e-9 for span in self._losses.get(link, ()))
 
-    @staticmethod
-    def _lost_again(heal: Heal, t: float) -> bool:
-        """Note that a link was cut at a time (s); return whether that was after the heal."""
-        if heal.t < t:
-            heal.lost_again = min(heal.lost_again, t)
-        return heal.t < t
-
     def found(self) -> list[Heal]:
         """Return the heals of links over which an agent listens, in the order of links and time."""
         return [heal for link in sorted(self._listens) for heal in sorted(self._healed[link], key=lambda one: one.t)]
 
     def _add(self, heal: Heal) -> None:
-        key = heal.link, round(1e3 * heal.t)
-        if key in self._known:
-            return
-        self._known.add(key)
-        self._receivers.add(heal.link[1])
-        self._healed[heal.link].append(heal)
-        self._whole[heal.link].append(heal)
-        coming = self._coming[heal.link]
-        coming.append(heal)
-        if len(coming) > 1 and coming[-2].t > heal.t:
-            self._coming[heal.link] = deque(sorted(coming, key=lambda one: one.t))
+        if all(abs(known.t - heal.t) > 5e-4 for known in self._healed[heal.link]):
+            self._healed[heal.link].append(heal)
+            self._open[heal.link[1]].append(heal)
 
 
 def _goes_on(window: StateWindow, number: int, standstill: float) -> bool:
@@ -184,16 +168,3 @@ def _ends(spans: Iterable[Span]) -> Iterator[tuple[float, float]]:
         until, was_cut = max(until, span.to_s), was_cut or span.kind in CUTS
     if was_cut:
         yield until, inf
-
-
-def _planned(info: RecordInfo) -> Iterator[tuple[Link, Iterable[Span]]]:
-    """Yield the faults that the scenario plans for each link."""
-    names = info.agent_names
-    for tree in (config.links for config in info.agents if config.links):
-        try:
-            setup = EmulationConfig.of_tree(tree)
-        except msgspec.ValidationError:
-            continue
-        for link in ((src, dst) for src in names for dst in names if src != dst):
-            yield link, setup.netem.spans(LinkEnds(*link), setup.microgrids)
-        return

@@ -6,15 +6,14 @@ sent, heard and used which number. So this reads the entries of the journals as 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from math import inf
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import msgspec
 
-from gridpeers.lab.communication.sent_states import SentState
+from gridpeers.lab.communication.sent_states import Link, SentState
 from gridpeers.netem.ledger import LinkCounts, LinkTrace
 from gridpeers.scenarios.checks.check_verdict import NotJudgedError
 from gridpeers.scenarios.emulation.link_data import data_of
@@ -38,15 +37,8 @@ from gridpeers.wire.journal import (
 from gridpeers.wire.messages import PLANT, Journal, LinkReport, State
 from gridpeers.wire.timing import time_of
 
-Link = tuple[str, str]  # Sender and receiver
-
-ON_WAY = 1.0
-"""Longest time (s of wall time) that a state is on its way, as the check of the account has it by default."""
-
 AHEAD = 5.0
-"""How far (s of wall time) an entry may be ahead of its journal: far more than clocks of two processes differ by."""
-
-_VALUES = ("sender", "seq", "t", "epoch", "idle", "quiet")  # Values of a state that checks need
+"""How far (s of wall time) an entry may be behind the record's end: far more than clocks of two processes differ by."""
 
 _STATE_KEYS = ("state", "set_points")
 """First parts of the keys of states; one that is not for the neighbours has a key of its own."""
@@ -57,57 +49,36 @@ _OF_SENDER = ("excess", "stale")
 """Kinds of rejection that a sender's own sound states may have, and of which a journal may have the number alone."""
 
 
-class DroppedStates(NamedTuple):
-    """States that a receiver dropped unread, sent between two run times (s); a stranger's may be among them."""
-
-    number: int
-    since: float
-    until: float
-
-
 class RecordSink:
     """Takes what a record has, in the order of its file: of each node as it was, of several within a second or so."""
 
-    def state(self, agent: str, state: SentState) -> None:
+    def take_state(self, agent: str, state: SentState) -> None:
         """Take a state that an agent sent; it may come twice."""
 
-    def decision(self, agent: str, epoch: int, decision: Decision) -> None:
+    def take_decision(self, agent: str, epoch: int, decision: Decision) -> None:
         """Take how an agent decided; in simulated time it holds until the next one."""
 
-    def heard(self, link: Link, epoch: int, number: int, rejected: str) -> None:
+    def take_heard(self, link: Link, epoch: int, number: int, rejected: str) -> None:
         """Take a state that arrived in real time, and why it was rejected, if it was."""
 
-    def dropped(self, link: Link, states: DroppedStates) -> None:
-        """Take the number of states that a receiver dropped in real time, without more."""
+    def take_dropped(self, link: Link, count: int) -> None:
+        """Take how many states a receiver dropped unread in real time."""
 
-    def renewed(self, agent: str, t: float) -> None:
+    def take_renewed(self, agent: str, t: float) -> None:
         """Take that an agent opened a new session in real time, after its state of a run time (s)."""
 
-    def counts(self, link: Link, counts: LinkCounts) -> None:
+    def take_counts(self, link: Link, counts: LinkCounts) -> None:
         """Take the account of an emulated link up to now."""
 
-    def trace(self, trace: LinkTrace) -> None:
+    def take_trace(self, trace: LinkTrace) -> None:
         """Take further verdicts of an emulated link."""
 
-    def known_until(self, agent: str, t: float) -> None:
-        """Take the run time (s) up to which it is known how an agent decided, where its journal comes all the time."""
 
-
-@dataclass(frozen=True, kw_only=True)
-class PassEnd:
-    """Totals of a pass over a whole record."""
-
+class PassEnd(NamedTuple):
     unreadable: int
     """Messages, entries, reports and parts of the file that could not be read, or cannot be true."""
-    lost: Mapping[str, Sequence[Hole]]
-    """Simulated time: run times (s) between which parts of a node's journal are lost."""
-    known_until: Mapping[str, float]
-    """Simulated time: run time (s) behind which no part of a node's journal has come; infinite if none need come."""
-
-    @property
-    def holes(self) -> dict[str, Sequence[Hole]]:
-        """Run times (s) between which it is not known how an agent decided, or what the plant heard."""
-        return {name: [*self.lost[name], (t + INSTANT, inf)] for name, t in self.known_until.items()}
+    holes: dict[str, Sequence[Hole]]
+    """Simulated time: run times (s) between which it is not known how an agent decided, or what the plant heard."""
 
 
 def opened(path: Path) -> RecordFile:
@@ -119,10 +90,7 @@ def opened(path: Path) -> RecordFile:
 
 
 def end_of(file: RecordFile) -> float:
-    """Return the run time (s) at which a record ends: its latest one, unless the run was to end before.
-
-    Nothing in the file is trusted, and one entry of a time that cannot be would put the end off.
-    """
+    """Return the run time (s) at which a record ends: no entry is believed that is later than the run's planned end."""
     end = file.info.plant.end
     return file.t_end if end is None else min(file.t_end, end)
 
@@ -137,18 +105,13 @@ class _Pass:
         self._file, self._sink = file, sink
         info, self._unreadable = file.info, 0
         self._simulated, self._T_c = info.simulated, info.T_c
-        self._t_end, self._speed = end_of(file), max(1.0, info.plant.speed)
-        self._latest = self._t_end + AHEAD * self._speed
+        self._latest = end_of(file) + AHEAD * max(1.0, info.plant.speed)
         self._most = int(self._latest / self._T_c) if self._simulated else MOST_COUNT
         """Largest number of a state: in simulated time that of its tick."""
         self._coverage: dict[str, JournalCoverage] = {}
         self._spoke: dict[str, float] = {}
         """Real time: run time (s) of the last own state in each agent's journal."""
-        self._parts: dict[str, tuple[int, float, float]] = {}
-        """Epoch of each sender's last part, its run time (s), and that of the last one before that time."""
-        fields = info.fields.get(State.__name__, ())
-        self._length = len(fields)
-        self._places = {name: fields.index(name) for name in _VALUES if name in fields}
+        self._fields = info.fields.get(State.__name__, ())
 
     def read(self) -> PassEnd:
         for record in self._file.messages(("journal", "link_reports")):
@@ -159,48 +122,34 @@ class _Pass:
                 self._report(message)
             else:
                 self._unreadable += 1
-        return PassEnd(
-            unreadable=self._unreadable + len(self._file.damage),
-            lost={name: each.holes(self._file.holes) for name, each in self._coverage.items()},
-            known_until={name: each.known_until for name, each in self._coverage.items()},
-        )
+        damaged = self._file.holes
+        holes = {
+            name: [*each.holes(damaged), (each.known_until + INSTANT, inf)] for name, each in self._coverage.items()
+        }
+        return PassEnd(self._unreadable + len(self._file.damage), holes)
 
     def _journal(self, journal: Journal) -> None:
         """Take a part of a journal, as far as it can be read; in simulated time what is not whole is lost."""
         before, ticks = self._unreadable, list[int]()
-        self._note_part(journal)
         for entry in entries_of(journal.data, self._count_damage):
             if isinstance(entry, Decision | Exchange):
-                if not self._is_timely(journal, time_of(entry.tick, self._T_c) if self._simulated else journal.t):
+                if not 0 <= (time_of(entry.tick, self._T_c) if self._simulated else journal.t) <= self._latest:
                     self._unreadable += 1
                     continue
                 ticks.append(entry.tick)
             self._take(journal, entry)
         if self._simulated and self._unreadable == before:  # in real time each entry tells all by itself
-            self._cover(journal, ticks)
+            name, T_c = journal.sender, self._T_c
+            if name not in self._coverage:
+                self._coverage[name] = JournalCoverage(periodic=is_periodic(self._file.info, name))
+            times = (time_of(ticks[0], T_c), time_of(ticks[-1], T_c) if name == PLANT else journal.t) if ticks else None
+            self._coverage[name].take(journal, lambda: times)
 
     def _count_damage(self, error: ValueError) -> None:
         self._unreadable += 1
 
-    def _is_timely(self, journal: Journal, t: float) -> bool:
-        """Return whether an entry of a journal may be about a run time (s): nobody tells of what is yet to come.
-
-        The plant's run time may stand still for a while, as it is frozen, so its journal counts as of the run's end.
-        """
-        at = inf if journal.sender == PLANT else journal.t + AHEAD * self._speed
-        return 0.0 <= t <= min(self._latest, at)
-
-    def _cover(self, journal: Journal, ticks: list[int]) -> None:
-        """Note which part of a journal is there, and the ticks of which it tells."""
-        name, T_c = journal.sender, self._T_c
-        if name not in self._coverage:
-            self._coverage[name] = JournalCoverage(periodic=is_periodic(self._file.info, name))
-        times = (time_of(ticks[0], T_c), time_of(ticks[-1], T_c) if name == PLANT else journal.t) if ticks else None
-        self._coverage[name].take(journal, lambda: times)
-        if (t := self._coverage[name].known_until) < inf:
-            self._sink.known_until(name, t)
-
     def _take(self, journal: Journal, entry: Entry) -> None:
+        sink, receiver = self._sink, journal.sender
         match entry:
             case Exchange(states=states):
                 for raw in states:
@@ -210,24 +159,26 @@ class _Pass:
                     self._state(journal, payload)
             case MessageReference(key=key, epoch=epoch, seq=number, rejected=rejected):
                 if kind_of(key) == "state":
-                    self._sink.heard((name_of(key), journal.sender), epoch, number, rejected)
-            case ReceivedMessage(key=key):
-                if kind_of(key) == "state":
-                    self._rejected(journal, name_of(key), entry)
+                    sink.take_heard((name_of(key), receiver), epoch, number, rejected)
+            case ReceivedMessage(key=key, payload=payload, rejected=rejected):
+                if kind_of(key) == "state" and rejected not in _NOT_SOUND:  # it arrived, if its key names its sender
+                    match values_of(payload):
+                        case {"sender": str(src), "epoch": int(epoch), "seq": int(number)} if src == name_of(key):
+                            sink.take_heard((src, receiver), epoch, number, rejected)
             case RejectedCount(key=key, kind=kind, count=count):
                 if kind_of(key) == "state" and kind in _OF_SENDER:
-                    self._dropped(journal, name_of(key), count)
-            case ProcessEvent(kind="session") if not self._simulated and journal.sender in self._spoke:
-                self._sink.renewed(journal.sender, self._spoke[journal.sender])
-            case Decision() if journal.sender != PLANT:
-                self._sink.decision(journal.sender, journal.epoch, entry)
+                    sink.take_dropped((name_of(key), receiver), count)
+            case ProcessEvent(kind="session") if not self._simulated and receiver in self._spoke:
+                sink.take_renewed(receiver, self._spoke[receiver])
+            case Decision() if receiver != PLANT:
+                sink.take_decision(receiver, journal.epoch, entry)
 
     def _state(self, journal: Journal, raw: Any) -> None:
-        values: Mapping[str, Any] = {}
+        values: dict[str, Any] = {}
         if isinstance(raw, bytes):
             values = values_of(raw)
-        elif isinstance(raw, list) and len(raw) == self._length:
-            values = {name: raw[place] for name, place in self._places.items()}
+        elif isinstance(raw, list) and len(raw) == len(self._fields):
+            values = dict(zip(self._fields, raw, strict=True))
         try:
             state = SentState(
                 int(values["seq"]), float(values["t"]), int(values["epoch"]),
@@ -237,36 +188,13 @@ class _Pass:
         except (KeyError, TypeError, ValueError, OverflowError):
             self._unreadable += 1
             return
-        numbers = 0 <= state.number <= self._most and 0 <= state.epoch <= MOST_COUNT
-        if numbers and self._is_timely(journal, state.t):
-            self._sink.state(sender, state)
-            if sender == journal.sender:
-                self._spoke[sender] = state.t
-        else:
+        credible = 0 <= state.number <= self._most and 0 <= state.epoch <= MOST_COUNT
+        if not (credible and 0.0 <= state.t <= self._latest):
             self._unreadable += 1
-
-    def _rejected(self, journal: Journal, src: str, message: ReceivedMessage) -> None:
-        """Take a message that was rejected: it arrived, if it is a state of the sender that its key names."""
-        if message.rejected not in _NOT_SOUND:
-            match values_of(message.payload):
-                case {"sender": str(sender), "epoch": int(epoch), "seq": int(number)} if sender == src:
-                    self._sink.heard((src, journal.sender), epoch, number, message.rejected)
-
-    def _note_part(self, journal: Journal) -> None:
-        """Note when a part of a journal was sent: no part is believed to be later than the record's end."""
-        t = min(journal.t, self._t_end)
-        epoch, last, earlier = self._parts.get(journal.sender, (journal.epoch, t, t))
-        if epoch != journal.epoch:
-            last = earlier = t
-        if t > last:
-            last, earlier = t, last
-        self._parts[journal.sender] = journal.epoch, last, earlier
-
-    def _dropped(self, journal: Journal, src: str, count: int) -> None:
-        """Take that a receiver dropped states after it sent the part of its journal before this one."""
-        _, last, earlier = self._parts[journal.sender]
-        way = ON_WAY * self._speed
-        self._sink.dropped((src, journal.sender), DroppedStates(count, earlier - way, last + way))
+            return
+        self._sink.take_state(sender, state)
+        if sender == journal.sender:
+            self._spoke[sender] = state.t
 
     def _report(self, report: LinkReport) -> None:
         try:
@@ -275,16 +203,10 @@ class _Pass:
             self._unreadable += 1
             return
         for src, counts in data.counts.items():
-            self._sink.counts((src, report.sender), counts)
+            self._sink.take_counts((src, report.sender), counts)
         for trace in data.traces:
-            self._sink.trace(self._credible(trace))
-
-    def _credible(self, trace: LinkTrace) -> LinkTrace:
-        """Return the verdicts on messages that may have been sent, and count the others."""
-        if max(trace.seq, default=0) <= self._most and max(trace.t, default=0.0) <= self._latest:
-            return trace
-        every = zip(trace.seq, trace.t, trace.outcome, strict=True)
-        rows = [row for row in every if row[0] <= self._most and row[1] <= self._latest]
-        self._unreadable += len(trace.seq) - len(rows)
-        seq, t, outcome = zip(*rows, strict=True) if rows else ((), (), ())
-        return LinkTrace(trace.src, trace.dst, seq, t, outcome)
+            rows = list(zip(trace.seq, trace.t, trace.outcome, strict=True))
+            credible = [row for row in rows if row[0] <= self._most and row[1] <= self._latest]
+            self._unreadable += len(rows) - len(credible)
+            if credible:
+                self._sink.take_trace(LinkTrace(trace.src, trace.dst, *zip(*credible, strict=True)))

@@ -1,10 +1,12 @@
-"""The last states that one agent sent, while a pass over a record goes on."""
+"""The last states that each agent sent, while a pass over a record goes on."""
 
 from __future__ import annotations
 
 from array import array
 from math import inf
 from typing import NamedTuple
+
+Link = tuple[str, str]  # Sender and receiver
 
 KEPT = 8192  # Number of states that a window holds: 2.7 minutes at a control period of 20 ms
 
@@ -27,7 +29,7 @@ class SentState(NamedTuple):
 
 
 class StateWindow:
-    """The last states of one process by number; of older ones it says that they are not there."""
+    """The last states of one process by number; older ones are absent."""
 
     def __init__(self) -> None:
         self._numbers = array("q", [-1]) * KEPT
@@ -52,7 +54,7 @@ class StateWindow:
         return number >= 0 and self._numbers[number % KEPT] == number
 
     def numbers(self, after: int, until: int) -> list[int]:
-        """Return the numbers behind one and up to another that were sent, in order; at most `KEPT`, however far."""
+        """Return the sent numbers in (after, until], in order."""
         if until - after > KEPT:
             return sorted(number for number in self._numbers if after < number <= until)
         return [number for number in range(after + 1, until + 1) if self.has(number)]
@@ -65,7 +67,7 @@ class StateWindow:
         return self.has(number) and not self._flags[number % KEPT] & _IDLE
 
     def t(self, number: int) -> float | None:
-        """Return when (s) the state of this number was sent; None if it is not there."""
+        """Return when (s) the state of this number was sent."""
         return self._t[number % KEPT] if self.has(number) else None
 
     def is_past(self, number: int) -> bool:
@@ -73,7 +75,7 @@ class StateWindow:
         return number < 0 or self._numbers[number % KEPT] > number
 
     def kept_until(self, number: int) -> int:
-        """Return the number up to which quiet states kept the one of this number in force: itself, if none did."""
+        """Return the number up to which quiet states kept the one of this number in force."""
         if self.is_past(number + 1):
             return number if self._loud > number else self._latest
         while self.has(number + 1) and self._flags[(number + 1) % KEPT] & _QUIET:
@@ -107,7 +109,6 @@ class SentStates:
         return found
 
     def window_of(self, epoch: int) -> StateWindow | None:
-        """Return the states of a process; None if they are not there any more."""
         return self._windows.get(0 if self._simulated else epoch)
 
     def put(self, state: SentState) -> bool:

@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from gridpeers.lab.communication.link_accounts import Missing
+from gridpeers.lab.communication.accounts import Missing
 from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.checks.judging import judge_by
 from gridpeers.wire.plugins.plugin import Plugin
@@ -24,9 +24,9 @@ def test_in_wall_clock_time_a_time_of_flight_longer_than_the_run_is_not_judged(i
         unreadable=0,
         counts={},
         unjudged={},
-        info=SimpleNamespace(agent_names=("inv1", "inv2")),
+        info=SimpleNamespace(agent_names=("inv1", "inv2"), level="all"),
         simulated=False,
-        has_arrivals=True,
+        dropped={},
         arrivals={("inv1", "inv2"): []},
         t_end=7.0,
     )

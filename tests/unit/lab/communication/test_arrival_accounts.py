@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection
 
 import pytest
 
-from gridpeers.lab.communication.arrival_accounts import ArrivalAccounts
+from gridpeers.lab.communication.accounts import ArrivalAccounts
 from gridpeers.lab.communication.sent_states import SentState
 
 LINK = ("inv1", "inv2")

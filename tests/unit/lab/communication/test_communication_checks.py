@@ -105,15 +105,15 @@ def test_the_memory_of_a_pass_does_not_grow_with_the_run(sound: CheckedCase, clo
         sums = SummaryPass(info, ticks * info.T_c)
         for number in range(ticks):
             for agent in NAMES:
-                sums.state(agent, SentState(number, number * info.T_c, 1, idle=False, quiet=number % 3 == 1))
+                sums.take_state(agent, SentState(number, number * info.T_c, 1, idle=False, quiet=number % 3 == 1))
                 said = [2, 1] if clock == "simulated" else [number - 1, number]
-                sums.decision(agent, 1, Decision(number, 0, [n for n in NAMES if n != agent], said, [], []))
+                sums.take_decision(agent, 1, Decision(number, 0, [n for n in NAMES if n != agent], said, [], []))
                 for other in NAMES:
                     if other != agent and number % 3 != 1:
-                        sums.heard((other, agent), 1, number, "")
+                        sums.take_heard((other, agent), 1, number, "")
         size, _ = tracemalloc.get_traced_memory()
         tracemalloc.stop()
-        assert sums.finish(0).used
+        assert sums.finish(0).oldest
         return size
 
     assert memory(4500) < 1.1 * memory(1500)

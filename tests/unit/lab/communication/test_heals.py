@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from gridpeers.lab.communication.heals import Heal, Heals
-from gridpeers.lab.communication.neighbour_use import NeighbourUse, Uses
+from gridpeers.lab.communication.uses import NeighbourUse, Uses
 from gridpeers.lab.communication.sent_states import SentState, SentStates
 from gridpeers.netem.ledger import LinkTrace
 
@@ -31,7 +31,7 @@ def healed(receiver: list[SentState], sender: list[SentState], *, used_at_last: 
     for name, said in zip(LINK, (sender, receiver), strict=True):
         for state in said:
             sent[name].put(state)
-    info: Any = SimpleNamespace(simulated=False, T_c=T_C, agent_names=LINK, agents=())
+    info: Any = SimpleNamespace(simulated=False, T_c=T_C, agent_names=LINK, agents=(), plant=SimpleNamespace(links={}))
     heals = Heals(info, 30.0, sent)
     heals.trace(LinkTrace(*LINK, seq=(1, 2), t=(9.0, 10.0), outcome=("cut", 0.0)))
     for state in receiver:

@@ -66,7 +66,7 @@ def test_a_decision_to_come_keeps_no_other_one_out() -> None:
     to_come = packed([*DECISION[:1], 2**60, *DECISION[2:]])
     sums, unreadable = judged([("inv1", to_come + packed(DECISION) + GOOD)], clock="simulated")
 
-    assert (unreadable, sums.finish(unreadable).used) == (1, True)
+    assert (unreadable, bool(sums.finish(unreadable).oldest)) == (1, True)
 
 
 def test_a_bad_entry_does_not_end_a_part() -> None:

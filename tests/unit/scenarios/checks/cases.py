@@ -47,22 +47,20 @@ def with_content(case: CheckedCase, content: RecordContent, *, late: float = 0.0
     for agent, states in content.states.items():
         for key, state in states.items():
             of[agent, *key] = state.t
-            entries.append((state.t, 1, partial(sums.state, agent, state)))
+            entries.append((state.t, 1, partial(sums.take_state, agent, state)))
     for agent, decisions in content.decisions.items():
         for epoch, decision in decisions:
-            t = decision.tick * content.info.T_c if content.simulated else of.get((agent, epoch, decision.tick), 0.0)
-            entries.append((t + late, 0, partial(sums.decision, agent, epoch, decision)))
+            t = decision.tick * content.info.T_c if content.info.simulated else of.get((agent, epoch, decision.tick), 0.0)
+            entries.append((t + late, 0, partial(sums.take_decision, agent, epoch, decision)))
     for link, heard in content.heard.items():
         for (epoch, number), why in heard.items():
-            entries.append((of[link[0], epoch, number] + late, 2, partial(sums.heard, link, epoch, number, why)))
-    for link, dropped in content.dropped.items():
-        entries += [(each.until + late, 3, partial(sums.dropped, link, each)) for each in dropped]
+            entries.append((of[link[0], epoch, number] + late, 2, partial(sums.take_heard, link, epoch, number, why)))
     for traces in content.traces.values():
-        entries += [(trace.t[-1] + late if trace.t else 0.0, 3, partial(sums.trace, trace)) for trace in traces]
+        entries += [(trace.t[-1] + late if trace.t else 0.0, 3, partial(sums.take_trace, trace)) for trace in traces]
     for _, _, take in sorted(entries, key=lambda entry: entry[:2]):
         take()
     for link, counts in content.counts.items():
-        sums.counts(link, counts)
+        sums.take_counts(link, counts)
     other.__dict__["communication"] = sums.finish(content.unreadable)
     return other
 

@@ -1,15 +1,13 @@
-"""Which state of which neighbour an agent's decisions used, told in order while a pass over a record goes on."""
+"""Which state of which neighbour an agent's decisions used, in order, while a pass over a record goes on."""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Sequence
-from math import inf
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from gridpeers.lab.communication.record_pass import Link
-from gridpeers.lab.communication.sent_states import SentState, StateWindow
-from gridpeers.scenarios.record.decision_entries import INSTANT, Hole, inside
+from gridpeers.lab.communication.sent_states import Link, SentState, SentStates
+from gridpeers.scenarios.record.decision_entries import Hole, inside
 from gridpeers.wire.journal import Decision
 
 MOST = 20_000  # States of an agent that wait for its journal at most: it may be lost, and the agent go on
@@ -42,6 +40,10 @@ class Uses(NamedTuple):
     """The neighbours, if the states of all are of the tick before; None else."""
 
 
+Used = tuple[SentState, Uses, bool]
+"""A state of an agent that was not idle, what the decision behind it used, and True if that decision is a new one."""
+
+
 def uses_of(agent: str, decision: Decision, T_c: float, *, simulated: bool) -> Uses:
     found = []
     unused, weights, ages = decision.unused, decision.weights, decision.ages
@@ -59,17 +61,11 @@ def uses_of(agent: str, decision: Decision, T_c: float, *, simulated: bool) -> U
     return Uses(tuple(found), frozenset(decision.neighbours) if alike else None)
 
 
-TellUse = Callable[[SentState, Uses, bool], None]
-"""Takes a state of an agent that was not idle, the decision that it came out of, and whether that is a new one."""
-
-
 class DecidedTicks:
     """The states of one agent in simulated time, each with the decision in force."""
 
-    def __init__(self, agent: str, T_c: float, tell: TellUse, holes: Sequence[Hole] = ()) -> None:
-        self._agent, self._T_c, self._tell, self._holes = agent, T_c, tell, holes
-        self.known_until = inf
-        """Run time (s) behind which it is not known yet how the agent decided."""
+    def __init__(self, agent: str, T_c: float, holes: Sequence[Hole]) -> None:
+        self._agent, self._T_c, self._holes = agent, T_c, holes
         self._states: deque[SentState] = deque(maxlen=MOST)
         self._coming: deque[Decision] = deque()
         self._uses: Uses | None = None
@@ -81,24 +77,23 @@ class DecidedTicks:
     def decision(self, epoch: int, decision: Decision) -> None:
         self._coming.append(decision)
 
-    def flush(self, until: float) -> None:
-        """Tell all states up to a run time (s), as far as it is known how the agent decided."""
-        until = min(until, self.known_until + INSTANT)
+    def flush(self, until: float) -> Iterator[Used]:
+        """Yield all states up to a run time (s), as far as it is known how the agent decided."""
         while self._states and self._states[0].t <= until:
             state = self._states.popleft()
             while self._coming and self._coming[0].tick <= state.number:
                 self._uses = uses_of(self._agent, self._coming.popleft(), self._T_c, simulated=True)
                 self._new = True
             if self._uses is not None and not state.idle and not inside(self._holes, state.t):
-                self._tell(state, self._uses, self._new)
+                yield state, self._uses, self._new
                 self._new = False
 
 
 class DecidedStates:
     """The decisions of one agent in real time, each with the state that came out."""
 
-    def __init__(self, agent: str, T_c: float, window: Callable[[int], StateWindow | None], tell: TellUse) -> None:
-        self._agent, self._T_c, self._tell, self._window = agent, T_c, tell, window
+    def __init__(self, agent: str, T_c: float, sent: SentStates) -> None:
+        self._agent, self._T_c, self._sent = agent, T_c, sent
         self._decisions: deque[tuple[float, int, Decision]] = deque()
         self._now = 0.0
 
@@ -108,15 +103,15 @@ class DecidedStates:
     def decision(self, epoch: int, decision: Decision) -> None:
         self._decisions.append((self._now, epoch, decision))
 
-    def flush(self, until: float) -> None:
-        """Tell all decisions whose states are of before a run time (s); all that was sent by then is known."""
+    def flush(self, until: float) -> Iterator[Used]:
+        """Yield all decisions whose states are of before a run time (s); all that was sent by then is known."""
         while self._decisions:
             came, epoch, decision = self._decisions[0]
-            window = self._window(epoch)
+            window = self._sent.window_of(epoch)
             t = None if window is None else window.t(decision.tick)
             if (came if t is None else t) > until:
                 return
             self._decisions.popleft()
             if window is not None and t is not None and window.decided(decision.tick):
                 state = SentState(decision.tick, t, epoch, idle=False, quiet=False)
-                self._tell(state, uses_of(self._agent, decision, self._T_c, simulated=False), True)
+                yield state, uses_of(self._agent, decision, self._T_c, simulated=False), True
