@@ -71,7 +71,9 @@ class Heals:
         self._losses: dict[Link, list[Span]] = {}
         """Planned cuts and losses of each link."""
         setup, names = planned_faults(info), info.agent_names
-        for link in ((src, dst) for src in names for dst in names if setup is not None and src != dst):
+        for link in ((src, dst) for src in names for dst in names if src != dst):
+            if setup is None:
+                break
             spans = setup.netem.spans(LinkEnds(*link), setup.microgrids)
             self._losses[link] = [span for span in spans if span.kind in LOSSES]
             for t, again in _ends(self._losses[link]):

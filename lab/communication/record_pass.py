@@ -6,7 +6,6 @@ sent, heard and used which number. So this reads the entries of the journals as 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import inf
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -77,7 +76,7 @@ class RecordSink:
 class PassEnd(NamedTuple):
     unreadable: int
     """Messages, entries, reports and parts of the file that could not be read, or cannot be true."""
-    holes: dict[str, Sequence[Hole]]
+    holes: dict[str, list[Hole]]
     """Simulated time: run times (s) between which it is not known how an agent decided, or what the plant heard."""
 
 

@@ -58,13 +58,7 @@ class Changes:
         return bool(self.without or self.without_loss or self.without_link_commands or self.law or self.keys)
 
     def __str__(self) -> str:
-        """Return them in words.
-
-        Examples
-        --------
-        >>> print(Changes(without=("inv4 -> inv7",), keys={"gains.k_p": 0.001}, since=2.0))
-        without inv4 -> inv7, gains.k_p = 0.001, from 2 s on
-        """
+        """Return them in words: "without inv4 -> inv7, gains.k_p = 0.001, from 2 s on"."""
         parts = [f"without {pattern}" for pattern in self.without]
         parts += ["without loss"] * self.without_loss + ["without link commands"] * self.without_link_commands
         parts += [f"law {self.law}"] * bool(self.law)
@@ -103,10 +97,18 @@ class ChangedRule:
 def changed_rule(record: RunRecord, changes: Changes) -> ChangedRule:
     """Return a record's run under changes; ReplayError with all that is wrong with these, or with the record."""
     require_arrivals(record)
-    _require_own_plant(record)
+    simulator, bridged = record.info.plant.settings.simulator, record.info.plant.bridged
+    if simulator != "gridpeers" or bridged:
+        raise ReplayError(
+            f"{record.path}: its plant was {'a federate' if bridged else f'that of {simulator}'}, which cannot be "
+            "closed into a loop again; what would have been needs our own plant"
+        )
     before, feeder = _checked(record, _tables(record), frozenset())
-    case = record.info.case
-    wrong = _wrong(record, changes, feeder)
+    case, since = record.info.case, changes.since
+    microgrids = {row.name: row.microgrid for row in (*feeder.inverters, *feeder.spares)}
+    wrong = [text for pattern in changes.without for text in objections(pattern, tuple(microgrids), microgrids)]
+    if not isfinite(since) or not 0.0 <= since < record.t_end:
+        wrong.append(f"from {since:g} s: is outside of the record, which has 0 to {record.t_end:.2f} s")
     tables, changed = _tables(record), []
     for path, value in {**({"law": changes.law} if changes.law else {}), **changes.keys}.items():
         try:
@@ -116,15 +118,17 @@ def changed_rule(record: RunRecord, changes: Changes) -> ChangedRule:
     if wrong:
         raise ReplayError(*wrong)
     after, _ = _checked(record, tables, frozenset(changed))
-    netem_before, netem_after = (_resolved(scenario, feeder, case) for scenario in (before, after))
+    netem_before, netem_after = (
+        setup_of(netem_of(scenario, case), scenario, feeder, real_nodes=True).netem for scenario in (before, after)
+    )
     if changes.without_loss:
         netem_after = without_loss(netem_after)
-    netem = spliced(netem_before, netem_after, changes.since)
+    netem = spliced(netem_before, netem_after, since)
     if changes.without:
-        cuts = (Fault(on=pattern, cut=True, from_s=changes.since) for pattern in changes.without)
+        cuts = (Fault(on=pattern, cut=True, from_s=since) for pattern in changes.without)
         netem = replace(netem, links=(*netem.links, *cuts))
     control, as_it_was = (configs(scenario, feeder, case)[1][0].control for scenario in (after, before))
-    if control != as_it_was and changes.since > 0.0 and record.info.simulated:
+    if control != as_it_was and since > 0.0 and record.info.simulated:
         raise ReplayError(
             "in simulated time the law, its gains and the graph change from the start of the run only: leave the time "
             "out, or take a record of a run in wall-clock time; links can change at any time"
@@ -145,15 +149,6 @@ def changed_rule(record: RunRecord, changes: Changes) -> ChangedRule:
 
 
 # -------------------------------------------------------------------- the scenario
-
-
-def _require_own_plant(record: RunRecord) -> None:
-    simulator, bridged = record.info.plant.settings.simulator, record.info.plant.bridged
-    if simulator != "gridpeers" or bridged:
-        raise ReplayError(
-            f"{record.path}: its plant was {'a federate' if bridged else f'that of {simulator}'}, which cannot be "
-            "closed into a loop again; what would have been needs our own plant"
-        )
 
 
 def _tables(record: RunRecord) -> Tree:
@@ -187,14 +182,6 @@ def _written(record: RunRecord, scenario: ScenarioModel) -> ScenarioModel | None
     except ReplayError:
         return None
     return scenario
-
-
-def _wrong(record: RunRecord, changes: Changes, feeder: Feeder) -> list[str]:
-    microgrids = {row.name: row.microgrid for row in (*feeder.inverters, *feeder.spares)}
-    wrong = [text for pattern in changes.without for text in objections(pattern, tuple(microgrids), microgrids)]
-    if not isfinite(changes.since) or not 0.0 <= changes.since < record.t_end:
-        wrong.append(f"from {changes.since:g} s: is outside of the record, which has 0 to {record.t_end:.2f} s")
-    return wrong
 
 
 def _put(tables: Tree, case: str, path: str, value: Any, *, whole: bool) -> str:
@@ -257,10 +244,6 @@ def _spliced(before: tuple[Entry, ...], after: tuple[Entry, ...], since: float) 
         if entry not in before and (entry.to_s is None or entry.to_s > since):
             found.append(replace(entry, from_s=max(entry.from_s, since)))
     return tuple(found)
-
-
-def _resolved(scenario: ScenarioModel, feeder: Feeder, case: str) -> Netem:
-    return setup_of(netem_of(scenario, case), scenario, feeder, real_nodes=True).netem
 
 
 def _with_links(scenario: ScenarioModel, case: str, netem: Netem) -> ScenarioModel:

@@ -1,26 +1,52 @@
-"""A run in wall-clock time again, as a closed loop: what each process hears is what the others send in the replay.
+"""A run in real time again, as a closed loop: each process hears the messages of the others in the replay.
 
 Calls and arrivals come when they came in the record. So without a change every process does what it did. Under a change
 a message takes as long as that of its number took in the record, and one that was lost stays lost. A message that the
 record does not have takes a delay of its link (`LinkDelays`). Processes start, stop, freeze and die as they did, and
-what people asked of the plant happens again.
+the commands of people to the plant happen again.
 """
 
 from __future__ import annotations
 
-from collections import OrderedDict, deque
+from collections import deque
 from collections.abc import Callable, Iterator
 from heapq import heappop, heappush
 from itertools import count
 from math import inf
 from statistics import median
+from typing import Any
 
-from gridpeers.agents.agent_config import nameplate_of
+from msgspec.structs import replace
+
+from gridpeers.agents.agent_config import AgentConfig, nameplate_of
+from gridpeers.agents.carriers.law_registry import close_laws
 from gridpeers.agents.graphs import GraphError, in_neighbours, rule_of
+from gridpeers.agents.laws.law import Law
+from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.lab.replay.changes import ChangedRule
-from gridpeers.lab.replay.loop_process import ChangedProcesses, LoopProcess, is_arrival
-from gridpeers.lab.replay.recorded_process import Input, RecordedStep, ReplayError, processes_of
-from gridpeers.lab.replay.replayed_process import MakePlant, Message, message_of, start_plant_of, tick_message
+from gridpeers.lab.replay.recorded_process import (
+    Message,
+    RecordedProcess,
+    RecordedStep,
+    ReplayError,
+    processes_of,
+    tick_message,
+)
+from gridpeers.lab.replay.replayed_process import (
+    MakePlant,
+    ReplayedProcess,
+    agent_again,
+    agent_as_run,
+    law_again,
+    plant_again,
+    recorded_links,
+    start_plant_of,
+)
+from gridpeers.netem.fault_schedule import Heal
+from gridpeers.netem.schema.fault import Fault
+from gridpeers.plant.realtime.realtime_plant import RealtimePlant
+from gridpeers.scenarios.emulation.emulated_links import links_of
+from gridpeers.scenarios.emulation.link_data import EVERYTHING, LinkCommand
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.wire.codec import decode
 from gridpeers.wire.journal import (
@@ -36,7 +62,8 @@ from gridpeers.wire.journal import (
     sender_of,
     stream_of,
 )
-from gridpeers.wire.messages import PLANT, AnyMessage, LinkReport, Measurement, State, Telemetry
+from gridpeers.wire.links import Links
+from gridpeers.wire.messages import PLANT, Command, LinkReport, LinkRequest, Measurement, State, Telemetry
 
 MOST_SENT = 100_000
 """Messages that are kept for those that are yet to hear them: minutes of nine agents."""
@@ -48,14 +75,48 @@ CUT_OFF = 1.0
 """Time (s of wall time) before the end of a record that is cut off within which a process belongs to its end."""
 
 _CALL, _ARRIVAL = 0, 1
-"""Order of what is due at the same time: processes that share a session send before they hear."""
+"""Order of calls at the same time: processes that share a session send before they hear."""
 
 _NOT_YET = Message("", b"not yet")
 """In place of a message that its sender is yet to send."""
 
 
+class LoopProcess:
+    """A process of the loop: its calls in the record, the node made again, and how far it has come."""
+
+    def __init__(self, recorded: RecordedProcess) -> None:
+        self.recorded, self.name = recorded, recorded.name
+        self.again: ReplayedProcess | None = None
+        """None before its start."""
+        self.config: AgentConfig | None = None
+        """Of an agent that was made again."""
+        self._steps: Iterator[RecordedStep] = recorded.steps()
+        self.head: RecordedStep | None = next(self._steps, None)
+        """Its next call; None at its end."""
+        self._sent: dict[str, int] = {}
+
+    @property
+    def agent(self) -> RealtimeAgent | None:
+        """Its node, if it is an agent that was made again."""
+        return self.again.node if self.again is not None and isinstance(self.again.node, RealtimeAgent) else None
+
+    def next(self) -> None:
+        assert self.head is not None
+        for sent in self.head.sent:
+            if (message := tick_message(sent)) is not None:
+                self._sent[stream_of(sent.key)] = message.seq
+        self.head = next(self._steps, None)
+
+    def has_sent(self, of: str, number: int) -> bool:
+        """Return whether it has sent a number of a stream, or a later one, in the record by now."""
+        return self._sent.get(of, -1) >= number
+
+    def hears(self, key: str) -> bool:
+        return self.again is not None and self.again.hears(key)
+
+
 class ClosedLoop:
-    """A run again, from its start, under changes from a time on."""
+    """A run again, from its start, under changes from a time on; None changes nothing."""
 
     def __init__(
         self,
@@ -64,13 +125,15 @@ class ClosedLoop:
         take: Callable[[Telemetry | LinkReport], None],
         make_plant: MakePlant,
     ) -> None:
-        self._record, self._take, self._make_plant = record, take, make_plant
-        self._making = ChangedProcesses(record.info, rule)
+        self._record, self._rule, self._take, self._make_plant = record, rule, take, make_plant
+        self._changed = rule is not None and rule.changes.since <= 0.0
+        """The change is made."""
+        self._laws: list[Law] = []
         self._processes: dict[tuple[str, int], LoopProcess] = {}
         self._due: list[tuple[float, int, int, LoopProcess, Message | None]] = []
-        """What comes next: when (s, monotonic), calls first; of whom; the message, if the record has none of it."""
+        """Next calls: when (s, monotonic), calls first; of whom; the message, if the record has none of it."""
         self._order = count()
-        self._sent: OrderedDict[tuple[str, int, int], tuple[float, Message]] = OrderedDict()
+        self._sent: dict[tuple[str, int, int], tuple[float, Message]] = {}
         """Messages that were sent in the replay, by stream, epoch and number, and when."""
         self._delays = LinkDelays()
         self._statuses: dict[str, deque[Message]] = {}
@@ -85,22 +148,24 @@ class ClosedLoop:
         """Sentences on what the replay leaves out."""
 
     def run(self) -> None:
+        info = self._record.info
         found = [LoopProcess(process) for process in processes_of(self._record)]
         first = found[0]
         if first.name != PLANT:
             raise ReplayError(f"{self._record.path}: the plant kept no journal, so that nothing can follow from it")
-        until, plant = self._until(found), start_plant_of(self._record.info, self._make_plant)
+        plant = start_plant_of(info, self._make_plant)
         try:
-            self._making.make_plant(first, plant)
+            first.again = plant_again(first.recorded, info, plant, self._links(PLANT, info.plant.links))
             for process in found:
                 self._processes[process.name, process.recorded.epoch] = process
                 self._push(process)
-            self._loop(first, until)
+            assert isinstance(first.again.node, RealtimePlant)
+            self._loop(first.again.node, self._until(found))
             for process in found:
                 if process.again is not None:
                     self._publish(process, (), process.again.end(), inf)
         finally:
-            self._making.close()
+            close_laws(self._laws)
             plant.close()
 
     def _until(self, found: list[LoopProcess]) -> float:
@@ -113,18 +178,19 @@ class ClosedLoop:
 
     # ---------------------------------------------------------------- the loop
 
-    def _loop(self, plant: LoopProcess, until: float) -> None:
+    def _loop(self, plant: RealtimePlant, until: float) -> None:
         waits = 0
         while self._due:
             due, _, _, process, message = heappop(self._due)
             if message is not None:
-                if process.again is not None and process.again.hears(message.key):
+                if process.again is not None and process.hears(message.key):
                     self._publish(process, (), process.again.hear(message, due), due)
                 continue
             step = process.head
             assert step is not None
-            self._change_if_due(process, step)
-            self._t = plant.plant.t if plant.plant is not None else 0.0
+            if process.name == PLANT:
+                self._change_if_due(plant, step)
+            self._t = plant.t
             if self._t > until + 1e-9:
                 return
             heard = self._heard(process, step)
@@ -133,32 +199,43 @@ class ClosedLoop:
                 heappush(self._due, (self._due[0][0], _ARRIVAL, next(self._order), process, None))
                 continue
             waits = 0
-            if process.again is None and not self._making.make_agent(process, step):
-                self._note(f"the record lacks the start of {process.name}, so that its states are as recorded")
-            if process.again is not None and (heard not in (None, _NOT_YET) or not is_arrival(step)):
-                sent = process.again.take(step, heard)
-                self._publish(process, step.sent, sent, step.due)
+            if process.again is None:
+                self._make_agent(process, step)
+            if process.again is not None and (heard not in (None, _NOT_YET) or not step.is_arrival):
+                self._publish(process, step.sent, process.again.take(step, heard), step.due)
             process.next()
             self._settle(process, step)
             self._push(process)
 
     def _push(self, process: LoopProcess) -> None:
         if process.head is not None:
-            rank = _ARRIVAL if is_arrival(process.head) else _CALL
+            rank = _ARRIVAL if process.head.is_arrival else _CALL
             heappush(self._due, (process.head.due, rank, next(self._order), process, None))
 
-    def _change_if_due(self, process: LoopProcess, step: RecordedStep) -> None:
-        """Make the change before the plant measures at its time."""
-        node, since = process.plant, self._making.is_due
-        if since is None or node is None or not isinstance(step.entry, WakeUp) or step.entry.work:
+    def _make_agent(self, process: LoopProcess, step: RecordedStep) -> None:
+        config = self._record.info.agent(process.name)
+        if config is None or not step.instance:
+            self._note(f"the record lacks the start of {process.name}, so that its states are as recorded")
             return
-        if node.phase == "running" and node.t >= since - 1e-9:
-            self._making.change(list(self._processes.values()))
+        if self._changed and self._rule is not None and self._rule.control is not None:
+            config = replace(config, control=self._rule.control)
+        process.config, links = config, self._links(process.name, config.links)
+        process.again = agent_again(process.recorded, config, step.instance, self._laws, links)
+
+    def _links(self, name: str, recorded: dict[str, Any]) -> Links | None:
+        """Return the links into a node: those of the change; but where the record has none, only once it is made."""
+        if self._rule is None or self._rule.links is None or not (recorded or self._changed):
+            return recorded_links(self._record.info, name)
+        return links_of(name, self._rule.links)
 
     def _settle(self, process: LoopProcess, step: RecordedStep) -> None:
         """Undo what a step must not do to a process under the changes."""
-        if isinstance(step.entry, ReceivedMessage) and kind_of(step.entry.key) in TO_LINKS:
-            self._making.cut_again(process, self._t)
+        rule = self._rule
+        if isinstance(step.entry, ReceivedMessage) and kind_of(step.entry.key) in TO_LINKS and rule and self._changed:
+            for pattern in rule.changes.without:  # the command may have healed them
+                if process.again is not None and process.again.links is not None:
+                    cut = LinkCommand(fault=Fault(on=pattern, cut=True))
+                    process.again.links.command(cut.to_tree(), max(self._t, rule.changes.since))
         node, head = process.agent, process.head
         if node is None or head is None or not node.session_broken:
             return
@@ -166,24 +243,62 @@ class ClosedLoop:
             node.session_broken = False
             self._note(f"{process.name} would have opened a new session; what that would have brought is not known")
 
+    def _note(self, text: str) -> None:
+        if text not in self.notes:
+            self.notes.append(text)
+
+    # ---------------------------------------------------------------- the change
+
+    def _change_if_due(self, plant: RealtimePlant, step: RecordedStep) -> None:
+        """Make the change before the plant measures at its time."""
+        rule = self._rule
+        if rule is None or self._changed or not isinstance(step.entry, WakeUp) or step.entry.work:
+            return
+        if plant.phase != "running" or plant.t < rule.changes.since - 1e-9:
+            return
+        self._changed = True
+        for process in self._processes.values():
+            again = process.again
+            if again is None or again.node.finished:
+                continue
+            if rule.links is not None and again.links is None:
+                links = links_of(process.name, rule.links)
+                assert links is not None
+                again.use_links(links)
+            if rule.changes.without_loss and again.links is not None:  # losses that people commanded
+                heal = LinkCommand(heal=Heal(on=EVERYTHING, from_s=0.0, kinds=("loss",)))
+                again.links.command(heal.to_tree(), rule.changes.since)
+            if rule.control is not None and process.config is not None and process.agent is not None:
+                config = replace(agent_as_run(process.config, process.recorded.epoch), control=rule.control)
+                self._laws.append(law_again(config))
+                process.agent.change(config, self._laws[-1])
+
+    def _command(self, message: Message) -> Message | None:
+        """Return a command to links as it is under the change; None if it is left out."""
+        if self._rule is None or not self._changed or not self._rule.changes.without_link_commands:
+            return message
+        decoded = decode(message.payload)
+        return None if isinstance(decoded, LinkRequest | Command) and decoded.link_command else message
+
     # ---------------------------------------------------------------- messages
 
     def _heard(self, process: LoopProcess, step: RecordedStep) -> Message | None:
-        """Return what a process hears in a step: as the replay sent it, or as recorded where nobody sends it there."""
+        """Return the message of a step: as the replay sent it, or as recorded where nobody sends it there."""
         entry = step.entry
         if not isinstance(entry, MessageReference | ReceivedMessage):
             return None
-        kind = kind_of(entry.key)
+        recorded, kind = process.recorded.message, kind_of(entry.key)
         if kind not in EACH_TICK:
-            recorded = message_of(process.recorded, step)
-            if kind == "status" and recorded is not None and not entry.rejected:
-                sent = self._statuses.get(recorded.key)  # without a change, the status of the record is among them
-                return recorded if not sent or recorded in sent else sent[-1]
-            is_command = kind in TO_LINKS and not entry.rejected
-            return self._making.command(recorded) if is_command and recorded is not None else recorded
-        named = _named(entry)
+            message = recorded(step)
+            if message is None or entry.rejected:
+                return message
+            if kind == "status":
+                sent = self._statuses.get(message.key)  # without a change, the status of the record is among them
+                return message if not sent or message in sent else sent[-1]
+            return self._command(message) if kind in TO_LINKS else message
+        named = _named(step)
         if named is None:  # no sound message
-            return message_of(process.recorded, step)
+            return recorded(step)
         src, of, epoch, number = named
         found, by = self._sent.get((of, epoch, number)), self._processes.get((src, epoch))
         if found is not None:
@@ -192,25 +307,32 @@ class ClosedLoop:
             stays = process.name == PLANT or message.key == entry.key
             return message if stays else None  # a state that its law does not tell the neighbours
         if by is None or by.again is None:
-            return message_of(process.recorded, step)
+            return recorded(step)
         if by.has_sent(of, number):
             return None  # the record has it, and the replay does not
-        return message_of(process.recorded, step) if by.head is None else _NOT_YET
+        return recorded(step) if by.head is None else _NOT_YET
 
     def _publish(
         self, process: LoopProcess, recorded: tuple[SentMessage, ...], sent: list[Message], due: float
     ) -> None:
-        """Bring what a process sent in a step to those who hear it, beside those of whom the record has it."""
+        """Bring the messages of a step to those who hear them, beside those of whom the record has them."""
         theirs = {(each.key, state.seq) for each in recorded if (state := tick_message(each)) is not None}
         for message in sent:
-            if kind_of(message.key) in ("telemetry", "report"):
-                self._record_message(decode(message.payload))
+            kind = kind_of(message.key)
+            if kind in ("telemetry", "report"):
+                told = decode(message.payload)
+                if isinstance(told, Telemetry):
+                    if told.seq <= self._number:
+                        continue  # again, for a late recorder
+                    self._number = told.seq
+                if isinstance(told, Telemetry | LinkReport):
+                    self._take(told)
             elif (decoded := tick_message(message)) is not None:
                 self._sent[stream_of(message.key), decoded.epoch, decoded.seq] = due, message
                 if len(self._sent) > MOST_SENT:
-                    self._sent.popitem(last=False)
+                    del self._sent[next(iter(self._sent))]
                 self._send_new(process, message, decoded, theirs, due)
-            elif kind_of(message.key) == "status":
+            elif kind == "status":
                 self._statuses.setdefault(message.key, deque(maxlen=KEPT_STATUSES)).append(message)
 
     def _send_new(
@@ -226,29 +348,17 @@ class ClosedLoop:
         existed = (message.key, decoded.seq) in theirs
         any_state = any((f"{key}/{name}", decoded.seq) in theirs for key in ("state", "set_points"))
         for other in self._processes.values():
-            if other is process or other.again is None or not other.again.hears(message.key):
+            if other is process or not other.hears(message.key):
                 continue
             link = process.name, other.name
-            if (*link, decoded.epoch, decoded.seq) in self._lost and self._making.changed:
-                self._deliver(other, message, due + self._delays.typical(*link))
-                continue
             listened = kind == "measurement" or name in self._listens.get(other.name, frozenset())
-            if not (any_state if other.name == PLANT else existed and listened):
-                self._deliver(other, message, due + self._delays.draw(*link))
-
-    def _deliver(self, to: LoopProcess, message: Message, due: float) -> None:
-        heappush(self._due, (due, _ARRIVAL, next(self._order), to, message))
-
-    def _record_message(self, message: AnyMessage) -> None:
-        if isinstance(message, LinkReport):
-            self._take(message)
-        elif isinstance(message, Telemetry) and message.seq > self._number:  # not again for a late recorder
-            self._number = message.seq
-            self._take(message)
-
-    def _note(self, text: str) -> None:
-        if text not in self.notes:
-            self.notes.append(text)
+            if (*link, decoded.epoch, decoded.seq) in self._lost and self._changed:
+                delay = self._delays.typical(*link)
+            elif not (any_state if other.name == PLANT else existed and listened):
+                delay = self._delays.draw(*link)
+            else:
+                continue
+            heappush(self._due, (due + delay, _ARRIVAL, next(self._order), other, message))
 
 
 def _listeners(record: RunRecord) -> dict[str, frozenset[str]]:
@@ -264,11 +374,12 @@ def _listeners(record: RunRecord) -> dict[str, frozenset[str]]:
     return found
 
 
-def _named(entry: Input) -> tuple[str, str, int, int] | None:
+def _named(step: RecordedStep) -> tuple[str, str, int, int] | None:
     """Return sender, stream, epoch and number of a state, or a measurement, that arrives; None if none does."""
+    entry = step.entry
     if not isinstance(entry, MessageReference | ReceivedMessage) or kind_of(entry.key) not in EACH_TICK:
         return None
-    named = entry if isinstance(entry, MessageReference) else tick_message(Message(entry.key, entry.payload))
+    named = entry if isinstance(entry, MessageReference) else tick_message(entry)
     return None if named is None else (sender_of(entry.key), stream_of(entry.key), named.epoch, named.seq)
 
 
@@ -277,7 +388,7 @@ def _lost(record: RunRecord) -> Iterator[tuple[str, str, int, int]]:
     for process in processes_of(record):
         last: dict[tuple[str, int], int] = {}
         for step in process.steps():
-            if (named := _named(step.entry)) is not None:
+            if (named := _named(step)) is not None:
                 src, of, epoch, number = named
                 before = last.get((of, epoch), number)
                 yield from ((src, process.name, epoch, missed) for missed in range(before + 1, number))

@@ -1,10 +1,9 @@
-"""What would have been: a recorded run again under changes, as a run folder beside one of what was."""
+"""A recorded run again under changes, as a run folder beside one of the run as it was."""
 
 from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from math import inf
 from pathlib import Path
@@ -16,8 +15,8 @@ import pandas as pd
 from gridpeers.lab.replay.changes import ChangedRule, Changes, changed_rule
 from gridpeers.lab.replay.closed_loop import ClosedLoop
 from gridpeers.lab.replay.recorded_process import ReplayError
-from gridpeers.lab.replay.replay import ComparedRows, Difference, record_of
-from gridpeers.lab.replay.replayed_process import MakePlant, start_plant_of
+from gridpeers.lab.replay.replay import ComparedRows, record_of
+from gridpeers.lab.replay.replayed_process import start_plant_of
 from gridpeers.plant.build import start_plant
 from gridpeers.runs.comparison import Comparison
 from gridpeers.runs.result import Result, shown_in_notebooks
@@ -100,21 +99,23 @@ def counterfactual(
         )
     except (ValueError, TypeError) as error:
         raise ReplayError(f"a change cannot be read: {error}") from None
-    rule = changed_rule(record, changes)
-    home = _temporary() if folder is None else new_home(folder)
-    done = counterfactual_in(record, rule, home, temporary=folder is None)
+    done = counterfactual_in(record, changed_rule(record, changes), None if folder is None else new_home(folder))
     first = done.would_be.failures[:1]
     warn_of_laws({f"what would have been, {row.agent}": row.why for row in first.itertuples()}, depth=1)
     return done
 
 
 def counterfactual_in(
-    record: RunRecord, rule: ChangedRule, folder: Path, *, temporary: bool = False, tell: Progress | None = None
+    record: RunRecord, rule: ChangedRule, folder: Path | None, tell: Progress | None = None
 ) -> Counterfactual:
-    """Run a counterfactual into an empty folder, which goes with it if it is temporary; see `counterfactual`."""
-    would_be, was = RunFolder(folder, temporary=temporary), RunFolder(_temporary(), temporary=True)
-    done = run_counterfactual(record, rule, was.path, would_be.path, tell=tell)
-    return Counterfactual(was, would_be, rule.changes, done)
+    """Run a counterfactual into an empty folder, or into one that goes with it; see `counterfactual`."""
+    would_be = RunFolder(folder or _temporary(), temporary=folder is None)
+    was = RunFolder(_temporary(), temporary=True)
+    with broken_if_ended(would_be.path):
+        try:
+            return Counterfactual(record, rule, was, would_be, tell)
+        except RecordError as error:
+            raise ReplayError(f"{record.path}: {error}") from None
 
 
 def _temporary() -> Path:
@@ -124,12 +125,35 @@ def _temporary() -> Path:
 class Counterfactual:
     """A recorded run and the run under changes, side by side; `gridpeers.counterfactual` makes it."""
 
-    def __init__(self, was: RunFolder, would_be: RunFolder, changes: Changes, done: CounterfactualRun) -> None:
+    def __init__(
+        self, record: RunRecord, rule: ChangedRule, was: RunFolder, would_be: RunFolder, tell: Progress | None
+    ) -> None:
         self._folders = was, would_be  # they go with this
+        self.changes = changes = rule.changes
+        rows, effect = ComparedRows(record, changes.since if changes else inf), ComparedRows(record)
+        run = _in_simulated_time if record.info.simulated else _in_real_time
+        with Recorder(would_be.path / rule.case, gaps=True) as recorder:
+
+            def take(message: Telemetry | Other) -> None:
+                rows.take(message)
+                effect.take(message)
+                recorder(message)
+                if tell is not None and isinstance(message, Telemetry) and message.rows and message.rows[-1][0] > 0.0:
+                    tell(rule.case, message.rows[-1][0], record.t_end)
+
+            if tell is not None:
+                tell(rule.case, 0.0, record.t_end)
+            notes = run(record, rule, take)
+            recorded = recorder.finish(recorder.ended, recorder.record_step)
+        if changes and effect.difference is None:
+            notes = [*notes, f"the change made no difference: every row up to {effect.t:.2f} s is as recorded"]
+        self.difference, self.compared, self.notes = rows.difference, rows.count, tuple(notes)
+        """First row of the plant before the change that is not as in the record, None if all are, as they should be;
+        rows compared; sentences on effects that are left out, or that there was none."""
+        _write(record, rule, rule.scenario, would_be.path, recorded, would_be=True)
+        before = _as_recorded(record, was.path / rule.case, recorded.ended)
+        _write(record, rule, rule.recorded, was.path, before, would_be=False)
         self.was, self.would_be = _result(was.path), _result(would_be.path)
-        self.changes = changes
-        self.difference, self.compared, self.notes = done.difference, done.compared, done.notes
-        """First difference from the record before the change, None if there is none; rows compared; what is left."""
 
     @property
     def folder(self) -> Path:
@@ -145,7 +169,7 @@ class Counterfactual:
         return Comparison({"": (self.was, self.would_be)}, ("was", "would be"))
 
     def plot(self) -> Figure:
-        """Draw f, P of every inverter and MPSI: what was in faint lines, what would have been in strong ones."""
+        """Draw f, P of every inverter and MPSI: of the recorded run in faint lines, of the other in strong ones."""
         from gridpeers.lab.replay.counterfactual_figure import counterfactual_figure
 
         shown_in_notebooks()
@@ -171,71 +195,18 @@ def _result(folder: Path) -> Result:
 # -------------------------------------------------------------------- the run
 
 
-@dataclass(frozen=True, kw_only=True)
-class CounterfactualRun:
-    difference: Difference | None
-    """First row of the plant before the change that is not as in the record; None if all are. It should be None."""
-    compared: int
-    t_end: float
-    """Run time of its last row (s)."""
-    notes: tuple[str, ...]
-    """Sentences on what it leaves out; one says so if the change made no difference."""
-
-
-def run_counterfactual(
-    record: RunRecord,
-    rule: ChangedRule,
-    was: Path,
-    would_be: Path,
-    make_plant: MakePlant = start_plant,
-    tell: Progress | None = None,
-) -> CounterfactualRun:
-    """Run a counterfactual, and write two run folders: for what was, without figures, and for what would have been."""
-    with broken_if_ended(would_be):
-        try:
-            return _both(record, rule, was, would_be, make_plant, tell)
-        except RecordError as error:
-            raise ReplayError(f"{record.path}: {error}") from None
-
-
-def _both(
-    record: RunRecord, rule: ChangedRule, was: Path, would_be: Path, make_plant: MakePlant, tell: Progress | None
-) -> CounterfactualRun:
-    changes = rule.changes
-    rows, effect = ComparedRows(record, changes.since if changes else inf), ComparedRows(record)
-    run = _in_simulated_time if record.info.simulated else _in_real_time
-    with Recorder(would_be / rule.case, gaps=True) as recorder:
-
-        def take(message: Telemetry | Other) -> None:
-            rows.take(message)
-            effect.take(message)
-            recorder(message)
-            if tell is not None and isinstance(message, Telemetry) and message.rows and message.rows[-1][0] > 0.0:
-                tell(rule.case, message.rows[-1][0], record.t_end)
-
-        if tell is not None:
-            tell(rule.case, 0.0, record.t_end)
-        notes = run(record, rule, take, make_plant)
-        recorded = recorder.finish(recorder.ended, recorder.record_step)
-    if changes and effect.difference is None:
-        notes = [*notes, f"the change made no difference: every row up to {effect.t:.2f} s is as recorded"]
-    _write(record, rule, rule.scenario, would_be, recorded, would_be=True)
-    _write(record, rule, rule.recorded, was, _as_recorded(record, was / rule.case, recorded.ended), would_be=False)
-    return CounterfactualRun(difference=rows.difference, compared=rows.count, t_end=recorded.ended, notes=tuple(notes))
-
-
-def _in_real_time(record: RunRecord, rule: ChangedRule, take: Take, make_plant: MakePlant) -> list[str]:
-    loop = ClosedLoop(record, rule if rule.changes else None, take, make_plant)
+def _in_real_time(record: RunRecord, rule: ChangedRule, take: Take) -> list[str]:
+    loop = ClosedLoop(record, rule if rule.changes else None, take, start_plant)
     loop.run()
     return loop.notes
 
 
-def _in_simulated_time(record: RunRecord, rule: ChangedRule, take: Take, make_plant: MakePlant) -> list[str]:
+def _in_simulated_time(record: RunRecord, rule: ChangedRule, take: Take) -> list[str]:
     """Run a scenario in simulated time again: messages are late and lost by their numbers, so as they were."""
     info = record.info
     links = {} if rule.links is None else {"links": rule.links}
     control = {} if rule.control is None else {"control": rule.control}
-    plant = start_plant_of(info, make_plant)
+    plant = start_plant_of(info, start_plant)
     try:
         outcome = run_inprocess(
             msgspec.structs.replace(info.plant, record="physics", **links),

@@ -1,14 +1,12 @@
-"""What was, in faint lines, and what would have been, in strong ones: f, P of every inverter, and MPSI."""
+"""A recorded run in faint lines, and the same run under changes in strong ones: f, P of every inverter, and MPSI."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import matplotlib as mpl
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from gridpeers.scenarios.results.history import Floats
 from gridpeers.scenarios.results.plots.drawing import Drawing
 from gridpeers.scenarios.results.plots.run_figures import MEASURES, measured
 from gridpeers.scenarios.results.plots.style import (
@@ -22,18 +20,14 @@ from gridpeers.scenarios.results.plots.style import (
     time_axis,
 )
 
-FAINT: dict[str, Any] = {"linewidth": 2.6, "linestyle": "-"}
-STRONG: dict[str, Any] = {"linewidth": 1.1, "linestyle": "-"}
-"""Lines of what was, below, and of what would have been, on top: where they coincide, both are seen."""
+LINES: tuple[tuple[dict[str, Any], float], ...] = (
+    ({"linewidth": 2.6, "linestyle": "-"}, 0.65),
+    ({"linewidth": 1.1, "linestyle": "-"}, 0.0),
+)
+"""Lines of the recorded run, below, and of the changed one, on top, each with the part of white in its colours. It is
+no transparency: faint lines of several inverters on top of each other would be strong again."""
 
-PALE = 0.65
-"""Part of white in the colour of a faint line. It is no transparency: lines of several inverters on top of each other
-would be strong again."""
-
-BLUE, GREEN = STYLES[0][0], STYLES[2][0]
-
-KINDS = {True: BLUE, False: GREEN}
-"""Colours of inverters: grid-forming, or not."""
+BLUE, GREEN, ORANGE = STYLES[0][0], STYLES[2][0], OTHER_STYLES[1][0]
 
 
 def counterfactual_figure(was: Drawing, would_be: Drawing, words: str, since: float) -> Figure:
@@ -41,13 +35,17 @@ def counterfactual_figure(was: Drawing, would_be: Drawing, words: str, since: fl
     with mpl.rc_context(PAGE):
         figure = Figure(figsize=(7.4, 6.4), layout="constrained")
         top, middle, bottom = figure.subplots(3, 1, sharex=True)
-        both = ((was, FAINT, "what was"), (would_be, STRONG, f"what would have been: {words}"))
-        for drawing, line, label in both:
-            _plot(top, drawing, "frequency", line, label=label)
-            _powers(middle, drawing, line)
         indices = []
-        for drawing, line, _ in both:
-            indices.append(_plot(bottom, drawing, "MPSI", line))
+        labels = "what was", f"what would have been: {words}"
+        for drawing, label, (line, white) in zip((was, would_be), labels, LINES, strict=True):
+            ((case, history),) = drawing.histories.items()
+            blue, green = (_paler(colour, white) for colour in (BLUE, GREEN))
+            top.plot(history.t, measured(drawing, case, "frequency"), color=blue, label=label, **line)
+            for i in range(len(history.inverters)):
+                colour = blue if drawing.nameplates.GFM[i] else green
+                middle.plot(history.t, history.P[:, i] / drawing.nameplates.s[i], color=colour, **line)
+            indices.append(measured(drawing, case, "MPSI"))
+            bottom.plot(history.t, indices[-1], color=blue, **line)
         from_zero(bottom, indices, MEASURES["MPSI"].bounds)  # type: ignore[arg-type]  # this one has bounds
         nominal_line(top, was.f_nom)
         name_panel(top, "Frequency", "mean of the GFM, f (Hz)")
@@ -59,7 +57,7 @@ def counterfactual_figure(was: Drawing, would_be: Drawing, words: str, since: fl
             time_axis(panel, was)
             mark_events(panel, would_be, labelled=panel is top)
             if since > 0.0:
-                panel.axvline(since, color="#d55e00", linewidth=1.0, zorder=1)
+                panel.axvline(since, color=ORANGE, linewidth=1.0, zorder=1)
             if panel is not bottom:
                 panel.set_xlabel("")
         if since > 0.0:
@@ -71,31 +69,12 @@ def counterfactual_figure(was: Drawing, would_be: Drawing, words: str, since: fl
                 xytext=(-4.0 if late else 4.0, 0.0),
                 textcoords="offset points",
                 ha="right" if late else "left",
-                color="#d55e00",
+                color=ORANGE,
                 fontsize="small",
             )
         legend_below(figure, top)
     return figure
 
 
-def _plot(axes: Axes, drawing: Drawing, name: str, line: dict[str, Any], label: str | None = None) -> Floats:
-    """Draw one of `MEASURES` of the drawing's history, and return it."""
-    ((case, history),) = drawing.histories.items()
-    values = measured(drawing, case, name)
-    axes.plot(history.t, values, color=_shade(BLUE, line), label=label, **line)
-    return values
-
-
-def _powers(axes: Axes, drawing: Drawing, line: dict[str, Any]) -> None:
-    ((_, history),) = drawing.histories.items()
-    for i in range(len(history.inverters)):
-        colour = _shade(KINDS[bool(drawing.nameplates.GFM[i])], line)
-        axes.plot(history.t, history.P[:, i] / drawing.nameplates.s[i], color=colour, **line)
-
-
-def _shade(colour: str, line: dict[str, Any]) -> tuple[float, float, float]:
-    """Return the colour as a line of this kind has it."""
-    red, green, blue = mpl.colors.to_rgb(colour)
-    if line is STRONG:
-        return red, green, blue
-    return tuple(PALE + (1.0 - PALE) * part for part in (red, green, blue))  # type: ignore[return-value]  # of three
+def _paler(colour: str, white: float) -> tuple[float, ...]:
+    return tuple(white + (1.0 - white) * part for part in mpl.colors.to_rgb(colour))

@@ -7,12 +7,13 @@ So a difference means that the record lacks an input, or that the code or the la
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import ExitStack, closing
 from typing import NamedTuple
 
 from msgspec.structs import replace
 
 from gridpeers.agents.agent import Agent
+from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.agents.carriers.law_registry import make_law
 from gridpeers.agents.laws.law import Law
 from gridpeers.scenarios.record.record_reader import RunRecord
@@ -25,13 +26,11 @@ class Recomputed(NamedTuple):
     """A decision of the record, and its state as the core decides it from the recorded inputs."""
 
     decision: RecordedDecision
-    """As recorded."""
     state: State
-    """As computed again."""
 
     @property
     def agrees(self) -> bool:
-        """Whether both states have the same bytes."""
+        """Both states have the same bytes."""
         return encode(self.decision.state) == encode(self.state)
 
 
@@ -41,50 +40,37 @@ def recomputed(record: RunRecord, agent: str, law: Law | None = None) -> Iterato
     A law may have a memory, so this begins with the first decision. It ends with the first that is not whole, as where
     the record is cut off.
     """
-    with closing(_Recomputation(record, agent, law)) as again:
+    config = record.info.agent(agent)
+    assert config is not None
+    config = config if config.clock == "wall" else config.by_own_clock()
+    with ExitStack() as ends:
+        law = law or ends.enter_context(closing(make_law(config.control)))
+        core: Agent | None = None
+        epoch = -1
         for decision in record.decisions(agent):
             if not decision.is_whole:
                 return
-            yield Recomputed(decision, again.decide(decision))
+            if core is None or decision.state.epoch != epoch:  # another process of this name
+                epoch = decision.state.epoch
+                core = Agent(replace(config, epoch=epoch), law)
+            yield Recomputed(decision, _decided_again(core, config, decision))
 
 
-class _Recomputation:
-    """An agent's core, fed from a record."""
-
-    def __init__(self, record: RunRecord, agent: str, law: Law | None) -> None:
-        config = record.info.agent(agent)
-        assert config is not None
-        self._config = config if config.clock == "wall" else config.by_own_clock()
-        self._own_law = None if law is not None else make_law(config.control)
-        self._law = law or self._own_law
-        self._core = Agent(self._config, self._law)
-        self._epoch: int | None = None
-
-    def decide(self, decision: RecordedDecision) -> State:
-        """Return the state of a decision."""
-        if decision.state.epoch != self._epoch:  # another process of this name
-            self._epoch = decision.state.epoch
-            self._core = Agent(replace(self._config, epoch=self._epoch), self._law)
-        core = self._core
-        for each in decision.neighbours:
-            heard = core.heard.get(each.name)
-            if each.state is None:
-                if heard is not None:
-                    core.forget(each.name)
-                core.meet(each.nameplate)
-            elif heard is None or (heard.epoch, heard.seq) != (each.state.epoch, each.state.seq):
-                core.meet(each.nameplate)
-                core.hear(each.state)
-        if decision.action == "idle" and not core.fault:
-            return core.idle_state(decision.measurement)
-        if self._config.clock == "simulated":
-            return core.tick(decision.measurement, [each.name for each in decision.neighbours])
-        if decision.restarted:
-            core.restart()
-        ages = {each.name: each.age for each in decision.neighbours if each.age is not None and each.unused != "stale"}
-        return replace(core.tick(decision.measurement, tuple(ages), ages), seq=decision.tick)
-
-    def close(self) -> None:
-        """Release what the law has opened, if it was made here."""
-        if self._own_law is not None:
-            self._own_law.close()
+def _decided_again(core: Agent, config: AgentConfig, decision: RecordedDecision) -> State:
+    for each in decision.neighbours:
+        heard = core.heard.get(each.name)
+        if each.state is None:
+            if heard is not None:
+                core.forget(each.name)
+            core.meet(each.nameplate)
+        elif heard is None or (heard.epoch, heard.seq) != (each.state.epoch, each.state.seq):
+            core.meet(each.nameplate)
+            core.hear(each.state)
+    if decision.action == "idle" and not core.fault:
+        return core.idle_state(decision.measurement)
+    if config.clock == "simulated":
+        return core.tick(decision.measurement, [each.name for each in decision.neighbours])
+    if decision.restarted:
+        core.restart()
+    ages = {each.name: each.age for each in decision.neighbours if each.age is not None and each.unused != "stale"}
+    return replace(core.tick(decision.measurement, tuple(ages), ages), seq=decision.tick)

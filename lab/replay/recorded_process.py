@@ -1,4 +1,4 @@
-"""The processes of a run in wall-clock time as their journals have them: what each was given, and what it sent."""
+"""The processes of a run in real time as their journals have them: each call of a node, and the messages it sent."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from gridpeers.scenarios.record.message_index import MessageIndex
 from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.wire.codec import sound
+from gridpeers.wire.codec import encode, sound
 from gridpeers.wire.journal import (
     EACH_TICK,
     Entry,
@@ -22,7 +22,7 @@ from gridpeers.wire.journal import (
     WakeUp,
     kind_of,
 )
-from gridpeers.wire.messages import PLANT, AnyMessage, Journal
+from gridpeers.wire.messages import PLANT, Journal, Measurement, State
 
 CALLS = ("start", "session", "leave")
 """Kinds of process events that are calls of the node; the others say what it did."""
@@ -39,6 +39,19 @@ class ReplayError(ValueError):
         self.problems = problems
 
 
+class Message(NamedTuple):
+    """A message on its way; the key is without `gridpeers/<run>/`."""
+
+    key: str
+    payload: bytes
+
+
+def tick_message(message: Message | SentMessage | ReceivedMessage) -> State | Measurement | None:
+    """Return a state, or a measurement; None of anything else."""
+    decoded = sound(message.payload) if kind_of(message.key) in EACH_TICK else None
+    return decoded if isinstance(decoded, State | Measurement) else None
+
+
 class RecordedStep(NamedTuple):
     """One call of a node."""
 
@@ -51,6 +64,16 @@ class RecordedStep(NamedTuple):
     """Run time at which its journal was sent (s); 0 before the run begins."""
     last: bool = False
     """The journal ends with it, so that some of what it sent may be missing."""
+
+    @property
+    def is_arrival(self) -> bool:
+        return isinstance(self.entry, MessageReference | ReceivedMessage)
+
+    @property
+    def instance(self) -> str:
+        """Instance of the process, if this is its start."""
+        entry = self.entry
+        return entry.text.rpartition(" ")[2] if isinstance(entry, ProcessEvent) and entry.kind == "start" else ""
 
 
 class RecordedProcess:
@@ -97,9 +120,15 @@ class RecordedProcess:
                         return
                     yield journal, entry
 
-    def message(self, entry: MessageReference, t: float) -> AnyMessage | None:
-        """Return a message that it heard by its number, about run time t (s); None if the record does not have it."""
-        return self._parts.index.named_by(entry, t)
+    def message(self, step: RecordedStep) -> Message | None:
+        """Return the message that it heard in a step; None if it heard none, or the record does not have it."""
+        entry = step.entry
+        if isinstance(entry, ReceivedMessage):
+            return Message(entry.key, entry.payload)
+        if isinstance(entry, MessageReference):
+            found = self._parts.index.named_by(entry, step.t)
+            return None if found is None else Message(entry.key, encode(found))
+        return None
 
 
 class JournalParts:
@@ -133,16 +162,16 @@ class JournalParts:
 
 
 def processes_of(record: RunRecord) -> tuple[RecordedProcess, ...]:
-    """Return the processes of a run in wall-clock time, the plant first."""
+    """Return the processes of a run in real time, the plant first."""
     require_arrivals(record)
     found = sorted(JournalParts(record.index).processes(), key=lambda each: each.name != PLANT)
     if not found:
-        raise ReplayError(f"{record.path}: it ends before any process has noted what it was given")
+        raise ReplayError(f"{record.path}: it ends before any process has noted its calls")
     return tuple(found)
 
 
 def require_arrivals(record: RunRecord) -> None:
-    """Raise ReplayError unless everything that the cores were given was recorded."""
+    """Raise ReplayError unless all inputs of the cores were recorded."""
     level = record.info.level
     if level != "all":
         has = "the physics alone" if level == "physics" else "decisions, but not what else arrived and when"

@@ -1,10 +1,10 @@
-"""Replay of a record: every core gets again what it got, and decides the same, or the first difference is named.
+"""Replay of a record: every core gets its inputs again, and decides the same, or the first difference is named.
 
-In wall-clock time each process is made again and called as its journal says: start, tokens, messages at the times of
+In real time each process is made again and called as its journal says: start, tokens, messages at the times of
 their arrival, and its clock. Nothing of the replay goes to another process, so a difference stays where it arises.
 
-In simulated time nothing but the scenario decides what arrives. So the run is made again in one process, and the
-decisions of each agent from what the record says it heard.
+In simulated time the scenario alone decides what arrives. So the run is made again in one process, and the decisions
+of each agent from the states that it had heard by its record.
 """
 
 from __future__ import annotations
@@ -22,23 +22,21 @@ from gridpeers.agents.carriers.law_registry import close_laws
 from gridpeers.agents.laws.law import Law
 from gridpeers.lab.replay.recomputation import recomputed
 from gridpeers.lab.replay.recorded_process import (
+    Message,
     RecordedProcess,
     RecordedStep,
     ReplayError,
     processes_of,
     require_arrivals,
+    tick_message,
 )
 from gridpeers.lab.replay.replayed_process import (
     MakePlant,
-    Message,
     ReplayedProcess,
     agent_again,
-    instance_of,
-    message_of,
     plant_again,
     recorded_links,
     start_plant_of,
-    tick_message,
 )
 from gridpeers.plant.build import start_plant
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
@@ -46,7 +44,6 @@ from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
 from gridpeers.scenarios.results.record import QUANTITIES
 from gridpeers.scenarios.short_texts import in_order
 from gridpeers.wire.codec import decode
-from gridpeers.wire.journal import MessageReference, ReceivedMessage
 from gridpeers.wire.messages import PLANT, AnyMessage, Measurement, Telemetry
 
 if TYPE_CHECKING:
@@ -89,32 +86,26 @@ class Replay:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Sentences on what was not compared; those on damage of the record itself are `RunRecord.damage`."""
+        """Sentences on parts that were not compared; those on damage of the record itself are `RunRecord.damage`."""
         return tuple(dict.fromkeys(part.note for part in self.parts if part.note))
 
 
-def replay(run: Result | RunRecord | str | Path, make_plant: MakePlant = start_plant) -> Replay:
-    """Give the cores of a recorded run again what they got, and compare what they decide.
+def replay(run: Result | RunRecord | str | Path, make_plant: MakePlant | None = start_plant) -> Replay:
+    """Give the cores of a recorded run their inputs again, and compare their decisions.
 
     Parameters
     ----------
     run : Result, RunRecord, str or Path
         The run, of any driver; its record may be cut off.
     make_plant : Callable[[PlantConfig], LivePlant], optional
-        Starts the plant.
-
-    Returns
-    -------
-    Replay
-        `difference` is the first one, with agent, time, quantity, both values and unit; None if everything is the same
-        within 1e-9.
+        Starts the plant; None leaves it out.
 
     Raises
     ------
     RecordFileError
         If there is no record, or it cannot be read.
     ReplayError
-        If it does not have what the cores got, or its law, graph or feeder is not here.
+        If it lacks the inputs of the cores, or its law, graph or feeder is not here.
     """
     record = record_of(run)
     require_arrivals(record)
@@ -196,24 +187,29 @@ def row_difference(
     return None
 
 
-# -------------------------------------------------------------------- wall-clock time
+# -------------------------------------------------------------------- real time
 
 
 def _in_real_time(record: RunRecord, make_plant: MakePlant | None) -> Iterator[ReplayedPart]:
     """Replay all processes side by side, so that the file is read once."""
-    replays: list[_PlantReplay | _AgentReplay] = []
-    for process in processes_of(record):
-        if process.name != PLANT:
-            replays.append(_AgentReplay(record, process))
-        elif make_plant is not None:
-            replays.append(_PlantReplay(record, process, make_plant))
+    plant = None if make_plant is None else start_plant_of(record.info, make_plant)
+    laws: list[Law] = []
     try:
+        replays: list[_AgentReplay | _PlantReplay] = []
+        for process in processes_of(record):
+            if process.name != PLANT:
+                replays.append(_AgentReplay(record, process, laws))
+            elif plant is not None:
+                again = plant_again(process, record.info, plant, recorded_links(record.info, PLANT))
+                replays.append(_PlantReplay(record, process, again))
         for _, number, step in merge(*(_by_time(number, each) for number, each in enumerate(replays))):
-            replays[number].take(step)
+            if not replays[number].is_over:
+                replays[number].take(step)
         yield from (each.result() for each in replays)
     finally:
-        for each in replays:
-            each.close()
+        close_laws(laws)
+        if plant is not None:
+            plant.close()
 
 
 def _by_time(number: int, replay: _PlantReplay | _AgentReplay) -> Iterator[tuple[float, int, RecordedStep]]:
@@ -224,10 +220,11 @@ def _by_time(number: int, replay: _PlantReplay | _AgentReplay) -> Iterator[tuple
 
 
 class _AgentReplay:
-    def __init__(self, record: RunRecord, process: RecordedProcess) -> None:
-        self.process, self._info = process, record.info
+    """An agent, given the calls of its journal; its states are compared."""
+
+    def __init__(self, record: RunRecord, process: RecordedProcess, laws: list[Law]) -> None:
+        self.process, self._info, self._laws = process, record.info, laws
         self._again: ReplayedProcess | None = None
-        self._laws: list[Law] = []
         self._count, self._t, self._note = 0, 0.0, ""
         self._difference: Difference | None = None
 
@@ -236,18 +233,16 @@ class _AgentReplay:
         return bool(self._note) or self._difference is not None
 
     def take(self, step: RecordedStep) -> None:
-        """Call the node as in a step, and compare what it sends."""
-        if self.is_over:
-            return
         name = self.process.name
         if self._again is None:
-            config, instance = self._info.agent(name), instance_of(step)
-            if config is None or not instance:
+            config = self._info.agent(name)
+            if config is None or not step.instance:
                 self._note = f"the record lacks the start of {name}, or its configuration: it was not replayed"
                 return
-            self._again = agent_again(self.process, config, instance, self._laws, recorded_links(self._info, name))
-        message = message_of(self.process, step)
-        if message is None and isinstance(step.entry, MessageReference | ReceivedMessage):
+            links = recorded_links(self._info, name)
+            self._again = agent_again(self.process, config, step.instance, self._laws, links)
+        message = self.process.message(step)
+        if message is None and step.is_arrival:
             self._note = f"the record lacks a message that {name} heard at t = {step.t:.2f} s; it was replayed to there"
             return
         ours = [decoded for sent in self._again.take(step, message) if (decoded := tick_message(sent)) is not None]
@@ -260,49 +255,33 @@ class _AgentReplay:
             self._count, self._t = self._count + 1, b.t
 
     def result(self) -> ReplayedPart:
+        note = self._note or self.process.ends
         return ReplayedPart(
-            name=self.process.name,
-            count=self._count,
-            t_end=self._t,
-            difference=self._difference,
-            note=self._note or self.process.ends,
+            name=self.process.name, count=self._count, t_end=self._t, difference=self._difference, note=note
         )
-
-    def close(self) -> None:
-        close_laws(self._laws)
 
 
 class _PlantReplay:
-    """The replay of the plant: its physics, given the states that it heard when it heard them."""
+    """The plant, given the calls of its journal; its rows are compared."""
 
-    def __init__(self, record: RunRecord, process: RecordedProcess, make_plant: MakePlant) -> None:
-        self.process = process
-        self._plant = start_plant_of(record.info, make_plant)
-        self._rows = ComparedRows(record)
-        self._again = plant_again(process, record.info, self._plant, recorded_links(record.info, PLANT))
+    def __init__(self, record: RunRecord, process: RecordedProcess, again: ReplayedProcess) -> None:
+        self.process, self._again, self._rows = process, again, ComparedRows(record)
 
     @property
     def is_over(self) -> bool:
         return self._rows.difference is not None
 
     def take(self, step: RecordedStep) -> None:
-        """Call the node as in a step, and compare the rows that it reports."""
-        self._compare(self._again.take(step, message_of(self.process, step)))
+        self._compare(self._again.take(step, self.process.message(step)))
 
     def result(self) -> ReplayedPart:
         self._compare(self._again.end())
-        rows = self._rows
-        return ReplayedPart(
-            name=PLANT, count=rows.count, t_end=rows.t, difference=rows.difference, note=self.process.ends
-        )
+        return self._rows.part(self.process.ends)
 
     def _compare(self, sent: list[Message]) -> None:
         for message in sent:
             if message.key == "telemetry":
                 self._rows.take(decode(message.payload))
-
-    def close(self) -> None:
-        self._plant.close()
 
 
 # -------------------------------------------------------------------- both
@@ -335,6 +314,9 @@ class ComparedRows:
                 self.difference = row_difference(inverters, recorded, row)
                 self.count, self.t = self.count + 1, row[0]
 
+    def part(self, note: str) -> ReplayedPart:
+        return ReplayedPart(name=PLANT, count=self.count, t_end=self.t, difference=self.difference, note=note)
+
 
 # -------------------------------------------------------------------- simulated time
 
@@ -366,11 +348,11 @@ def _physics(record: RunRecord, make_plant: MakePlant) -> ReplayedPart:
         note = "something happened in this run that its scenario does not tell, so that it cannot be made again"
     elif outcome.broke and record.outcome == "":
         note = f"the run breaks when it is made again: {outcome.broke}"
-    return ReplayedPart(name=PLANT, count=rows.count, t_end=rows.t, difference=rows.difference, note=note)
+    return rows.part(note)
 
 
 def _decisions(record: RunRecord, agent: str) -> ReplayedPart:
-    """Make the decisions of an agent again, each from what the record says that it had heard."""
+    """Make the decisions of an agent again, each from the states that it had heard by the record."""
     count, t = 0, 0.0
     hole = min((since for since, _ in record.holes(agent)), default=inf)
     try:

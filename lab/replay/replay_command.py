@@ -158,7 +158,7 @@ def _counterfactual(record: RunRecord, changes: Changes, out: Path | None) -> bo
     folder = new_folder(out, f"{record.info.scenario}-replay", datetime.now().astimezone())
     with ended_by_signals(f"what came until then is in {shown(folder)}/"), broken_if_ended(folder):
         with progress(terminal(), (record.info.case,)) as tell:
-            done = counterfactual_in(record, rule, folder, tell=tell)
+            done = counterfactual_in(record, rule, folder, tell)
         typer.echo(str(done))
         write_whole(folder / "comparison.txt", f"{changes}\n\n{done}\n")
         (figure,) = save(done.plot(), folder / "plots", "counterfactual")

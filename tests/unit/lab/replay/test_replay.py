@@ -20,7 +20,7 @@ from gridpeers.lab.replay.replay import (
     replay,
     row_difference,
 )
-from gridpeers.lab.replay.replayed_process import agent_again, message_of
+from gridpeers.lab.replay.replayed_process import agent_again
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.netem.schema.partition import Partition
@@ -189,7 +189,7 @@ def test_what_was_rejected_unseen_is_rejected_again_by_its_number(
     again.take(start)
     step = RecordedStep(1001.0, entry, (), 0.1)
 
-    assert again.take(step, message_of(process, step)) == []
+    assert again.take(step, process.message(step)) == []
     assert again.node.rejects.counts == counts
 
 

@@ -50,7 +50,11 @@ def with_content(case: CheckedCase, content: RecordContent, *, late: float = 0.0
             entries.append((state.t, 1, partial(sums.take_state, agent, state)))
     for agent, decisions in content.decisions.items():
         for epoch, decision in decisions:
-            t = decision.tick * content.info.T_c if content.info.simulated else of.get((agent, epoch, decision.tick), 0.0)
+            t = (
+                decision.tick * content.info.T_c
+                if content.info.simulated
+                else of.get((agent, epoch, decision.tick), 0.0)
+            )
             entries.append((t + late, 0, partial(sums.take_decision, agent, epoch, decision)))
     for link, heard in content.heard.items():
         for (epoch, number), why in heard.items():
