@@ -59,11 +59,6 @@ class Failure:
     """The run of the simplest schedule found for it."""
     file: Path
 
-    @property
-    def sentence(self) -> str:
-        """Sentence of the check on the simplest run; on the run as found if the simplest one passes the next time."""
-        return self.simplest.violated.get(self.violated, self.row.violated[self.violated])
-
 
 @dataclass(frozen=True, kw_only=True)
 class Summary:
@@ -93,8 +88,9 @@ class Summary:
         collapses = sum(bool(row.collapse) for row in rows)
         beyond = f"; {collapses} with a collapse that no control prevents, and that lasts" if collapses else ""
         yield f"{self.violated} of {len(rows)} runs violated anything; {sum(row.trips for row in rows)} trips{beyond}"
-        for failure in self.failures:
-            yield f"{failure.violated}, run {failure.row.number}: {failure.sentence}"
+        for failure in self.failures:  # of the run as found if the simplest one passes the next time
+            name, found = failure.violated, failure.row
+            yield f"{name}, run {found.number}: {failure.simplest.violated.get(name, found.violated[name])}"
             yield from (f"    {line}" for line in base.lines(failure.simplest.schedule))
             yield f"    {again(failure.file)}"
 
@@ -133,17 +129,14 @@ def _do_runs(campaign: Campaign, folder: ChaosFolder, tell: Tell, within: Path |
     text, seed, driver = campaign.base.text, campaign.seed, campaign.driver
     calls = ((text, seed, number, it, driver, within) for number, it in _numbered(campaign, dict(folder.rows)))
     jobs = 1 if driver == "processes" else campaign.jobs
-    _tell_runs(campaign, folder, tell)
+    head, of = campaign.base.scenario.name, campaign.runs
+    tell(f"{head}, {len(folder.rows)} of {of} runs", len(folder.rows), of)
     with closing(on_workers(calls, jobs, run_number, campaign.dask)) as results:
         for row in results:
             first = folder.rows.get(row.number)
             folder.add(row if first is None else compared(first, row, REPEATS))
-            _tell_runs(campaign, folder, tell)
-
-
-def _tell_runs(campaign: Campaign, folder: ChaosFolder, tell: Tell) -> None:
-    done, bad = len(folder.rows), sum(bool(row.violated) for row in folder.rows.values())
-    tell(f"{campaign.base.scenario.name}, {done} of {campaign.runs} runs, {bad} violated", done, campaign.runs)
+            done, bad = len(folder.rows), sum(bool(row.violated) for row in folder.rows.values())
+            tell(f"{head}, {done} of {of} runs, {bad} violated", done, of)
 
 
 def _numbered(campaign: Campaign, known: Mapping[int, ChaosRow]) -> Iterator[tuple[int, Schedule]]:
@@ -178,21 +171,16 @@ def _shrink_all(
         return
     kinds = counted(len(failures), "kind of failure", "kinds of failure")
     tell(f"shrinking, 0 of {kinds}", 0, len(failures))
-    calls = [
-        (campaign.base.text, campaign.seed, it.row.number, name, _shrinking_driver(campaign, name), within)
-        for name, it in failures.items()
-    ]
-    with closing(on_workers(calls, min(campaign.jobs, len(calls)), _shrink, campaign.dask)) as simpler:
+    calls = []
+    for name, it in failures.items():  # processes only for a failure that one process cannot show
+        driver = campaign.driver if name in (SAME_IN_PROCESSES, REPEATS) else "inprocess"
+        calls.append((campaign.base.text, campaign.seed, it.row.number, name, driver, within))
+    with closing(on_workers(calls, min(campaign.jobs, len(calls)), shrink_number, campaign.dask)) as simpler:
         for done, (violated, simplest) in enumerate(simpler, start=1):
             found = failures[violated]
             file = folder.write_failure(violated, found.row, simplest)
             failures[violated] = replace(found, simplest=simplest, file=file)
             tell(f"shrinking, {done} of {kinds}", done, len(failures))
-
-
-def _shrinking_driver(campaign: Campaign, violated: str) -> Driver:
-    """Return the driver with which a failure is shrunk: processes only for what one process cannot show."""
-    return campaign.driver if violated in (SAME_IN_PROCESSES, REPEATS) else "inprocess"
 
 
 def _concluded(campaign: Campaign, folder: ChaosFolder, failures: dict[str, Failure]) -> Summary:
@@ -212,17 +200,13 @@ def run_number(
     return run_schedule(base_of(text), schedule, seed_of(seed, number), number, driver, within=within)
 
 
-def _shrink(
-    text: str, seed: int, number: int, violated: str, driver: Driver, within: Path | None
-) -> tuple[str, ChaosRow]:
-    return violated, shrink_number(text, seed, number, violated, driver, within)
-
-
 def shrink_number(
     text: str, seed: int, number: int, violated: str, driver: Driver, within: Path | None = None
-) -> ChaosRow:
+) -> tuple[str, ChaosRow]:
+    """Return the check that a run violates, and the run of the simplest schedule found that violates it, too."""
     base = base_of(text)
     rows: dict[bytes, ChaosRow] = {}
+    lacks: list[MachineError] = []
 
     def row_of(schedule: Schedule) -> ChaosRow:
         again = violated == REPEATS
@@ -233,18 +217,14 @@ def shrink_number(
         try:
             return violated in row_of(schedule).violated
         except MachineError as error:
-            raise _SearchEnd(error) from error
+            lacks.append(error)
+            raise KeyboardInterrupt from error  # hypothesis would take an `Exception` for a failure, and shrink it
 
     try:
         simplest = shrunk(base, seed, number, fails)
-    except _SearchEnd as end:
-        raise end.why from None
-    return rows.get(msgspec.json.encode(simplest)) or row_of(simplest)  # that of the run itself is not run to shrink it
-
-
-class _SearchEnd(BaseException):
-    """Ends a search at once: hypothesis would take an `Exception` for a failure, and shrink it."""
-
-    def __init__(self, why: MachineError) -> None:
-        super().__init__(str(why))
-        self.why = why
+    except KeyboardInterrupt:
+        if lacks:
+            raise lacks[0] from None
+        raise
+    # that of the run itself is not run to shrink it
+    return violated, rows.get(msgspec.json.encode(simplest)) or row_of(simplest)

@@ -47,14 +47,8 @@ def chaos_checks(
 ) -> list[str | dict[str, Any]]:
     """Return the checks of a run with disturbances, as entries of its scenario, from its own entries.
 
-    What the scenario itself says of a check stays: its limits, but for those above, and that it is off. The run is to
-    be restored from the last change (s of run time) on, or from later if inverters trip.
-
-    Examples
-    --------
-    >>> of = {check_name(it): it for it in chaos_checks([{"use": "steady", "off": True}, "mine:Calm"], 4.0, 9.0)}
-    >>> of["steady"], of["mine:Calm".partition(":")[2]], of["voltage"]["since_s"]
-    ({'use': 'steady', 'off': True}, 'mine:Calm', 9.0)
+    The scenario's own keys of a check stay: its limits, but for those above, and that it is off. The run is to be
+    restored from the last change (s of run time) on, or from later if inverters trip.
     """
     entries = {check_name(entry): entry if isinstance(entry, str) else dict(entry) for entry in own}
     limits_of: dict[str, Mapping[str, Any]] = {
@@ -63,9 +57,8 @@ def chaos_checks(
         **_ALWAYS,
     }
     for name in ALWAYS:
-        limits = limits_of.get(name, {})
         given = table_of(entries.get(name, name))
-        if limits and not given.get("off"):
-            entries[name] = {**given, **limits}
+        if name in limits_of and not given.get("off"):
+            entries[name] = {**given, **limits_of[name]}
     entries.setdefault(RETURNS, RETURNS)
     return list(entries.values())

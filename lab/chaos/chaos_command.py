@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -112,28 +113,28 @@ def chaos(
         first_seed, first_runs = (1, RUNS) if resume is None else asked_of(resume)
         seed, runs = first_seed if seed is None else seed, runs or first_runs
         campaign = Campaign(base=base, seed=seed, runs=runs, driver=driver, jobs=jobs or cores(), dask=dask)
-        rows: dict[int, ChaosRow] = {}
-        if resume is None:
-            require_folder(out, name)
-        else:
-            _lock(context, resume, "--resume")
-            rows = kept_rows(resume, base, seed, driver, runs)
-        with _kept_if_ended(campaign, rows, resume, scenario):
+        kept = _Kept(scenario, campaign, resume)
+        with kept.told_if_ended():
+            if resume is None:
+                require_folder(out, name)
+            else:
+                _lock(context, resume, "--resume")
+                kept.rows = kept_rows(resume, base, seed, driver, runs)
             _try_undisturbed(console, campaign)
-        if resume is None:  # the folder is made only once the scenario has passed without disturbances
-            path = new_folder(out, name, datetime.now().astimezone())
-            _lock(context, path, "--out")
-        else:
-            path = resume
+            if resume is None:  # the folder is made only once the scenario has passed without disturbances
+                kept.path = new_folder(out, name, datetime.now().astimezone())
+                _lock(context, kept.path, "--out")
+            path = kept.path
+            assert path is not None
+            set_status(path, "running")
+            words = ["chaos", scenario, "--case", base.case, "--runs", str(runs), "--seed", str(seed)]
+            with broken_if_ended(path):
+                folder = ChaosFolder(path, base, seed, command_line(*words, "--driver", driver), kept.rows, runs)
+            kept.rows = folder.rows
+            with _stages(console) as tell:
+                summary = run_campaign(campaign, folder, tell)
     except FolderError as error:
         fail([str(error)], BAD_INPUT)
-    words = ["chaos", scenario, "--case", base.case, "--runs", str(runs), "--seed", str(seed), "--driver", driver]
-    with _kept_if_ended(campaign, rows, path, scenario):
-        set_status(path, "running")
-        with broken_if_ended(path):
-            folder = ChaosFolder(path, base, seed, command_line(*words), rows, runs)
-    with _kept_if_ended(campaign, folder.rows, path, scenario), _stages(console) as tell:
-        summary = run_campaign(campaign, folder, tell)
     for line in summary.lines():
         typer.echo(line)
     typer.echo(f"\nResults: {shown(path)}/")
@@ -181,33 +182,41 @@ def _try_undisturbed(console: Console, campaign: Campaign) -> None:
     typer.echo(f"{name}: it violates nothing; next {counted(campaign.runs, 'run')} with disturbances, {how} ...")
 
 
-@contextmanager
-def _kept_if_ended(campaign: Campaign, rows: Collection[int], folder: Path | None, scenario: str) -> Iterator[None]:
-    """End the command with what went wrong, how many runs are kept and how to go on, if the work is ended early."""
-    from gridpeers.cli.usage import exit_code, interruptible
-    from gridpeers.lab.chaos.machine_error import MachineError, machine_error
-    from gridpeers.scenarios.results.run_files import refusal, shown
-    from gridpeers.scenarios.sweep.workers import WorkersError
-    from gridpeers.wire.driver.command_line import command_line
+@dataclass
+class _Kept:
+    """The runs that a campaign has so far, and its folder once there is one."""
 
-    try:
-        with interruptible():
-            yield
-    except (KeyboardInterrupt, OSError, MemoryError, MachineError, WorkersError) as error:
-        kept = len(rows)
-        where = "and no folder was made"
-        if folder and not folder.is_dir():
-            kept, where = 0, f"as {shown(folder)}/ is gone"
-        elif folder:
-            words = ["chaos", scenario, "--case", campaign.base.case, "--driver", campaign.driver]
-            where = f"in {shown(folder)}/; go on with: {command_line(*words, '--resume', shown(folder))}"
-        left = f"{kept} of {campaign.runs} runs are kept {where}"
-        if isinstance(error, KeyboardInterrupt):
-            fail([f"interrupted; {left}"], exit_code(error))
-        if isinstance(error, OSError) and folder:
-            fail([refusal(folder, error), left], BROKEN)
-        why = str(machine_error(error) or error)
-        fail([why, left], BROKEN)
+    scenario: str
+    campaign: Campaign
+    path: Path | None
+    rows: Mapping[int, ChaosRow] = field(default_factory=dict)
+
+    @contextmanager
+    def told_if_ended(self) -> Iterator[None]:
+        """End the command with the error, the number of runs that are kept, and how to go on."""
+        from gridpeers.cli.usage import exit_code, interruptible
+        from gridpeers.lab.chaos.machine_error import MachineError, machine_error
+        from gridpeers.scenarios.results.run_files import refusal, shown
+        from gridpeers.scenarios.sweep.workers import WorkersError
+        from gridpeers.wire.driver.command_line import command_line
+
+        try:
+            with interruptible():
+                yield
+        except (KeyboardInterrupt, OSError, MemoryError, MachineError, WorkersError) as error:
+            kept, path, campaign = len(self.rows), self.path, self.campaign
+            where = "and no folder was made"
+            if path and not path.is_dir():
+                kept, where = 0, f"as {shown(path)}/ is gone"
+            elif path:
+                words = ["chaos", self.scenario, "--case", campaign.base.case, "--driver", campaign.driver]
+                where = f"in {shown(path)}/; go on with: {command_line(*words, '--resume', shown(path))}"
+            left = f"{kept} of {campaign.runs} runs are kept {where}"
+            if isinstance(error, KeyboardInterrupt):
+                fail([f"interrupted; {left}"], exit_code(error))
+            if isinstance(error, OSError) and path:
+                fail([refusal(path, error), left], BROKEN)
+            fail([str(machine_error(error) or error), left], BROKEN)
 
 
 @contextmanager

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from io import StringIO
 from pathlib import Path
 from types import MappingProxyType
@@ -27,8 +27,6 @@ RUNS = 100
 
 SEEDS = 1_000_000
 """Seeds of the messages' fates for each seed of a campaign: run n has one of its own."""
-
-TABLE, FAILURES = "chaos.csv", "failures"
 
 COLUMNS = (
     *("run", "seed", "status", "violated", "why", "disturbances", "schedule"),
@@ -69,16 +67,26 @@ class ChaosFolder:
         with (self.path / JOURNAL).open("ab") as file:
             file.write(journal_line(row))
         self.rows[row.number] = row  # once it is kept: an error tells how many are
-        with (self.path / TABLE).open("ab") as file:
-            file.write(self._cells(row).encode())
 
     def write_table(self) -> None:
-        rows = (self.rows[number] for number in sorted(self.rows))
-        write_whole(self.path / TABLE, [_line(COLUMNS), *map(self._cells, rows)])
+        """Write chaos.csv: a line for each run, by their numbers."""
+        text = StringIO()
+        table = csv.writer(text, lineterminator="\n")
+        table.writerow(COLUMNS)
+        for _, row in sorted(self.rows.items()):
+            why = [*(row.violated[it] for it in sorted(row.violated)), row.collapse, row.unsettled]
+            table.writerow(
+                (
+                    *(row.number, seed_of(self._seed, row.number), row.status, " ".join(sorted(row.violated))),
+                    *("; ".join(filter(None, why)), len(row.schedule), json.dumps(msgspec.to_builtins(row.schedule))),
+                    *(" ".join(row.passed), row.trips, row.since_s, row.history_sha256, row.links_sha256, row.took_s),
+                )
+            )
+        write_whole(self.path / "chaos.csv", text.getvalue())
 
     def write_failure(self, violated: str, row: ChaosRow, simplest: ChaosRow) -> Path:
         """Write the scenario of a failure of a run, as it is or as it was shrunk; return its file."""
-        file = self.path / FAILURES / f"{violated}.toml"
+        file = self.path / "failures" / f"{violated}.toml"
         file.parent.mkdir(exist_ok=True)
         seed, schedule = seed_of(self._seed, row.number), simplest.schedule
         fewer = len(schedule) < len(row.schedule)
@@ -98,31 +106,17 @@ class ChaosFolder:
         write_whole(file, to_toml(scenario, {}, [remark.replace("\n", " ") for remark in remarks], terse=True))
         return file
 
-    def _cells(self, row: ChaosRow) -> str:
-        cells = (
-            *(row.number, seed_of(self._seed, row.number), row.status, " ".join(sorted(row.violated))),
-            "; ".join(filter(None, [*(row.violated[it] for it in sorted(row.violated)), row.collapse, row.unsettled])),
-            *(len(row.schedule), json.dumps(msgspec.to_builtins(row.schedule))),
-            *(" ".join(row.passed), row.trips, row.since_s, row.history_sha256, row.links_sha256, row.took_s),
-        )
-        return _line(cells)
-
-
-def _line(cells: Iterable[object]) -> str:
-    text = StringIO()
-    csv.writer(text, lineterminator="\n").writerow(cells)
-    return text.getvalue()
-
 
 def asked_of(folder: Path) -> tuple[int, int]:
     """Return the seed and the number of runs with which a campaign was begun; FolderError if it is no such folder."""
     try:
         found = json.loads((folder / ASKED).read_text(encoding="utf-8"))
         return int(found["seed"]), int(found["runs"])
-    except OSError as error:
-        raise _no_campaign(folder, error.strerror) from None
-    except (ValueError, LookupError, TypeError):
-        raise _no_campaign(folder, f"its {ASKED} is damaged") from None
+    except (OSError, ValueError, LookupError, TypeError) as error:
+        why = error.strerror if isinstance(error, OSError) else f"its {ASKED} is damaged"
+        raise FolderError(
+            f"--resume {folder}: no folder of a campaign: {why}; name one with {SCENARIO} and {ASKED}"
+        ) from None
 
 
 def kept_rows(folder: Path, base: ChaosBase, seed: int, driver: Driver, runs: int) -> dict[int, ChaosRow]:
@@ -131,21 +125,16 @@ def kept_rows(folder: Path, base: ChaosBase, seed: int, driver: Driver, runs: in
     Runs in one process are none of a campaign with processes. FolderError if the folder is of a campaign with another
     scenario, another seed or more runs, or is damaged.
     """
-    where = f"--resume {folder}"
-    theirs, _ = asked_of(folder)
+    where, (theirs, _) = f"--resume {folder}", asked_of(folder)
     try:
         if (folder / SCENARIO).read_text(encoding="utf-8") != base.text:
             raise FolderError(f"{where}: its {SCENARIO} is not the scenario and case to disturb; take a new folder")
         rows = rows_in(folder, ChaosRow, lambda row: "")
     except OSError as error:
-        raise _no_campaign(folder, error.strerror) from None
+        raise FolderError(f"{where}: no folder of a campaign: {error.strerror}") from None
     if theirs != seed:
         raise FolderError(f"{where}: it was begun with --seed {theirs}, not {seed}; give that one")
     if rows and (last := max(rows)) >= runs:
         raise FolderError(f"{where}: it has run {last} already; give --runs {last + 1} or more")
     here = {SAME_IN_PROCESSES} if driver == "processes" else set()
     return {number: row for number, row in rows.items() if here <= {*row.passed, *row.violated}}
-
-
-def _no_campaign(folder: Path, why: str | None) -> FolderError:
-    return FolderError(f"--resume {folder}: no folder of a campaign: {why}; name one with {SCENARIO} and {ASKED}")

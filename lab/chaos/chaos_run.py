@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from time import monotonic
 from typing import NamedTuple
@@ -11,7 +11,7 @@ from typing import NamedTuple
 import msgspec
 
 from gridpeers.lab.chaos.chaos_checks import RESTORED, WITHIN_S
-from gridpeers.lab.chaos.collapse import Collapse, collapses_at_changes, excused_inverters, unexcused
+from gridpeers.lab.chaos.collapse import Collapse, collapses_at_changes, unexcused
 from gridpeers.lab.chaos.disturbance import Schedule
 from gridpeers.lab.chaos.disturbed_scenario import ChaosBase
 from gridpeers.lab.chaos.machine_error import MachineError, machine_error
@@ -20,7 +20,6 @@ from gridpeers.scenarios.checks.check_verdict import CheckVerdict
 from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.checks.judging import judge_case
 from gridpeers.scenarios.results.event_windows import CaseRecord
-from gridpeers.scenarios.results.record import Recorded
 from gridpeers.scenarios.results.recorded_events import tripped_by, tripped_inverters
 from gridpeers.scenarios.run_case import run_case
 from gridpeers.scenarios.run_request import BrokenRunError, Driver, LawStopError, Request
@@ -77,11 +76,15 @@ def run_schedule(
     folders are made `within` that of the campaign.
     """
     began = monotonic()
-    row = _once_restored(base, schedule, seed, number, driver, within)
+
+    def settled(base: ChaosBase, schedule: Schedule, driver: Driver) -> JudgedRun:
+        return _settled(base, schedule, seed, number, driver, within)
+
+    row = _excused(base, schedule, driver, settled)
     if driver == "processes":
-        row = compared(row, _once_restored(base, schedule, seed, number, "inprocess", within), SAME_IN_PROCESSES)
+        row = compared(row, _excused(base, schedule, "inprocess", settled), SAME_IN_PROCESSES)
     if again:
-        row = compared(row, _once_restored(base, schedule, seed, number, driver, within), REPEATS)
+        row = compared(row, _excused(base, schedule, driver, settled), REPEATS)
     violated = {name: utf8(text) for name, text in row.violated.items()}  # an error may name a file by any bytes
     return msgspec.structs.replace(row, violated=violated, took_s=round(monotonic() - began, 3))
 
@@ -118,32 +121,31 @@ def restored_from(events: Iterable[PlantEvent], enter_service_s: float) -> float
     return round(last + (WITHIN_S + enter_service_s if tripped_inverters(events) else 0.0), 9)
 
 
-def _once_restored(
-    base: ChaosBase, schedule: Schedule, seed: int, number: int, driver: Driver, within: Path | None
+def _excused(
+    base: ChaosBase, schedule: Schedule, driver: Driver, settled: Callable[[ChaosBase, Schedule, Driver], JudgedRun]
 ) -> ChaosRow:
-    """Run a scenario with a schedule, and judge it without what a collapse before any control could act excuses."""
-    judged = _settled(base, schedule, seed, number, driver, within)
+    """Run a scenario with a schedule, and judge it without violations that a collapse before any control excuses."""
+    judged = settled(base, schedule, driver)
     row = judged.row
     if not judged.collapses or row.violated.keys().isdisjoint(RESTORED):
         return row
     changes, faultless = tuple(it for it in schedule if it.table == "event"), base.without_faults()
     plain = judged
     if len(changes) < len(schedule) or faultless is not base:  # a fault of links or agents before may have led to it
-        plain = _settled(faultless, changes, seed, number, "inprocess", within)
+        plain = settled(faultless, changes, "inprocess")
+    without = {collapse.label: collapse.inverters for collapse in plain.collapses}
     # Who is in service again, or would be without faults, is to be restored like all others.
     lost = {
-        label: names & judged.off & plain.off
-        for label, names in excused_inverters(judged.collapses, plain.collapses).items()
+        it.label: it.inverters & without.get(it.label, frozenset()) & judged.off & plain.off for it in judged.collapses
     }
-    excused = frozenset().union(*lost.values())
-    others = unexcused(judged.verdicts, excused)
+    others = unexcused(judged.verdicts, frozenset().union(*lost.values()))
     violated = {name: others.get(name, text) for name, text in row.violated.items()}
     if violated == row.violated:
         return row
     return msgspec.structs.replace(
         row,
         violated={name: text for name, text in violated.items() if text},
-        collapse="; ".join(collapse.text for collapse in judged.collapses if lost.get(collapse.label)),
+        collapse="; ".join(collapse.text for collapse in judged.collapses if lost[collapse.label]),
     )
 
 
@@ -200,33 +202,25 @@ def _judged(
         except Exception as error:
             if lack := machine_error(error):
                 raise lack from error
+            violated = {ERROR: f"{type(error).__name__}: {error}"}
             if isinstance(error, BrokenRunError):
-                violated = LAW_FAILED if isinstance(error, LawStopError) else ENDS
-                return JudgedRun(msgspec.structs.replace(row, violated={violated: str(error)}))
-            return JudgedRun(msgspec.structs.replace(row, violated={ERROR: f"{type(error).__name__}: {error}"}))
-        restored_s = restored_from(recorded.events, scenario.protection.enter_service)
-        collapses = collapses_at_changes(scenario, base.feeder, recorded.events)
-        history = record.history
-        present = zip(history.inverters, history.present[-1].tolist(), strict=True)
-        off = frozenset(name for name, on in present if not on)
-        return JudgedRun(_with_verdicts(row, recorded, verdicts), restored_s, collapses, off, verdicts)
-
-
-def _with_verdicts(row: ChaosRow, recorded: Recorded, verdicts: tuple[CheckVerdict, ...]) -> ChaosRow:
+                violated = {LAW_FAILED if isinstance(error, LawStopError) else ENDS: str(error)}
+            return JudgedRun(msgspec.structs.replace(row, violated=violated))
     links = [*recorded.links.warnings, *sorted(recorded.links.failures)]
     unlike = "" if recorded.reproducible else "something happened that the scenario does not say"
     asked = {ENDS: "", ERROR: unlike, LINKS: "; ".join(links[:2])}
-    violated = {name: text for name, text in asked.items() if text}
-    violated |= {it.check: it.sentence for it in verdicts if it.status == "failed"}
-    passed = (
-        *(name for name, text in asked.items() if not text),
-        *(it.check for it in verdicts if it.status == "passed"),
-    )
-    return msgspec.structs.replace(
+    failed = {it.check: it.sentence for it in verdicts if it.status == "failed"}
+    passed = [name for name, text in asked.items() if not text]
+    row = msgspec.structs.replace(
         row,
-        passed=passed,
-        violated=violated,
+        passed=(*passed, *(it.check for it in verdicts if it.status == "passed")),
+        violated={name: text for name, text in asked.items() if text} | failed,
         history_sha256=recorded.sha256,
         links_sha256=recorded.links.sha256,
         trips=sum(bool(tripped_by(event)) for event in recorded.events),
     )
+    restored_s = restored_from(recorded.events, scenario.protection.enter_service)
+    history = record.history
+    present = zip(history.inverters, history.present[-1].tolist(), strict=True)
+    off = frozenset(name for name, on in present if not on)
+    return JudgedRun(row, restored_s, collapses_at_changes(scenario, base.feeder, recorded.events), off, verdicts)

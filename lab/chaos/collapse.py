@@ -59,13 +59,6 @@ def collapses_at_changes(scenario: ScenarioModel, feeder: Feeder, events: Iterab
     return tuple(found.values())
 
 
-def excused_inverters(collapses: Iterable[Collapse], plain: Iterable[Collapse]) -> dict[str, frozenset[str]]:
-    """Return the inverters of each collapse, by its label, that collapse at the same change without any fault, too."""
-    without = {collapse.label: collapse.inverters for collapse in plain}
-    both = {each.label: each.inverters & without.get(each.label, frozenset()) for each in collapses}
-    return {label: inverters for label, inverters in both.items() if inverters}
-
-
 def unexcused(verdicts: Iterable[CheckVerdict], excused: frozenset[str]) -> dict[str, str]:
     """Return the failed checks of what control restores, with the sentence of what inverters violate that count.
 

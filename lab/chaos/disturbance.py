@@ -9,32 +9,15 @@ from typing import Any, Literal
 
 import msgspec
 
-from gridpeers.wire.wording import counted
-
-Table = Literal["event", "link", "partition", "node"]
-
-KINDS: Mapping[str, tuple[str, str]] = {
-    "cut": ("cut", "cuts"),
-    "delay": ("delay", "delays"),
-    "loss": ("loss", "losses"),
-    "duplicate": ("duplication", "duplications"),
-    "corrupt": ("corruption", "corruptions"),
-    "partition": ("partition", "partitions"),
-    "pause": ("pause", "pauses"),
-    "slow_s": ("slow agent", "slow agents"),
-    "kill": ("kill", "kills"),
-    "lies": ("lie", "lies"),
-    "leave": ("leave", "leaves"),
-    "join": ("join", "joins"),
-    "open": ("switch opened", "switches opened"),
-    "close": ("switch closed", "switches closed"),
-    "load": ("change of loads", "changes of loads"),
-}
-"""Kinds of disturbances by the key that makes them, or by their table: the noun for one, and for several."""
+KINDS = (
+    *("cut", "delay", "loss", "duplicate", "corrupt", "partition", "pause", "slow_s", "kill", "lies"),
+    *("leave", "join", "open", "close", "load"),
+)
+"""Kinds of disturbances: the key that makes them, or their table."""
 
 
 class Disturbance(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """One thing that is done to a run.
+    """One disturbance.
 
     Examples
     --------
@@ -45,7 +28,7 @@ class Disturbance(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
     '2 s: event leave = [inv2]'
     """
 
-    table: Table
+    table: Literal["event", "link", "partition", "node"]
     entry: Mapping[str, Any]
     back: Mapping[str, Any] = {}
     """Of an event: the later event that takes it back; empty if none does."""
@@ -55,29 +38,23 @@ class Disturbance(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
         return float(self.entry["t_s" if self.table == "event" else "from_s"])
 
     @property
-    def settled_s(self) -> float:
-        """Run time (s) at which its last change comes: its end, or its beginning if it stays."""
-        if self.table == "event":
-            return float(self.back.get("t_s", self.begins_s))
-        return float(self.entry.get("to_s", self.begins_s))
-
-    @property
     def ends_s(self) -> float:
         """Run time (s) at which it ends; infinity if it stays."""
-        if self.table == "event":
-            return float(self.back.get("t_s", inf))
-        return float(self.entry.get("to_s", inf))
+        return float(self.back.get("t_s", inf) if self.table == "event" else self.entry.get("to_s", inf))
+
+    @property
+    def settled_s(self) -> float:
+        """Run time (s) of its last change: its end, or its beginning if it stays."""
+        return self.begins_s if self.ends_s == inf else self.ends_s
 
     @property
     def kind(self) -> str:
-        """Key of its kind in `KINDS`: its table, or the first key of its entry that is one."""
         return next(key for key in (self.table, *self.entry) if key in KINDS)
 
     def __str__(self) -> str:
-        times = ("t_s", "from_s", "to_s")
         until = "" if self.ends_s == inf else f" to {self.ends_s:g}"
-        what = ", ".join(f"{key} = {_word(value)}" for key, value in self.entry.items() if key not in times)
-        return f"{self.begins_s:g}{until} s: {self.table} {what}"
+        what = {key: value for key, value in self.entry.items() if key not in ("t_s", "from_s", "to_s")}
+        return f"{self.begins_s:g}{until} s: {self.table} {_pairs(what)}"
 
 
 Schedule = tuple[Disturbance, ...]
@@ -85,14 +62,18 @@ Schedule = tuple[Disturbance, ...]
 
 
 def counted_kinds(schedules: Iterable[Schedule]) -> str:
-    """Return how many disturbances of each kind schedules have: "1 kill, 2 lies"; "none"."""
+    """Return how many disturbances of each kind schedules have: "kill 1, lies 2"; "none"."""
     numbers = Counter(disturbance.kind for schedule in schedules for disturbance in schedule)
-    return ", ".join(counted(numbers[key], *nouns) for key, nouns in KINDS.items() if numbers[key]) or "none"
+    return ", ".join(f"{kind} {numbers[kind]}" for kind in KINDS if numbers[kind]) or "none"
+
+
+def _pairs(entry: Mapping[str, Any]) -> str:
+    return ", ".join(f"{key} = {_word(value)}" for key, value in entry.items())
 
 
 def _word(value: Any) -> str:
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{key} = {_word(of)}" for key, of in value.items()) + "}"
+        return "{" + _pairs(value) + "}"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(map(_word, value)) + "]"
     if isinstance(value, bool):

@@ -1,4 +1,4 @@
-"""Whether the inverters of every island can feed it: what no control can change is not drawn."""
+"""Islands that their inverters cannot feed: no control can change that, so it is not drawn."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class _Part(NamedTuple):
     """Real power (W) of its loads, as in the feeder's tables."""
     buses: frozenset[str]
     has_substation: bool
-    alive: bool
+    energised: bool
 
 
 class _State(NamedTuple):
@@ -63,7 +63,7 @@ class FeasibleSupply:
         for state in both:
             forming = frozenset(row.name for row in self._rows if row.kind == "GFM" and row.name in state.present)
             for part in self._parts_of(state.closed, forming):
-                if text := _objection(part, self._load(part, state.powers), state, leaders):
+                if text := self._objection(part, state, leaders):
                     return f"at {state.t_s:g} s {text}"
         return ""
 
@@ -93,31 +93,30 @@ class FeasibleSupply:
                 powers = set_powers[change.t_s]
             yield _State(t_s, closed, present, killed, powers)
 
-    def _load(self, part: _Part, powers: Mapping[str, complex]) -> float:
-        set_here = [(S, self._loads[name]) for name, S in powers.items() if self._loads[name].bus in part.buses]
-        return part.load + sum(S.real - load.S.real for S, load in set_here)
-
     def _parts(self, closed: frozenset[str], forming: frozenset[str]) -> tuple[_Part, ...]:
         fed, dead = self._graph.fed(closed, (row for row in self._rows if row.name in forming))
         parts = []
-        for nodes, alive in (*((part, True) for part in fed), *((part, False) for part in dead)):
+        for nodes in (*fed, *dead):
             load = sum(S.real for bus, ends, S in self._demands if any((bus, phase) in nodes for phase in ends))
             there = tuple(row for row in self._rows if row.node in nodes)
-            parts.append(_Part(there, load, frozenset(bus for bus, _ in nodes), self._source in nodes, alive))
+            buses = frozenset(bus for bus, _ in nodes)
+            parts.append(_Part(there, load, buses, self._source in nodes, energised=nodes in fed))
         return tuple(parts)
 
-
-def _objection(part: _Part, load: float, state: _State, leaders: frozenset[str]) -> str:
-    there = [row for row in part.inverters if row.name in state.present]
-    if part.has_substation or not there:
+    def _objection(self, part: _Part, state: _State, leaders: frozenset[str]) -> str:
+        there = [row for row in part.inverters if row.name in state.present]
+        if part.has_substation or not there:
+            return ""
+        names = ", ".join(row.name for row in there)
+        if not part.energised:
+            return f"no grid-forming inverter is with {names}"
+        alive = [row for row in there if row.name not in state.killed]
+        if leaders and not any(row.name in leaders for row in alive):
+            return f"no grid-forming inverter with an agent that controls is with {names}"
+        loads = ((S, self._loads[name]) for name, S in state.powers.items())
+        load = part.load + sum(S.real - own.S.real for S, own in loads if own.bus in part.buses)
+        able = sum(row.P_rated for row in alive)
+        held = sum(row.P_rated for row in there) - able
+        if not LEAST_LOAD * able + held <= load <= MOST_LOAD * able + KILLED * held:
+            return f"{load / 1e3:.0f} kW of load are not what {names} can feed"
         return ""
-    names = ", ".join(row.name for row in there)
-    if not part.alive:
-        return f"no grid-forming inverter is with {names}"
-    alive = [row for row in there if row.name not in state.killed]
-    if leaders and not any(row.name in leaders for row in alive):
-        return f"no grid-forming inverter with an agent that controls is with {names}"
-    able, held = (sum(row.P_rated for row in rows) for rows in (alive, [row for row in there if row not in alive]))
-    if not LEAST_LOAD * able + held <= load <= MOST_LOAD * able + KILLED * held:
-        return f"{load / 1e3:.0f} kW of load are not what {names} can feed"
-    return ""

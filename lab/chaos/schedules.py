@@ -54,8 +54,6 @@ loaded modules, so a seed would draw other schedules after any change of any of 
 Pick = Callable[[int], int]
 """Draws a whole number from 0 to below a bound; towards 0 is simpler."""
 
-Make = Callable[["_Draw"], Disturbance]
-
 
 class _FailsError(Exception):
     """A schedule fails."""
@@ -75,9 +73,15 @@ def shrunk(base: ChaosBase, seed: int, number: int, fails: Callable[[Schedule], 
     disturbances, and its schedule stays empty.
     """
     batch, place = divmod(number, BATCH)
-    asked = _Asked(fails)
+    known: dict[bytes, bool] = {}
     simplest: Schedule = ()
     passed = 0
+
+    def known_to_fail(schedule: Schedule, most: int) -> bool:
+        key = msgspec.json.encode(schedule)
+        if key not in known and len(known) < most:
+            known[key] = fails(schedule)
+        return known.get(key, False)
 
     def attempt(schedule: Schedule) -> None:
         nonlocal passed, simplest
@@ -85,45 +89,25 @@ def shrunk(base: ChaosBase, seed: int, number: int, fails: Callable[[Schedule], 
             passed += 1
             if passed <= place:
                 return
-            asked.note_failure(schedule)
-        if asked.fails(schedule, TRIES - TRIES // IDLE_PART):
+            known[msgspec.json.encode(schedule)] = True
+        if known_to_fail(schedule, TRIES - TRIES // IDLE_PART):
             simplest = schedule
             raise _FailsError
 
     with suppress(_FailsError):  # of the simplest one, which hypothesis tries again at the end
         _search(base, seed, batch, attempt, (Phase.generate, Phase.shrink))
-    return _without_idle_ones(base, simplest, asked)
+    return _without_idle_ones(base, simplest, lambda schedule: known_to_fail(schedule, TRIES))
 
 
-class _Asked:
-    """Tell of schedules if they fail: each is run once, and all together no more often than they may."""
-
-    def __init__(self, fails: Callable[[Schedule], bool]) -> None:
-        self._fails = fails
-        self._known: dict[bytes, bool] = {}
-        self._runs = 0
-
-    def note_failure(self, schedule: Schedule) -> None:
-        self._known[msgspec.json.encode(schedule)] = True
-
-    def fails(self, schedule: Schedule, most: int) -> bool:
-        """Return whether a schedule is known to fail, after a run of it unless there were `most` runs already."""
-        key = msgspec.json.encode(schedule)
-        if key not in self._known and self._runs < most:
-            self._runs += 1
-            self._known[key] = self._fails(schedule)
-        return self._known.get(key, False)
-
-
-def _without_idle_ones(base: ChaosBase, schedule: Schedule, asked: _Asked) -> Schedule:
+def _without_idle_ones(base: ChaosBase, schedule: Schedule, fails: Callable[[Schedule], bool]) -> Schedule:
     """Return a failing schedule without the disturbances that it fails without.
 
     hypothesis leaves out few numbers in a row, which a disturbance of many is not.
     """
     for disturbance in schedule:
         rest = tuple(it for it in schedule if it is not disturbance)
-        if base.is_possible(rest) and asked.fails(rest, TRIES):
-            return _without_idle_ones(base, rest, asked)
+        if base.is_possible(rest) and fails(rest):
+            return _without_idle_ones(base, rest, fails)
     return schedule
 
 
@@ -173,13 +157,12 @@ class _Draw:
         """Distance (s) of the times that are drawn: events apart by it have a recorded row between them."""
 
     def disturbance(self) -> Disturbance:
-        kinds: list[Make] = [_Draw._cut, _Draw._partition, _Draw._delay, _Draw._loss, _Draw._noise, _Draw._pause]
-        kinds += [_Draw._slow, _Draw._lie, _Draw._kill, _Draw._leave]
-        kinds += [_Draw._join] if self._spares else []
-        kinds += [_Draw._load] if self._loads else []
-        kinds += [_Draw._switch] if self._switches else []
-        make: Make = self._one_of(kinds)
-        return make(self)
+        kinds = [self._cut, self._partition, self._delay, self._loss, self._noise, self._pause]
+        kinds += [self._slow, self._lie, self._kill, self._leave]
+        kinds += [self._join] * bool(self._spares) + [self._load] * bool(self._loads)
+        kinds += [self._switch] * bool(self._switches)
+        make: Callable[[], Disturbance] = self._one_of(kinds)
+        return make()
 
     # ---------------------------------------------------------------- numbers
 
@@ -241,12 +224,14 @@ class _Draw:
 
     # ---------------------------------------------------------------- agents
 
+    def _node(self, **fault: Any) -> Disturbance:
+        return Disturbance(table="node", entry={"name": self._one_of(self._names), **self._span(), **fault})
+
     def _pause(self) -> Disturbance:
-        return Disturbance(table="node", entry={"name": self._one_of(self._names), **self._span(), "pause": True})
+        return self._node(pause=True)
 
     def _slow(self) -> Disturbance:
-        slow_s = round(0.01 * (1 + self._pick(20)), 3)
-        return Disturbance(table="node", entry={"name": self._one_of(self._names), **self._span(), "slow_s": slow_s})
+        return self._node(slow_s=round(0.01 * (1 + self._pick(20)), 3))
 
     def _kill(self) -> Disturbance:
         entry = {"name": self._one_of(self._names), "from_s": self._begin(), "kill": True}
@@ -254,7 +239,19 @@ class _Draw:
 
     def _lie(self) -> Disturbance:
         name = self._one_of(self._names)
-        lie = self._words_of(round(self._rows[name].P_rated * 0.05 * (1 + self._pick(20)), 3))
+        W = round(self._rows[name].P_rated * 0.05 * (1 + self._pick(20)), 3)
+        lies: list[dict[str, Any]] = [
+            {"model": "offset", "P_set_W": W, "Q_var": W},
+            {"model": "offset", "P_set_W": -W, "V_set_V": 100.0},
+            {"model": "scale", "P_set": 0.5, "Q": -1.0},
+            {"model": "freeze"},
+            {"model": "replay", "delay_s": 1.0},
+            {"model": "random", "P_set_W": W, "Q_var": W},
+            {"model": "random", "P_set_W": W, "V_set_V": 50.0, "two_faced": True},
+            {"model": "extreme", "side": "high"},
+            {"model": "extreme", "side": "alternate"},
+        ]
+        lie = self._one_of(lies)
         others = [it for it in self._names if it != name]
         reach = self._pick(4)
         if reach == 2:
@@ -262,21 +259,6 @@ class _Draw:
         elif reach == 3 and others and self._base.scenario.security == "none":
             lie |= {"in_name_of": self._one_of(others)}
         return Disturbance(table="node", entry={"name": name, **self._span(), "lies": lie})
-
-    def _words_of(self, size: float) -> dict[str, Any]:
-        """Draw a lie; `size` is its power (W, var) where it has one."""
-        kinds: list[dict[str, Any]] = [
-            {"model": "offset", "P_set_W": size, "Q_var": size},
-            {"model": "offset", "P_set_W": -size, "V_set_V": 100.0},
-            {"model": "scale", "P_set": 0.5, "Q": -1.0},
-            {"model": "freeze"},
-            {"model": "replay", "delay_s": 1.0},
-            {"model": "random", "P_set_W": size, "Q_var": size},
-            {"model": "random", "P_set_W": size, "V_set_V": 50.0, "two_faced": True},
-            {"model": "extreme", "side": "high"},
-            {"model": "extreme", "side": "alternate"},
-        ]
-        return dict(self._one_of(kinds))
 
     # ---------------------------------------------------------------- events
 

@@ -63,16 +63,6 @@ class Modes:
     """Largest real part of the same (1/s)."""
 
     @property
-    def frequency_settling_s(self) -> float:
-        """Time (s) to 2 % of the slowest mode, by its exact rate."""
-        return settling(self.slowest_rate)
-
-    @property
-    def sharing_settling_s(self) -> float:
-        """Time (s) to 2 % of the sharing mode."""
-        return settling(self.sharing_rate)
-
-    @property
     def euler_step_s(self) -> float:
         """Largest control period (s) with which explicit Euler would be stable, 2 / fastest rate. Our law has none."""
         return math.inf if self.fastest_rate <= 0.0 else 2.0 / self.fastest_rate

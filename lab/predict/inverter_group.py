@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from gridpeers.agents.agent_config import Control, Gains
 from gridpeers.agents.graphs import adjacency
-from gridpeers.plant.equipment import F_NOM, Feeder, InverterRow
+from gridpeers.plant.equipment import F_NOM, Feeder
 from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters, InverterParameters
 from gridpeers.scenarios.results.history import Flags, Floats
 from gridpeers.scenarios.schema import ScenarioModel
+from gridpeers.scenarios.schema.configs import configs
 from gridpeers.scenarios.schema.participants import inverters_of, without_agent
-from gridpeers.scenarios.schema.plugin_keys import graph_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,40 +125,26 @@ def inverter_group_of(
     The graph's rule is applied to the roster, who takes part in the run: those of the start, if left out. Of an island,
     the others are not heard.
     """
-    rule = scenario.cases[case]
     present = {row.name for row in feeder.inverters} if roster is None else set(roster)
     rows = {row.name: row for row in inverters_of(scenario, feeder) if row.name in present}
-    graph, own_graph = graph_of(rule)
-    control = Control(
-        secondary=rule.secondary,
-        graph=graph,
-        own_graph=own_graph,
-        links=rule.links,
-        without=rule.without,
-        gains=rule.gains,
-    )
+    _, agents = configs(scenario, feeder, case)
+    control = agents[0].control if agents else Control(secondary="none", graph="none")
     without = without_agent(scenario, case)
-    GFM = np.array([row.kind == "GFM" for row in rows.values()], bool)
+    A = np.zeros((len(rows), len(rows)))
+    at = [i for i, name in enumerate(rows) if name not in without]
+    A[np.ix_(at, at)] = np.array(adjacency(control, {name: rows[name] for name in rows if name not in without}))
     inverters = InverterGroup(
         names=tuple(rows),
-        GFM=GFM,
-        A=_adjacency(control, rows, without),
+        GFM=np.array([row.kind == "GFM" for row in rows.values()], bool),
+        A=A,
         acts=np.array([control.acts(name, row.kind) and name not in without for name, row in rows.items()], bool),
         shares=np.array([name not in without for name in rows], bool),
         s=np.array([row.P_rated for row in rows.values()]),
         m_p=np.array([row.m_p for row in rows.values()]),
         m_q=np.array([row.m_q for row in rows.values()]),
-        gains=rule.gains,
+        gains=scenario.cases[case].gains,
         f_nom=feeder.f_nom,
         T_c=scenario.time.T_c_s,
         parameters=tuple(feeder.parameters_of(row, scenario.plant.gfm, scenario.plant.gfl) for row in rows.values()),
     )
     return inverters if island is None else inverters.part(np.array([name in island for name in rows], bool))
-
-
-def _adjacency(control: Control, rows: Mapping[str, InverterRow], without: Collection[str]) -> Floats:
-    """Return the adjacency of all inverters; those without an agent have no link."""
-    A = np.zeros((len(rows), len(rows)))
-    at = [i for i, name in enumerate(rows) if name not in without]
-    A[np.ix_(at, at)] = np.array(adjacency(control, {name: rows[name] for name in rows if name not in without}))
-    return A

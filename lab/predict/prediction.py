@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from functools import cached_property
 from pathlib import Path
 
@@ -16,11 +15,11 @@ from gridpeers.agents.carriers.law_check import PAPER
 from gridpeers.lab.predict.closed_form import (
     SETTLING,
     DelayKind,
-    Modes,
     delay_limit_closed,
     equivalent_delay,
     groups,
     modes,
+    settling,
     settling_in_ticks,
 )
 from gridpeers.lab.predict.inverter_group import InverterGroup, inverter_group_of
@@ -45,9 +44,6 @@ LIMITS: dict[DelayKind, str] = {
 
 WIDTH = 100
 """Columns of the text."""
-
-TextRow = tuple[str, str, str, str]
-"""Quantity, by the continuous law, by ours in discrete time, meaning."""
 
 
 def predict(scenario: Scenario | str | Path, case: str, *, voltage: bool = True) -> Prediction:
@@ -93,60 +89,27 @@ def predictions(spec: ScenarioModel, feeder: Feeder, *, voltage: bool) -> dict[s
         islands = tuple(
             (step, inverter_group_of(spec, feeder, name, roster=step.roster, island=step.members)) for step in steps
         )
-        found[name] = Prediction(CasePrediction(title, inverter_group_of(spec, feeder, name), islands, plant))
+        found[name] = Prediction(title, inverter_group_of(spec, feeder, name), islands, plant)
     return found
-
-
-@dataclass(frozen=True)
-class CasePrediction:
-    """Numbers of one case, each computed when it is first asked for."""
-
-    title: str
-    inverters: InverterGroup
-    islands: tuple[tuple[IslandStep, InverterGroup], ...]
-    """Islands after each event, and their inverters."""
-    plant: VarResponse | None
-    """Response of voltage and vars; None leaves them out."""
-
-    @property
-    def has_law(self) -> bool:
-        """Any inverter runs the secondary law."""
-        return bool(self.inverters.acts.any())
-
-    @cached_property
-    def modes(self) -> Modes:
-        """The modes of the secondary law, if there is one."""
-        return modes(self.inverters)
-
-    @cached_property
-    def delay_limits(self) -> dict[DelayKind, tuple[float, float]]:
-        """Longest delays (s) for which the case is stable: by the continuous equations, and of our law in its steps."""
-        return {kind: (delay_limit_closed(self.inverters, kind), delay_limit(self.inverters, kind)) for kind in LIMITS}
-
-    @cached_property
-    def times(self) -> tuple[Times, ...]:
-        """Times after each event, by island; a note says why there are none."""
-        return tuple(self._times_of(step, island) for step, island in self.islands)
-
-    def _times_of(self, step: IslandStep, island: InverterGroup) -> Times:
-        if step.load is None:
-            note = "islands join, which is not predicted"
-        elif not island.GFM.any():
-            note = "no grid-forming inverter, so the island is de-energised"
-        elif not self.has_law:
-            note = "there is no secondary law"
-        else:
-            return predicted_times(island, load=step.load)
-        return Times(restore_s=None, share_s=None, stable=False, note=note)
 
 
 class Prediction:
     """Predictions by theory of one case; made by `gridpeers.predict`."""
 
-    def __init__(self, case: CasePrediction) -> None:
-        self._case = case
-        self.title = case.title
+    def __init__(
+        self,
+        title: str,
+        inverters: InverterGroup,
+        islands: tuple[tuple[IslandStep, InverterGroup], ...],
+        plant: VarResponse | None,
+    ) -> None:
+        self.title = title
         """Scenario and case."""
+        self._inverters, self._islands, self._plant = inverters, islands, plant
+
+    @property
+    def _has_law(self) -> bool:
+        return bool(self._inverters.acts.any())
 
     @cached_property
     def modes(self) -> pd.Series:
@@ -154,7 +117,7 @@ class Prediction:
 
         Empty where nobody runs a secondary law.
         """
-        found = asdict(self._case.modes) if self._case.has_law else {}
+        found = asdict(modes(self._inverters)) if self._has_law else {}
         return pd.Series(found, name=self.title, dtype=float)
 
     @cached_property
@@ -163,9 +126,12 @@ class Prediction:
 
         Infinite: any delay; nan: unstable without one.
         """
-        limits = self._case.delay_limits if self._case.has_law else {}
-        rows = {LIMITS[kind]: pair for kind, pair in limits.items()}
-        frame = pd.DataFrame.from_dict(rows, orient="index", columns=["continuous", "discrete"], dtype=float)
+        pairs = {
+            name: (delay_limit_closed(self._inverters, kind), delay_limit(self._inverters, kind))
+            for kind, name in LIMITS.items()
+            if self._has_law
+        }
+        frame = pd.DataFrame.from_dict(pairs, orient="index", columns=["continuous", "discrete"], dtype=float)
         frame.attrs["units"] = {"continuous": "s", "discrete": "s"}
         return frame.rename_axis("delay")
 
@@ -179,42 +145,85 @@ class Prediction:
         numbers = ["restore_s", "share_s", "t_restore_s"]
         rows = [
             (step.label, ", ".join(step.members), it.restore_s, it.share_s, it.report_s, it.stable, it.note)
-            for (step, _), it in zip(self._case.islands, self._case.times, strict=True)
+            for step, _, it in self._times
         ]
         frame = pd.DataFrame(rows, columns=["window", "island", *numbers, "stable", "note"])
         frame = frame.set_index(["window", "island"]).astype(dict.fromkeys(numbers, float))
         frame.attrs["units"] = dict.fromkeys(numbers, "s")
         return frame
 
+    @cached_property
+    def _times(self) -> list[tuple[IslandStep, InverterGroup, Times]]:
+        """Times after each event, by island; a note says why there are none."""
+        found = []
+        for step, island in self._islands:
+            if step.load is None:
+                note = "islands join, which is not predicted"
+            elif not island.GFM.any():
+                note = "no grid-forming inverter, so the island is de-energised"
+            elif not self._has_law:
+                note = "there is no secondary law"
+            else:
+                found.append((step, island, predicted_times(island, load=step.load)))
+                continue
+            found.append((step, island, Times(restore_s=None, share_s=None, stable=False, note=note)))
+        return found
+
     def __str__(self) -> str:
         """Return the text that the command `gridpeers predict` prints."""
-        return case_text(self._case)
+        if not self._has_law:
+            words = "No secondary control: no modes, no limits of delay. Droop alone decides, at once: `gridpeers run`."
+            return "\n".join([self.title, *_wrapped(words)])
+        lines = [self.title, *_wrapped(_words(self._inverters))]
+        for name, left, right, words in (("", "continuous", "our law", ""), *self._rows()):
+            lines.append(f"  {name:15}{left:>12}{right:>12}   {words}".rstrip())
+        for step, island, times in self._times:
+            lines += _wrapped(f"{_event(step)}: {_sentence(step, island, times)}")
+        return "\n".join([*lines, *_wrapped(f"Voltage and vars: {_vars(self._inverters, self._plant)}.")])
 
     def __repr__(self) -> str:
         return f"<Prediction {self.title}>"
+
+    def _rows(self) -> list[tuple[str, str, str, str]]:
+        """Return quantity, by the continuous law, by ours in discrete time, meaning."""
+        inverters, found = self._inverters, modes(self._inverters)
+        loop, T_c = Loop(inverters=inverters), inverters.T_c
+        slowest = settling_in_ticks(loop.spectral_radius, T_c) if loop.stable else math.inf
+        limits = [(_s(one, "any"), _limit(other)) for one, other in self.delay_limits.itertuples(index=False)]
+        r = robustness(inverters.A[np.ix_(inverters.acts, inverters.acts)])
+        return [
+            ("links", f"{found.links}", "", "undirected, among those that run the law"),
+            ("lambda_2", f"{found.lambda_2:.3f}", "", "algebraic connectivity; 0 when parts are not linked"),
+            ("lambda_max", f"{found.lambda_max:.3f}", "", "largest eigenvalue of the Laplacian"),
+            ("robustness", str(r), "", f"of the graph; W-MSR bears F = {r.F} liars around each agent"),
+            ("frequency mode", f"{found.frequency_rate:.2f} 1/s", "", "kappa n_L/N: rate if sharing were at once"),
+            ("sharing mode", _rate(found.sharing_rate), "", "kappa lambda_2: rate at which powers agree"),
+            ("slowest mode", _rate(found.slowest_rate), _rate(SETTLING / slowest), "exact, of law and plant together"),
+            (
+                "2 % settling",
+                _s(settling(found.slowest_rate), "never"),
+                _s(slowest, "never"),
+                "four time constants of it",
+            ),
+            ("sharing 2 %", _s(settling(found.sharing_rate), "never"), "", "the same of the sharing mode"),
+            ("largest step", _s(found.euler_step_s, "any"), "any", "longest T_c; continuous: as explicit Euler"),
+            ("delay: links", *limits[0], "agent to agent, own value fresh"),
+            ("delay: both", *limits[1], "own value as late as neighbours'"),
+            ("delay: plant", *limits[2], "f as measured, or P_set, late"),
+            ("loss 50 %", "", _s(equivalent_delay(T_c, 0.5), ""), "held: as so much more delay on the links"),
+            ("loss 90 %", "", _s(equivalent_delay(T_c, 0.9), ""), "the same; T_c p/(1 - p)"),
+        ]
 
 
 # -------------------------------------------------------------------- text
 
 
-def case_text(case: CasePrediction) -> str:
-    if not case.has_law:
-        words = "No secondary control: no modes, no limits of delay. Droop alone decides, at once: `gridpeers run`."
-        return "\n".join([case.title, *_wrapped(words, "  ")])
-    lines = [case.title, *_wrapped(_words(case), "  ")]
-    lines += _aligned([("", "continuous", "our law", ""), *_rows(case)])
-    for (step, island), times in zip(case.islands, case.times, strict=True):
-        lines += _wrapped(f"{_event(step)}: {_sentence(step, island, times)}", "  ")
-    lines += _wrapped(f"Voltage and vars: {_vars(case)}.", "  ")
-    return "\n".join(lines)
-
-
-def _words(case: CasePrediction) -> str:
-    inverters, apart = case.inverters, groups(case.inverters)
+def _words(inverters: InverterGroup) -> str:
+    apart = groups(inverters)
     leaders = [name for name, leads in zip(inverters.names, inverters.leads, strict=True) if leads]
     acting = int(inverters.acts.sum())
     text = f"{acting} of {inverters.n} inverters run the law; leaders {', '.join(leaders) or 'none'}; "
-    text += f"kappa {case.modes.kappa:.3g} 1/s; T_c {inverters.T_c:g} s. "
+    text += f"kappa {inverters.kappa[inverters.acts].mean():.3g} 1/s; T_c {inverters.T_c:g} s. "
     if not leaders:
         text += "Nobody leads, so nobody corrects the frequency. "
     if len(apart) > 1:
@@ -225,38 +234,6 @@ def _words(case: CasePrediction) -> str:
     if agentless := [name for name, shares in zip(inverters.names, inverters.shares, strict=True) if not shares]:
         text += f"{', '.join(agentless)} without an agent: droop alone, and the sharing index leaves them out. "
     return text.rstrip()
-
-
-def _rows(case: CasePrediction) -> list[TextRow]:
-    inverters, found, loop = case.inverters, case.modes, Loop(inverters=case.inverters)
-    slowest = settling_in_ticks(loop.spectral_radius, inverters.T_c) if loop.stable else math.inf
-
-    def limits(kind: DelayKind) -> tuple[str, str]:
-        continuous, discrete = case.delay_limits[kind]
-        return _s(continuous, "any"), _limit(discrete)
-
-    return [
-        ("links", f"{found.links}", "", "undirected, among those that run the law"),
-        ("lambda_2", f"{found.lambda_2:.3f}", "", "algebraic connectivity; 0 when parts are not linked"),
-        ("lambda_max", f"{found.lambda_max:.3f}", "", "largest eigenvalue of the Laplacian"),
-        ("robustness", *_robustness(inverters)),
-        ("frequency mode", f"{found.frequency_rate:.2f} 1/s", "", "kappa n_L/N: rate if sharing were at once"),
-        ("sharing mode", _rate(found.sharing_rate), "", "kappa lambda_2: rate at which powers agree"),
-        ("slowest mode", _rate(found.slowest_rate), _rate(SETTLING / slowest), "exact, of law and plant together"),
-        ("2 % settling", _s(found.frequency_settling_s, "never"), _s(slowest, "never"), "four time constants of it"),
-        ("sharing 2 %", _s(found.sharing_settling_s, "never"), "", "the same of the sharing mode"),
-        ("largest step", _s(found.euler_step_s, "any"), "any", "longest T_c; continuous: as explicit Euler"),
-        ("delay: links", *limits("neighbours"), "agent to agent, own value fresh"),
-        ("delay: both", *limits("disagreement"), "own value as late as neighbours'"),
-        ("delay: plant", *limits("local loop"), "f as measured, or P_set, late"),
-        ("loss 50 %", "", _s(equivalent_delay(inverters.T_c, 0.5), ""), "held: as so much more delay on the links"),
-        ("loss 90 %", "", _s(equivalent_delay(inverters.T_c, 0.9), ""), "the same; T_c p/(1 - p)"),
-    ]
-
-
-def _robustness(inverters: InverterGroup) -> tuple[str, str, str]:
-    found = robustness(inverters.A[np.ix_(inverters.acts, inverters.acts)])
-    return str(found), "", f"of the graph; W-MSR bears F = {found.F} liars around each agent"
 
 
 def _event(step: IslandStep) -> str:
@@ -279,8 +256,7 @@ def _sentence(step: IslandStep, island: InverterGroup, times: Times) -> str:
     return f"load {step.load.start_pu:.3f} -> {step.load.load_pu:.3f} pu of the ratings: {text}"
 
 
-def _vars(case: CasePrediction) -> str:
-    inverters, plant = case.inverters, case.plant
+def _vars(inverters: InverterGroup, plant: VarResponse | None) -> str:
     if plant is None:
         return "left out by --no-vars"
     if not all(name in plant.names for name in inverters.names):
@@ -307,9 +283,5 @@ def _limit(seconds: float) -> str:
     return "unstable" if math.isnan(seconds) else _s(seconds, "any")
 
 
-def _aligned(rows: Sequence[TextRow]) -> list[str]:
-    return [f"  {name:15}{left:>12}{right:>12}   {words}".rstrip() for name, left, right, words in rows]
-
-
-def _wrapped(text: str, indent: str) -> list[str]:
-    return textwrap.wrap(text, WIDTH, initial_indent=indent, subsequent_indent=indent + "  ")
+def _wrapped(text: str) -> list[str]:
+    return textwrap.wrap(text, WIDTH, initial_indent="  ", subsequent_indent="    ")

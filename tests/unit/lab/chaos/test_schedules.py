@@ -180,7 +180,7 @@ def test_a_lie_of_an_agent_that_has_left_changes_nothing_and_the_report_says_so(
     assert base.is_possible(schedule)
     assert (row.history_sha256, row.passed) == (without.history_sha256, without.passed)
     assert "(nothing happens: inv4 has left at 0.3 s)" in failed.read_text(encoding="utf-8")
-    assert next(summary.lines()).endswith("; disturbances: 1 leave")
+    assert next(summary.lines()).endswith("; disturbances: leave 1")
 
 
 def test_only_who_is_away_all_the_time_does_nothing(tmp_path: Path) -> None:

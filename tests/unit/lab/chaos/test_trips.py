@@ -169,7 +169,9 @@ def test_a_run_that_never_settles_says_so(monkeypatch: pytest.MonkeyPatch, tmp_p
     base = base_named("islanding")
     monkeypatch.setattr(chaos_run, "_judged", judged)
     row = run_schedule(base, (), 1)
-    ChaosFolder(tmp_path, base, 1, "gridpeers chaos islanding").add(row)
+    folder = ChaosFolder(tmp_path, base, 1, "gridpeers chaos islanding")
+    folder.add(row)
+    folder.write_table()
 
     assert row.unsettled.startswith(f"inverters trip and return: after {LONGER_RUNS} runs still judged from")
     assert row.unsettled in (tmp_path / "chaos.csv").read_text(encoding="utf-8")

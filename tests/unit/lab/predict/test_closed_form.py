@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from gridpeers.lab.predict.closed_form import delay_limit_closed, equivalent_delay, groups, modes
+from gridpeers.lab.predict.closed_form import delay_limit_closed, equivalent_delay, groups, modes, settling
 from tests.unit.lab.predict.predicted_graphs import GRAPHS, inverters
 
 TABLE = {
@@ -32,8 +32,8 @@ def test_eigenvalues_settling_times_and_limits_are_those_of_the_theory(graph: st
     assert found.links == links
     assert found.lambda_2 == pytest.approx(lambda_2, abs=5e-4)
     assert found.lambda_max == pytest.approx(lambda_max, abs=5e-4)
-    assert found.sharing_settling_s == pytest.approx(sharing, abs=6e-3)
-    assert found.frequency_settling_s == pytest.approx(frequency, abs=6e-3)
+    assert settling(found.sharing_rate) == pytest.approx(sharing, abs=6e-3)
+    assert settling(found.slowest_rate) == pytest.approx(frequency, abs=6e-3)
     assert 1e3 * delay_limit_closed(inverters(graph, kappa=12.0), "disagreement") == pytest.approx(kind_2, abs=0.05)
     assert 1e3 * found.euler_step_s == pytest.approx(euler, abs=0.05)
 
