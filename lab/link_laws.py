@@ -53,8 +53,6 @@ Blocks = tuple[tuple[tuple[int, int], ...], ...]
 
 
 class LinkTest(NamedTuple):
-    """One test of one link."""
-
     link: Link
     what: str
     configured: str
@@ -72,7 +70,6 @@ class LinkLaws(Check):
     """Probability that a sound run has any violation, however many links it has (Holm 1979)."""
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
-        """Yield each deviation that chance does not explain."""
         _ = case.communication  # says why there is no record
         assert case.folder is not None
         record = RunRecord.open(case.folder)
@@ -173,7 +170,6 @@ def _joined(seq: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
 
 
 def blocks_of(seq: npt.NDArray[np.int64]) -> Blocks:
-    """Return message numbers as `Blocks`."""
     blocks: dict[int, list[tuple[int, int]]] = {}
     for run in np.split(seq, np.flatnonzero(~_joined(seq)) + 1):
         block, first = divmod(int(run[0]), RESTART)

@@ -40,7 +40,6 @@ class LivePages:
         self._agents = OwnAgents(where)
 
     def close(self) -> None:
-        """End what pages have begun."""
         self._worker.shutdown(cancel_futures=True)
         self._actions.close()
         self._agents.close()

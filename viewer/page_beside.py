@@ -21,7 +21,6 @@ HERE, PORT = "127.0.0.1", 8123
 """Where a page is opened if nothing else is said: on this host alone."""
 
 LEAVING = 5.0
-"""Time (s) that the process has to end by itself."""
 
 
 def require_page() -> None:
@@ -60,14 +59,12 @@ class PageConfig(msgspec.Struct, frozen=True, kw_only=True):
     """Configuration of the process (JSON on its standard input)."""
 
     path: str
-    """Folder of the run."""
     descriptor: int
     """File descriptor of the socket on which the page is opened."""
 
 
 @contextmanager
 def _process(folder: Path, listening: socket.socket) -> Iterator[subprocess.Popen[bytes]]:
-    """Start the process, which takes over the socket; leaving the context ends it, and so does the command's death."""
     from gridpeers.wire.driver.process import LEASH
 
     config = PageConfig(path=str(folder), descriptor=listening.fileno())
@@ -97,7 +94,6 @@ def _process(folder: Path, listening: socket.socket) -> Iterator[subprocess.Pope
 
 
 def serve(config: PageConfig) -> str:
-    """Serve the page until a signal comes."""
     from gridpeers.viewer.page_server import PageOptions, PageServer
     from gridpeers.viewer.record_pages import RecordedRun, RecordPages
 

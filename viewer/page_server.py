@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from starlette.websockets import WebSocket
 
 PAGE = Path(__file__).parent / "page"
-"""The page's own files; it loads nothing from elsewhere."""
 
 KINDS = {".css": "text/css", ".js": "text/javascript"}
 
@@ -39,7 +38,6 @@ SILENT = 1.0
 """Time (s) without a word from its server after which a page shows nothing as of now: four heartbeats."""
 
 FASTEST = 0.05
-"""Least time (s) between two frames of a page."""
 
 _log = logging.getLogger("view")
 
@@ -62,8 +60,6 @@ _ASK_TOKEN = """<!doctype html><html lang="en"><meta charset="utf-8"><title>grid
 
 @dataclass(frozen=True, kw_only=True)
 class PageOptions:
-    """Options of the server."""
-
     token: str = ""
     """What a page must know; "" asks for none."""
     hosts: tuple[str, ...] = ("127.0.0.1", "localhost", "[::1]")
@@ -77,9 +73,7 @@ Talk = Coroutine[Any, Any, None]
 class Pages(Protocol):
     """What the pages show: a live run, or records."""
 
-    def close(self) -> None:
-        """End what pages have begun; no loop runs any more."""
-        ...
+    def close(self) -> None: ...
 
     def talk(self, socket: WebSocket) -> tuple[Talk, Talk]:
         """Return what sends a page what it shows, and what takes what it says; both end with the first of them."""
@@ -87,8 +81,6 @@ class Pages(Protocol):
 
 
 class PageServer:
-    """Serve the page until a signal comes."""
-
     def __init__(self, pages: Pages, options: PageOptions) -> None:
         self._pages, self._options = pages, options
 
@@ -214,7 +206,6 @@ async def texts(socket: WebSocket) -> AsyncIterator[str]:
 
 
 def as_json(value: Any) -> str:
-    """Return a message to a page."""
     return msgspec.json.encode(value).decode()
 
 
@@ -229,7 +220,6 @@ async def send(socket: WebSocket, text: str) -> None:
 
 
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
-"""Names of this host's loopback in the address of a page."""
 
 
 def listen(address: str, port: int) -> socket.socket:
@@ -272,6 +262,5 @@ def access(address: str, token: str) -> tuple[str, tuple[str, ...]]:
 
 
 def url_of(listening: socket.socket, address: str) -> str:
-    """Return the page's address for a browser of this host."""
     host = f"[{address}]" if ":" in address else address
     return f"http://{host}:{listening.getsockname()[1]}/"

@@ -63,7 +63,6 @@ class PlantRows:
         return points
 
     def _read_rows(self, part: int) -> _Rows:
-        """Return the rows of a part, in the order of time."""
         inverters: tuple[str, ...] = ()
         rows: list[tuple[float, ...]] = []
         for message in self._index.of_type("telemetry", Telemetry, (part,)):

@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 
 
 class RecordQuestion(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What a page wants to see."""
-
     case: Text = ""
     """Case; the latest without one."""
     at: float | None = None
@@ -44,8 +42,6 @@ class RecordQuestion(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
 
 
 class RecordPage:
-    """What one page has."""
-
     def __init__(self) -> None:
         self.case = ""
         self.wanted = ""
@@ -63,7 +59,6 @@ class RecordPages:
         self._worker = ThreadPoolExecutor(1, "record")
 
     def close(self) -> None:
-        """End the thread that reads."""
         self._worker.shutdown(cancel_futures=True)
 
     def talk(self, socket: WebSocket) -> tuple[Talk, Talk]:
@@ -116,7 +111,6 @@ class RecordPages:
         return [as_json({"news": news})]
 
     def frame(self, page: RecordPage, question: RecordQuestion) -> Iterator[str]:
-        """Return the frame that a page asks for."""
         if question.case != page.wanted:
             page.wanted = question.case
             yield from self.news(page)
@@ -133,7 +127,6 @@ class RecordPages:
         yield as_json({"frame": replace(frame, links=links, names=frame.names if frame.reset else ())})
 
     def decision(self, page: RecordPage, question: RecordQuestion) -> Iterator[str]:
-        """Return the decision that a page asks for."""
         if not question.agent:
             return
         try:
@@ -182,20 +175,15 @@ Growth = Literal["waiting", "recording", "ended", "broken", "cut"]
 
 
 class RecordNews(msgspec.Struct, frozen=True, kw_only=True):
-    """What is new of a record."""
-
     case: str
     cases: tuple[str, ...]
     """All cases of the run that have a record, the latest last."""
     t_end: float
-    """Latest run time in it (s)."""
     growth: Growth
     text: str
-    """The state of the run, in a sentence."""
     notes: tuple[str, ...] = ()
     """Sentences on what the record, or this host, does not have."""
     events: tuple[EventView, ...] = ()
-    """New events."""
 
 
 class RecordedRun:

@@ -40,8 +40,6 @@ _STILL = Pacing(steps=0, late=0, p50=0.0, p95=0.0, p99=0.0, worst=0.0, slipped=0
 
 
 class RecordView:
-    """Read a record for the page."""
-
     def __init__(self, record: RunRecord) -> None:
         self.record = record
         info = record.info
@@ -50,7 +48,6 @@ class RecordView:
         self._moments = AgentMoments(record)
         self._faults = LinkFaults(record)
         self._parts = 0
-        """Parts whose events are here."""
         self._events: list[EventView] = []
         self._plant_events: list[PlantEvent] = []
         feeder = feeder_of(info)
@@ -144,7 +141,6 @@ class RecordView:
         return list(present)
 
     def _switches_at(self, t: float) -> dict[str, bool]:
-        """Return the position of each switch."""
         positions = dict(self._switches)
         for event in self._until(t):
             name = self._by_name.get(event.subject) if event.kind == "switch" else None
@@ -161,12 +157,10 @@ class RecordView:
         return {name: power for name, power in powers.items() if not _alike(power, self._tables.get(name))}
 
     def _until(self, t: float) -> Iterator[PlantEvent]:
-        """Yield the events up to a run time (s)."""
         self.events  # noqa: B018  reads them, if there are more
         return takewhile(lambda event: event.t <= t + 1e-9, self._plant_events)
 
     def _feed_row(self, view: RunView, t: float) -> float | None:
-        """Feed the last row; return its run time (s)."""
         last = self._rows.last(t)
         if last is None:
             return None

@@ -25,8 +25,6 @@ KEPT = 200
 
 
 class EventView(msgspec.Struct, frozen=True):
-    """An event as the page shows it."""
-
     number: int
     t: float
     kind: str
@@ -35,28 +33,18 @@ class EventView(msgspec.Struct, frozen=True):
 
 
 class Cursor(msgspec.Struct, frozen=True):
-    """What a page has already."""
-
     run: int = -1
     """Number of the run's plant, counted by the view."""
     t: float = -1.0
-    """Run time (s) of its last point."""
     event: int = 0
-    """Number of its last event."""
     links: int = 0
-    """Version of its links."""
     switches: int = -1
-    """Version of its switches."""
     loads: int = -1
-    """Version of the loads that were set."""
 
 
 class Frame(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """What a page needs to be up to date."""
-
     live: LivenessView
     t: float | None
-    """Run time (s)."""
     pace: str
     speed: float = 1.0
     """Run time per wall time (s/s)."""
@@ -155,7 +143,6 @@ class RunView:
         self._renew_links(receiver)
 
     def presence(self, *, plant: bool, agents: Collection[str], now: float) -> None:
-        """Note whose tokens are there."""
         self._liveness.token(there=plant, now=now)
         self._present = frozenset(agents)
 
@@ -200,7 +187,6 @@ class RunView:
         return frame, later
 
     def _begin_again(self) -> None:
-        """Forget what the former plant said."""
         self._run += 1
         self._strips.clear()
         self._links.clear()
@@ -242,11 +228,8 @@ Word = Literal["waiting", "live", "frozen", "gone", "ended", "record"]
 
 
 class LivenessView(msgspec.Struct, frozen=True, kw_only=True):
-    """The state of a run as the page shows it."""
-
     word: Word
     text: str
-    """In a sentence."""
     since: float | None = None
     """How long ago (s) the last word of the plant came, if that is not now."""
     restarts: int = 0
@@ -293,7 +276,6 @@ class Liveness:
             self._gone_at = now
 
     def at(self, now: float) -> LivenessView:
-        """Return the state at a time (s)."""
         silent = None if self._heard_at is None else now - self._heard_at
         if self._end is not None:
             return self._view("ended", f"The run has ended{': ' + self._end if self._end else ''}.", silent)

@@ -14,7 +14,6 @@ from gridpeers.scenarios.results.sharing_index import sharing_index
 from gridpeers.wire.messages import VALUES
 
 LENGTH = 30.0
-"""Length of the strips (s of run time)."""
 
 STEP = 0.05
 """Run time (s) between two points at the least: more than a strip of 600 pixels can show."""
@@ -47,7 +46,6 @@ class Strips:
         return self._points[-1][0] if self._points else -1.0
 
     def clear(self) -> None:
-        """Forget all points: another run has begun."""
         self._points.clear()
         self._due = 0.0
 
@@ -63,7 +61,6 @@ class Strips:
             self._points.popleft()
 
     def since(self, t: float) -> list[Point]:
-        """Return the points after a run time (s)."""
         return [*takewhile(lambda point: point[0] > t, reversed(self._points))][::-1]
 
 
@@ -74,7 +71,6 @@ def next_due(t: float, inverters: int, length: float = LENGTH) -> float:
 
 
 def point_of(inverters: tuple[str, ...], row: tuple[float, ...], configs: Mapping[str, AgentConfig]) -> Point:
-    """Return the point of a row of telemetry."""
     f, P, Q, V = (np.array(row[1 + i :: VALUES]) for i in range(4))
     present = (P != 0.0) | (Q != 0.0)  # the plant reports exactly no power of an inverter that is off the network
     known = [configs.get(name) for name in inverters]

@@ -67,7 +67,6 @@ def view(
 
 @contextmanager
 def _live(live: LiveRun, *, control: bool) -> Iterator[tuple[Pages, Line]]:
-    """Yield the pages of a live run, and the line that tells their address."""
     with live.client(meet_agents=True, acts=control) as client:
         from gridpeers.viewer.live_pages import LivePages, looks_only
         from gridpeers.viewer.run_follower import RunFollower
@@ -82,7 +81,6 @@ def _live(live: LiveRun, *, control: bool) -> Iterator[tuple[Pages, Line]]:
 
 @contextmanager
 def _recorded(path: Path, case: str) -> Iterator[tuple[Pages, Line]]:
-    """Yield the pages of a record, and the line that tells their address."""
     require({"mcap": "the record of a run"})
     from gridpeers.scenarios.record.record_file import record_path
     from gridpeers.scenarios.record.record_reader import RecordFileError
@@ -99,7 +97,6 @@ def _recorded(path: Path, case: str) -> Iterator[tuple[Pages, Line]]:
 def _serve(
     pages: Callable[[], AbstractContextManager[tuple[Pages, Line]]], address: str, port: int, token: str
 ) -> NoReturn:
-    """Serve pages until a signal comes."""
     with usage_errors():
         from gridpeers.viewer.page_server import access, listen, url_of
 

@@ -33,7 +33,6 @@ REPEATED = 20
 """Every run of which the number is a multiple of this one is done twice, by whatever worker is free."""
 
 Tell = Callable[[str, float, float], None]
-"""Takes the present work, with its stage before the first comma, how much of the stage is done, and how much it has."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,15 +42,12 @@ class Campaign:
     runs: int
     driver: Driver = "inprocess"
     jobs: int = 1
-    """Processes for runs in one process each."""
     dask: str = ""
     """Address of a Dask scheduler to use instead; its workers have their own folders for temporary files."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Failure:
-    """One kind of failure: what is violated, and the runs that show it."""
-
     violated: str
     row: ChaosRow
     """The run in which it was found, among those with the fewest disturbances."""
@@ -62,8 +58,6 @@ class Failure:
 
 @dataclass(frozen=True, kw_only=True)
 class Summary:
-    """The result of a campaign, whole or interrupted."""
-
     campaign: Campaign
     rows: dict[int, ChaosRow]
     failures: tuple[Failure, ...]
@@ -96,7 +90,6 @@ class Summary:
 
 
 def undisturbed(campaign: Campaign) -> ChaosRow:
-    """Return the result of the scenario without any disturbance, in this process."""
     return run_schedule(campaign.base, (), seed_of(campaign.seed, 0))
 
 
@@ -155,7 +148,6 @@ def _numbered(campaign: Campaign, known: Mapping[int, ChaosRow]) -> Iterator[tup
 
 
 def _add_failures(failures: dict[str, Failure], folder: ChaosFolder) -> None:
-    """Add each new kind of failure with the run that has the fewest disturbances, and write its scenario as it is."""
     rows = sorted(folder.rows.values(), key=lambda row: (len(row.schedule), row.number))
     for violated in sorted({name for row in rows for name in row.violated} - failures.keys()):
         row = next(row for row in rows if violated in row.violated)
@@ -166,7 +158,6 @@ def _add_failures(failures: dict[str, Failure], folder: ChaosFolder) -> None:
 def _shrink_all(
     campaign: Campaign, folder: ChaosFolder, failures: dict[str, Failure], tell: Tell, within: Path | None
 ) -> None:
-    """Shrink each kind of failure, and write its scenario in place of the one that was drawn."""
     if not failures:
         return
     kinds = counted(len(failures), "kind of failure", "kinds of failure")

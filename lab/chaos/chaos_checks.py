@@ -30,7 +30,6 @@ _AFTER: Mapping[str, Mapping[str, Any]] = {
     "rating": {"with_killed": False},
     "steady": {"after_s": WITHIN_S},
 }
-"""Checks that are judged from the last change, trip or return on, with their limits."""
 
 RESTORED = frozenset({*_AFTER, "oscillation", RETURNS})
 """Checks of what control restores; the others hold whatever is done to a run."""

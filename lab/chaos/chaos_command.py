@@ -142,7 +142,6 @@ def chaos(
 
 
 def _lock(context: typer.Context, folder: Path, option: str) -> None:
-    """Lock the campaign's folder until the command ends."""
     from gridpeers.scenarios.results.run_files import locked
 
     handle = locked(folder, option, "chaos")
@@ -150,7 +149,6 @@ def _lock(context: typer.Context, folder: Path, option: str) -> None:
 
 
 def _refuse_unless_possible(scenario: str, spec: ScenarioModel, case: str | None, driver: str) -> None:
-    """End with one line if the scenario cannot be disturbed."""
     if len(spec.cases) > 1:
         fail([f"--case: takes one case, got {case}"], BAD_INPUT)
     if spec.plant.simulator != "gridpeers":
@@ -161,7 +159,6 @@ def _refuse_unless_possible(scenario: str, spec: ScenarioModel, case: str | None
 
 
 def _try_undisturbed(console: Console, campaign: Campaign) -> None:
-    """Say what begins; end with a line for each check that the scenario violates by itself."""
     from gridpeers.cli.progress import TRYING, explained
     from gridpeers.lab.chaos.campaign import undisturbed
     from gridpeers.scenarios.checks.check_registry import ALWAYS

@@ -56,20 +56,17 @@ class ChaosFolder:
     ) -> None:
         self.path, self._base, self._seed, self._command = path, base, seed, command
         self.rows = dict(rows)
-        """Results by the number of their run."""
         write_whole(path / SCENARIO, base.text)
         write_whole(path / ASKED, json.dumps({"seed": seed, "runs": runs}) + "\n")
         open_journal(path).close()
         self.write_table()
 
     def add(self, row: ChaosRow) -> None:
-        """Keep the result of a run, in the order in which they come."""
         with (self.path / JOURNAL).open("ab") as file:
             file.write(journal_line(row))
         self.rows[row.number] = row  # once it is kept: an error tells how many are
 
     def write_table(self) -> None:
-        """Write chaos.csv: a line for each run, by their numbers."""
         text = StringIO()
         table = csv.writer(text, lineterminator="\n")
         table.writerow(COLUMNS)

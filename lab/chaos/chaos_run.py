@@ -42,7 +42,6 @@ class ChaosRow(msgspec.Struct, frozen=True, kw_only=True):
     schedule: Schedule
     passed: tuple[str, ...] = ()
     violated: dict[str, str] = {}
-    """Those that it violated, with the sentence of each."""
     collapse: str = ""
     """Why violations of some inverters do not count: a change made them trip before any control could prevent it."""
     unsettled: str = ""
@@ -56,7 +55,6 @@ class ChaosRow(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def status(self) -> str:
-        """In a word: what it violates comes before what a collapse excuses."""
         return "violated" if self.violated else "collapse" if self.collapse else "passed"
 
 
@@ -165,8 +163,6 @@ def _settled(
 
 
 class JudgedRun(NamedTuple):
-    """A run once done."""
-
     row: ChaosRow
     restored_s: float = 0.0
     collapses: tuple[Collapse, ...] = ()
@@ -178,7 +174,6 @@ class JudgedRun(NamedTuple):
 def _judged(
     base: ChaosBase, scenario: ScenarioModel, row: ChaosRow, driver: Driver, within: Path | None = None
 ) -> JudgedRun:
-    """Run a scenario once in a temporary folder."""
     try:
         temporary = tempfile.TemporaryDirectory(prefix="gridpeers-chaos-", dir=within, ignore_cleanup_errors=True)
     except OSError as error:

@@ -23,10 +23,7 @@ of the change from another, or has measured what a decision did."""
 
 
 class Collapse(NamedTuple):
-    """Trips at one change of the network."""
-
     label: str
-    """Label of the scenario's event that is the change."""
     text: str
     inverters: frozenset[str]
     """Inverters of the islands in which inverters tripped, as the switches were then."""

@@ -39,7 +39,6 @@ class Disturbance(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
 
     @property
     def ends_s(self) -> float:
-        """Run time (s) at which it ends; infinity if it stays."""
         return float(self.back.get("t_s", inf) if self.table == "event" else self.entry.get("to_s", inf))
 
     @property
@@ -62,7 +61,6 @@ Schedule = tuple[Disturbance, ...]
 
 
 def counted_kinds(schedules: Iterable[Schedule]) -> str:
-    """Return how many disturbances of each kind schedules have: "kill 1, lies 2"; "none"."""
     numbers = Counter(disturbance.kind for schedule in schedules for disturbance in schedule)
     return ", ".join(f"{kind} {numbers[kind]}" for kind in KINDS if numbers[kind]) or "none"
 

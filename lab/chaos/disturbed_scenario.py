@@ -43,7 +43,6 @@ class ChaosBase:
     scenario: ScenarioModel
     feeder: Feeder
     tree: Mapping[str, Any] = field(init=False, repr=False)
-    """The scenario as the tables of its file."""
     supply: FeasibleSupply = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -63,7 +62,6 @@ class ChaosBase:
 
     @property
     def settled_s(self) -> float:
-        """Run time (s) of the scenario's own last change."""
         netem = netem_of(self.scenario, self.case)
         faults: list[Fault | Partition | NodeFault] = [*netem.links, *netem.partitions, *netem.nodes]
         ends = [fault.from_s if fault.to_s is None else fault.to_s for fault in faults]

@@ -22,10 +22,7 @@ KILLED = 0.5
 
 
 class _Part(NamedTuple):
-    """A connected part of the feeder."""
-
     inverters: tuple[InverterRow, ...]
-    """Those that are connected to it, on the network or not."""
     load: float
     """Real power (W) of its loads, as in the feeder's tables."""
     buses: frozenset[str]
@@ -68,7 +65,6 @@ class FeasibleSupply:
         return ""
 
     def _leaders(self, scenario: ScenarioModel, case: str) -> frozenset[str]:
-        """Return the grid-forming inverters whose agents run the secondary law."""
         chosen, agentless = scenario.cases[case].secondary, without_agent(scenario, case)
         names = {row.name for row in self._rows if row.kind == "GFM" and chosen != "none"} - agentless
         return frozenset(names if isinstance(chosen, str) else names & set(chosen))

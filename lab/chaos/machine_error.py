@@ -48,7 +48,6 @@ def machine_error(*told: BaseException | str) -> MachineError | None:
 
 
 def _texts(error: BaseException | None) -> Iterator[str]:
-    """Yield an error, and those that have led to it."""
     while error is not None:
         yield f"{type(error).__name__}: {error}".rstrip(": ")
         error = error.__cause__ or error.__context__

@@ -27,7 +27,6 @@ BATCH = 25
 many follow, and few are drawn again to shrink one."""
 
 TRIES = 150
-"""Most runs to shrink one failure, in all."""
 
 IDLE_PART = 5
 """A fifth of these runs is kept for leaving out disturbances one by one, once hypothesis is done."""
@@ -36,16 +35,13 @@ MOST_DISTURBANCES = 10
 """Most disturbances of a schedule, of which some may not be possible together."""
 
 LONGEST_S = 2.0
-"""Longest disturbance that ends (s)."""
 
 AFTER_S = 0.5
-"""Time (s) after the scenario's last change up to which disturbances begin."""
 
 MOST_LOADS = 20
 """Most loads that a step changes: a quarter of those of the standard feeder."""
 
 BEGIN_S = 0.2
-"""Earliest run time (s) of a disturbance."""
 
 _FAR = 7_203_117_000_000_061
 """A number that no program is likely to contain. hypothesis prefers integers that it finds in the source code of
@@ -263,7 +259,6 @@ class _Draw:
     # ---------------------------------------------------------------- events
 
     def _event(self, there: dict[str, Any], back: dict[str, Any]) -> Disturbance:
-        """Draw an event, and mostly another one that takes it back."""
         begin = self._begin()
         end = {"t_s": self._end(begin), **back} if self._pick(3) else {}
         return Disturbance(table="event", entry={"t_s": begin, **there}, back=end)

@@ -23,11 +23,8 @@ WAIT = 1000
 
 @dataclass
 class Missing:
-    """States that are missing on a link."""
-
     count: int = 0
     first: float = 0.0
-    """Run time of the first one (s)."""
 
     def add(self, t: float) -> None:
         if not self.count:
@@ -44,7 +41,6 @@ class TickAccounts:
     def __init__(self, sent: Mapping[str, SentStates], T_c: float, lost: Sequence[Hole] = ()) -> None:
         self._sent, self._T_c, self._lost = sent, T_c, lost
         self._spoken: dict[int, set[str]] = {}
-        """Agents that told their neighbours something, by tick."""
         self.missing: dict[Link, Missing] = {}
         """Of each link over which an agent listens."""
 
@@ -57,7 +53,6 @@ class TickAccounts:
             self._spoken[state.number].add(agent)
 
     def use(self, agent: str, state: SentState, uses: Uses, *, new: bool) -> None:
-        """Note the states from which an agent decided one of its own."""
         if new:
             for use in uses.each:
                 self.missing.setdefault(use.link, Missing())
@@ -135,8 +130,6 @@ class Presence:
 
 @dataclass
 class ArrivalAccount:
-    """What came over a link while its sender and its receiver were there."""
-
     ends: tuple[Presence, Presence]
     began: bool = False
     """The link must be there: something came, or both ends have been there for long."""
@@ -163,7 +156,6 @@ class ArrivalAccounts:
     def __init__(self, pause: float, linked_within: float) -> None:
         self._pause, self._linked_within = pause, linked_within
         self._there: dict[str, list[Presence]] = defaultdict(list)
-        """When each agent was there, in the order of time."""
         self._states: dict[str, deque[SentState]] = defaultdict(deque)
         self._arrived: dict[Link, dict[tuple[int, int], None]] = {}
         self._links_of: dict[str, list[Link]] = defaultdict(list)

@@ -43,7 +43,6 @@ class MessageAccount(Check):
     on its way."""
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
-        """Yield the links whose account does not close."""
         found: CommunicationSummary = case.communication
         if found.unreadable:
             yield Violation(text="messages or parts of the record that cannot be read", value=found.unreadable, limit=0)
@@ -96,7 +95,6 @@ class Rejoined(Check):
     """Longest time (s): what Zenoh needs at most to find again a peer that it has lost."""
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
-        """Yield the links that stay silent though sender and receiver go on."""
         found: CommunicationSummary = case.communication
         if not found.heals:
             raise NotJudgedError("no link was cut and healed")
@@ -136,7 +134,6 @@ class StaleValues(Check):
     """Run time (s) from which on it is judged: the end of the last fault of links or agents, say."""
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
-        """Yield the oldest value that was used of each link."""
         found: CommunicationSummary = case.communication
         if not found.oldest:
             raise NotJudgedError("no decision used a neighbour's value")
@@ -174,7 +171,6 @@ class LastWords(Check):
     """Longest time (s) between an agent's last state and the end of the run, or the event that explains it."""
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
-        """Yield the agents that stop without a reason."""
         found: CommunicationSummary = case.communication
         if not any(sent.epochs for sent in found.sent.values()):
             raise NotJudgedError("the record has no states of agents")

@@ -46,7 +46,6 @@ class OldUse:
     t: float
     """Run time of the first decision that used one of this age (s)."""
     last: float
-    """Run time of the last of them (s)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,13 +54,9 @@ class CommunicationSummary:
 
     info: RecordInfo
     t_end: float
-    """Latest run time in the record (s)."""
     unreadable: int
-    """Messages and reports that could not be read."""
     sent: Mapping[str, SentStates]
-    """States of each agent: when its processes spoke first and last."""
     counts: Mapping[Link, LinkCounts]
-    """Last account of each emulated link."""
     unjudged: Mapping[Link, Missing]
     """Simulated time: states without a verdict of their emulated link."""
     unheard: Mapping[Link, Missing]
@@ -73,7 +68,6 @@ class CommunicationSummary:
     oldest: Mapping[Link, list[OldUse]]
     """The oldest value that was used of each link, then the oldest of what was used later, and so on: ages fall."""
     heals: list[Heal]
-    """Ends of cuts."""
 
     @property
     def simulated(self) -> bool:

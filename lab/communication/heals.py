@@ -42,7 +42,6 @@ class Heal:
 
     link: Link
     t: float
-    """When (s)."""
     took: float | None = None
     """After what time (s) the receiver used something that the sender has sent since; None if it never did. It counts
     from when one of them last stood still (left out ticks; in real time `STANDSTILL`), if that was later."""
@@ -94,7 +93,6 @@ class Heals:
                 self._add(Heal(link, t))
 
     def use(self, agent: str, state: SentState, uses: Uses, *, new: bool) -> None:
-        """Note the states from which an agent decided one of its own."""
         if new:
             self._listens.update(use.link for use in uses.each)
         waiting = [heal for heal in self._open.get(agent, ()) if heal.t <= state.t and heal.link in self._listens]

@@ -27,7 +27,6 @@ class RecordContent(RecordSink):
 
     info: RecordInfo
     t_end: float = 0.0
-    """Latest run time in the record (s)."""
     states: dict[str, dict[tuple[int, int], SentState]] = field(default_factory=lambda: defaultdict(dict))
     """States of each agent by epoch and number, in the order of the file."""
     decisions: dict[str, list[tuple[int, Decision]]] = field(default_factory=lambda: defaultdict(list))
@@ -40,11 +39,9 @@ class RecordContent(RecordSink):
     dropped: dict[Link, int] = field(default_factory=lambda: defaultdict(int))
     """Real time: how many states a receiver dropped unread."""
     counts: dict[Link, LinkCounts] = field(default_factory=dict)
-    """Last account of each emulated link."""
     traces: dict[Link, list[LinkTrace]] = field(default_factory=lambda: defaultdict(list))
     """Verdicts of each emulated link."""
     unreadable: int = 0
-    """Messages and reports that could not be read."""
     complete: bool = True
     """The record was closed properly."""
 

@@ -15,13 +15,10 @@ from gridpeers.scenarios.short_texts import short
 from gridpeers.wire.messages import VALUES, PlantEvent
 
 RECENT = 1.0
-"""Time (s) before the decision whose events are told."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class NeighbourAccount:
-    """An in-neighbour at a decision, and what became of it."""
-
     name: str
     input: NeighbourInput | None
     """Its last state as heard; None if the agent had not met it."""
@@ -44,7 +41,6 @@ class Explanation:
     asked: float
     """Run time (s) that was asked for; the decision was in force then."""
     decision: RecordedDecision
-    """The decision: its inputs and the state that came out, in SI units."""
     neighbours: tuple[NeighbourAccount, ...]
     """The in-neighbours by the graph: those that the agent had met, then the others."""
     step: LawStep | None
@@ -91,7 +87,12 @@ def explained(
         decision=decision,
         neighbours=_accounts(record, decision, events),
         step=step,
-        events=tuple(event for event in events if _matters(event, decision, asked)),
+        events=tuple(
+            event
+            for event in events
+            if decision.t - RECENT <= event.t <= decision.t + 1e-9
+            or (event.subject == decision.agent and decision.t < event.t <= asked)
+        ),
         aftermath=aftermath(record, decision, asked, events),
         damage=record.damage,
     )
@@ -116,12 +117,6 @@ def _accounts(
         why = "idle agents hear nobody" if decision.action == "idle" else absence(decision, name, events)
         accounts.append(NeighbourAccount(name=name, input=None, seen=None, why=why))
     return tuple(accounts)
-
-
-def _matters(event: PlantEvent, decision: RecordedDecision, asked: float) -> bool:
-    if decision.t - RECENT <= event.t <= decision.t + 1e-9:
-        return True
-    return event.subject == decision.agent and decision.t < event.t <= asked
 
 
 # -------------------------------------------------------------------- after the last decision
@@ -149,36 +144,28 @@ def aftermath(
     last = f"it is the last decision before {asked:g} s"
     if not about and asked - decision.t < SILENT * T_c:
         return (last,)
-    left = f": {about[-1].text}" if about else ""
-    return last + left, *_inverter(record, decision, asked)
-
-
-def _inverter(record: RunRecord, decision: RecordedDecision, t: float) -> tuple[str, ...]:
-    """Return in a sentence what the inverter of an agent does at a run time (s); nothing if no row tells."""
-    values = _row(record, decision.agent, t)
+    last += f": {about[-1].text}" if about else ""
+    values = _row(record, decision.agent, asked)
     if values is None:
-        return ()
+        return (last,)
     _, P, Q, _, P_set, V_set = values
     if P == Q == 0.0:  # the plant reports exactly no power of an inverter that is off the network
-        return (f"at {t:g} s its inverter is off the network",)
-    holds = (
-        "these set-points"
-        if (P_set, V_set) == decision.after
-        else f"P_set = {P_set / 1e3:.2f} kW, V_set = {V_set:.2f} V"
-    )
-    return (f"at {t:g} s its inverter is on the network, delivers {P / 1e3:.2f} kW, and keeps {holds}",)
+        return last, f"at {asked:g} s its inverter is off the network"
+    same = (P_set, V_set) == decision.after
+    holds = "these set-points" if same else f"P_set = {P_set / 1e3:.2f} kW, V_set = {V_set:.2f} V"
+    return last, f"at {asked:g} s its inverter is on the network, delivers {P / 1e3:.2f} kW, and keeps {holds}"
 
 
 def _row(record: RunRecord, inverter: str, t: float) -> tuple[float, ...] | None:
     """Return f, P, Q, V, P_set and V_set of an inverter in the last row up to a run time (s)."""
-    found: tuple[float, tuple[float, ...]] | None = None
+    found: tuple[float, ...] | None = None
     for message in record.telemetry(since=max(0.0, t - 1.0), until=t):
         if inverter in message.inverters:
             start = 1 + VALUES * message.inverters.index(inverter)
             for row in message.rows:
-                if row[0] <= t + 1e-9 and (found is None or row[0] > found[0]):
-                    found = row[0], row[start : start + VALUES]
-    return None if found is None else found[1]
+                if row[0] <= t + 1e-9:
+                    found = row[start : start + VALUES]
+    return found
 
 
 # -------------------------------------------------------------------- a value followed back
@@ -189,8 +176,6 @@ Quantity = Literal["P_set", "V_set"]
 
 @dataclass(frozen=True, kw_only=True)
 class TrailStep:
-    """One decision on the way back."""
-
     decision: RecordedDecision
     step: LawStep | None
     largest: Term | None

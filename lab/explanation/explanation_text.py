@@ -13,13 +13,11 @@ from gridpeers.lab.explanation.law_step import QuantityStep
 from gridpeers.scenarios.console import text_of as printed_text
 
 SHOWN = 12
-"""Most terms that stand in a row of their own: the others are summed."""
 
 _SIDES = {1: "cannot deliver more", -1: "cannot deliver less"}
 
 
 def text_of(explanation: Explanation, trails: Sequence[tuple[Quantity, tuple[TrailStep, ...]]] = ()) -> str:
-    """Return the plain text of an explanation, and of trails from it."""
     return printed_text(lambda console: print_explanation(explanation, console, trails)).rstrip("\n")
 
 
@@ -35,20 +33,13 @@ def show(
 def print_explanation(
     explanation: Explanation, console: Console, trails: Sequence[tuple[Quantity, tuple[TrailStep, ...]]]
 ) -> None:
-    """Print the blocks of an explanation, with a blank line between them."""
-    blocks = [
-        _head(explanation),
-        _neighbours(explanation),
-        *_steps(explanation),
-        _events(explanation),
+    blocks = (
+        *(_head(explanation), _neighbours(explanation), *_steps(explanation), _events(explanation)),
         *(_trail(quantity, steps) for quantity, steps in trails),
-    ]
-    number = 0
-    for block in blocks:
-        lines = list(block)
-        if lines and number:
+    )
+    for number, lines in enumerate(filter(None, map(list, blocks))):
+        if number:
             console.print()
-        number += bool(lines)
         for line in lines:
             console.print(line, soft_wrap=not isinstance(line, Table))
 
@@ -103,21 +94,21 @@ def _neighbour(account: NeighbourAccount) -> tuple[str, ...]:
 
 
 def _steps(it: Explanation) -> Iterator[list[RenderableType]]:
-    decision = it.decision
-    config = decision.config
+    decision, config = it.decision, it.decision.config
+    bases = ("P_set", config.P_rated / 1e3, "kW"), ("V_set", config.V_nom, "V")
     if it.step is None:
+        scales = 1e3, 1.0
         lines: list[RenderableType] = []
-        for i, (name, base, scale, unit) in enumerate(
-            (("P_set", config.P_rated, 1e3, "kW"), ("V_set", config.V_nom, 1.0, "V"))
+        for (name, base, unit), scale, before, after in zip(
+            bases, scales, decision.before, decision.after, strict=True
         ):
-            before, after = decision.before[i], decision.after[i]
-            ends = f"{before / scale:.2f} -> {after / scale:.2f} {unit}, {before / base:.6f} -> {after / base:.6f} pu"
+            one, other = before / scale, after / scale
+            ends = f"{one:.2f} -> {other:.2f} {unit}, {one / base:.6f} -> {other / base:.6f} pu"
             lines.append(Text.assemble((name, "bold"), f"  {ends}: no step of a law"))
         yield lines
         return
-    law = config.control.law.name
-    yield _step(f"P_set of law {law}", it.step.P_set, config.P_rated / 1e3, "kW", decision.saturated[0])
-    yield _step(f"V_set of law {law}", it.step.V_set, config.V_nom, "V", decision.saturated[1])
+    for (name, base, unit), step, side in zip(bases, (it.step.P_set, it.step.V_set), decision.saturated, strict=True):
+        yield _step(f"{name} of law {config.control.law.name}", step, base, unit, side)
     if it.step.problem:
         yield [Text.assemble(("NOTE", "yellow"), f"  one term: {it.step.problem}")]
 
@@ -125,13 +116,11 @@ def _steps(it: Explanation) -> Iterator[list[RenderableType]]:
 def _step(title: str, step: QuantityStep, base: float, unit: str, side: int) -> list[RenderableType]:
     ends = f"{step.before * base:.2f} -> {step.after * base:.2f} {unit}, {step.before:.6f} -> {step.after:.6f} pu"
     terms = sorted(step.terms, key=lambda term: -abs(term.value))
-    rows = [(term.name, term.neighbour, _signed(term.value), _share(term.value, step)) for term in terms[:SHOWN]]
+    values = [(term.name, term.neighbour, term.value) for term in terms[:SHOWN]]
     if more := terms[SHOWN:]:
-        rest = sum(term.value for term in more)
-        rows.append((f"{len(more)} further terms", "", _signed(rest), _share(rest, step)))
-    limits = f"limits {step.low:g} to {step.high:g}"
-    rows.append((limits, "", _signed(step.limits), _share(step.limits, step)))
-    rows.append(("step", "", _signed(step.step), _share(step.step, step)))
+        values.append((f"{len(more)} further terms", "", sum(term.value for term in more)))
+    values += [(f"limits {step.low:g} to {step.high:g}", "", step.limits), ("step", "", step.step)]
+    rows = tuple((name, source, _signed(value), _share(value, step)) for name, source, value in values)
     note: list[RenderableType] = []
     if side:
         note = [Text(f"its inverter is saturated: it {_SIDES[side]}", style="yellow")]
@@ -139,7 +128,7 @@ def _step(title: str, step: QuantityStep, base: float, unit: str, side: int) -> 
         note.append(Text(f"at its {'upper' if step.after >= step.high else 'lower'} limit", style="yellow"))
     return [
         Text.assemble((title, "bold"), f"  {ends}"),
-        _table(("term", "from", "pu", "of the step"), tuple(rows), left=(0, 1)),
+        _table(("term", "from", "pu", "of the step"), rows, left=(0, 1)),
         *note,
     ]
 
@@ -164,18 +153,10 @@ def _trail(quantity: Quantity, steps: Sequence[TrailStep]) -> Iterator[Renderabl
     rows = []
     for each in steps:
         of = None if each.step is None else getattr(each.step, quantity)
+        ends = ("-", "-") if of is None else (f"{of.after:.6f}", _signed(of.step))
         largest = "-" if each.largest is None else f"{each.largest.name} {_signed(each.largest.value)}"
-        source = each.largest.neighbour if each.largest is not None else ""
-        rows.append(
-            (
-                f"{each.decision.t:.2f}",
-                each.decision.agent,
-                "-" if of is None else f"{of.after:.6f}",
-                "-" if of is None else _signed(of.step),
-                largest,
-                each.end if each.end else f"from {source}",
-            )
-        )
+        source = "" if each.largest is None else f"from {each.largest.neighbour}"
+        rows.append((f"{each.decision.t:.2f}", each.decision.agent, *ends, largest, each.end or source))
     yield _table(("t s", "agent", f"{quantity} pu", "step pu", "largest term pu", ""), tuple(rows), left=(1, 4, 5))
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from math import isfinite
@@ -19,12 +18,9 @@ TOLERANCE = 1e-12
 
 @dataclass(frozen=True, kw_only=True)
 class QuantityStep:
-    """The step of one set-point (pu of the own rating)."""
-
     before: float
     after: float
     terms: tuple[Term, ...]
-    """Terms of the law, before its limits."""
     limits: float
     """Part that the limits of the law add, so that the set-point stays within them; 0 where they do not act."""
     low: float
@@ -58,27 +54,28 @@ def law_step(record: RunRecord, decision: RecordedDecision) -> LawStep | None:
         return None
     choice = decision.config.control.law
     if choice.command or choice.fmu:
-        return _whole_step(decision, f"the law is {choice.name}, which is not started for an explanation")
+        return _parts(decision, None, f"the law is {choice.name}, which is not started for an explanation")
     try:
         law = make_law(decision.config.control)
     except ValueError as error:
-        return _whole_step(decision, f"the law cannot be made here: {error}")
+        return _parts(decision, None, f"the law cannot be made here: {error}")
     problem = "computed again, the law makes another step: it is not the law of the run, or its memory is older"
     with closing(law):
-        for since_start in (False, True) if _has_no_memory(law) else (True,):
-            inputs = _since_start(record, decision) if since_start else (decision,)
+        has_no_memory = type(law).start is Law.start
+        for since_start in (False, True) if has_no_memory else (True,):
+            decisions = _since_start(record, decision) if since_start else (decision,)
             try:
-                step = _parts(decision, *_computed_again(law, inputs))
-            except ANYTHING as error:  # the law, and what it returns, is anybody's code
+                law.start(decisions[0].own)
+                for each in decisions[:-1]:
+                    law.step(each.own, each.neighbours_used, each.T)
+                inputs = decision.own, decision.neighbours_used, decision.T
+                step = _parts(decision, law.terms(*inputs), result=law.step(*inputs))
+            except ANYTHING as error:  # the law, and its answer, is anybody's code
                 problem = f"computed again, the law raised {named(error)}"
                 continue
             if max(abs(step.P_set.rest), abs(step.V_set.rest)) <= TOLERANCE:
                 return step
-    return _whole_step(decision, problem)
-
-
-def _has_no_memory(law: Law) -> bool:
-    return type(law).start is Law.start
+    return _parts(decision, None, problem)
 
 
 def _since_start(record: RunRecord, decision: RecordedDecision) -> tuple[RecordedDecision, ...]:
@@ -97,58 +94,30 @@ def _since_start(record: RunRecord, decision: RecordedDecision) -> tuple[Recorde
         back *= 4.0
 
 
-def _computed_again(law: Law, decisions: Sequence[RecordedDecision]) -> tuple[Terms | None, SetPoints]:
-    law.start(decisions[0].own)
-    for each in decisions[:-1]:
-        law.step(each.own, each.neighbours_used, each.T)
-    last = decisions[-1]
-    inputs = last.own, last.neighbours_used, last.T
-    terms = law.terms(*inputs)
-    return terms, law.step(*inputs)
+def _parts(
+    decision: RecordedDecision, terms: Terms | None, problem: str = "", result: SetPoints | None = None
+) -> LawStep:
+    """Return the parts of a step: the terms, and the change by the limits of their sum.
 
-
-def _parts(decision: RecordedDecision, terms: Terms | None, result: SetPoints) -> LawStep:
-    """Return the parts of a step: the terms, and what the limits make of their sum."""
-    own = decision.own
+    Without terms it is one term: the step of a `result`, or the recorded one.
+    """
+    own, config = decision.own, decision.config
+    after = SetPoints(decision.after[0] / config.P_rated, decision.after[1] / config.V_nom)
     if terms is None:
-        terms = Terms((Term("step", result.P_set - own.P_set),), (Term("step", result.V_set - own.V_set),))
-    sums = [sum(_finite(term.value) for term in each) for each in terms]
-    limits = limits_of(decision.config.control)
-    parts = []
-    for name, before, change, of in zip(
-        ("P_set", "V_set"), (own.P_set, own.V_set), sums, (terms.P_set, terms.V_set), strict=True
-    ):
-        low, high = limits[f"{name}_min"], limits[f"{name}_max"]
-        wanted = before + change
-        parts.append(
-            QuantityStep(
-                before=before,
-                after=_after(decision)[name],
-                terms=tuple(of),
-                limits=min(max(wanted, low), high) - wanted,
-                low=low,
-                high=high,
-            )
+        end = result or after
+        terms = Terms((Term("step", end.P_set - own.P_set),), (Term("step", end.V_set - own.V_set),))
+    limits, parts = limits_of(config.control), {}
+    for name, of in zip(("P_set", "V_set"), terms, strict=True):
+        if wrong := [term.value for term in of if not isfinite(term.value)]:
+            raise ValueError(f"a term is {wrong[0]}; it must be a finite number (pu)")
+        low, high, before = limits[f"{name}_min"], limits[f"{name}_max"], getattr(own, name)
+        wanted = before + sum(term.value for term in of)
+        parts[name] = QuantityStep(
+            before=before,
+            after=getattr(after, name),
+            terms=tuple(of),
+            limits=min(max(wanted, low), high) - wanted,
+            low=low,
+            high=high,
         )
-    return LawStep(P_set=parts[0], V_set=parts[1])
-
-
-def _finite(value: float) -> float:
-    if not isfinite(value):
-        raise ValueError(f"a term is {value}; it must be a finite number (pu)")
-    return value
-
-
-def _after(decision: RecordedDecision) -> dict[str, float]:
-    P_set, V_set = decision.after
-    return {"P_set": P_set / decision.config.P_rated, "V_set": V_set / decision.config.V_nom}
-
-
-def _whole_step(decision: RecordedDecision, problem: str) -> LawStep:
-    """Return a step as one term, from the record alone."""
-    own, after = decision.own, _after(decision)
-    result = SetPoints(after["P_set"], after["V_set"])
-    step = _parts(
-        decision, Terms((Term("step", result.P_set - own.P_set),), (Term("step", result.V_set - own.V_set),)), result
-    )
-    return LawStep(P_set=step.P_set, V_set=step.V_set, problem=problem)
+    return LawStep(**parts, problem=problem)

@@ -28,7 +28,6 @@ WORDS = {
     "quiet": "not sent to neighbours: its law saw no need",
     "idle": "idle: its agent is paused, or without a measurement",
 }
-"""Fates of a state that was not heard: netem's reasons, and our own."""
 
 Fates = Mapping[tuple[str, int], list[tuple[float, Outcome]]]
 """Verdicts by sender and number: when the message was sent (s of run time), and its outcome."""
@@ -50,7 +49,6 @@ def verdicts(record: RunRecord, agent: str, since: float, until: float) -> Fates
 
 
 def rejections(record: RunRecord, agent: str, since: float, until: float) -> Rejections:
-    """Return the messages on each neighbour's key that an agent rejected."""
     found: dict[str, list[tuple[int, str, int]]] = {}
     for entry in record.entries(agent, since=since, until=until):
         match entry:

@@ -37,7 +37,6 @@ def laplacian(inverters: InverterGroup) -> Floats:
 
 
 def groups(inverters: InverterGroup) -> tuple[tuple[str, ...], ...]:
-    """Return the connected parts of the graph of those that run the law, in the order of the names."""
     acting = [name for name, acts in zip(inverters.names, inverters.acts.tolist(), strict=True) if acts]
     count, label = connected_components(inverters.A[np.ix_(inverters.acts, inverters.acts)], directed=False)
     return tuple(tuple(name for name, of in zip(acting, label.tolist(), strict=True) if of == k) for k in range(count))
@@ -69,7 +68,6 @@ class Modes:
 
 
 def settling(rate: float) -> float:
-    """Return the time (s) in which a mode falls to 2 %; infinite when it does not fall."""
     return math.inf if rate <= ZERO else SETTLING / rate
 
 
@@ -107,7 +105,6 @@ def modes(inverters: InverterGroup) -> Modes:
 
 
 def _zeroed(value: float) -> float:
-    """Return an eigenvalue without the rounding that makes 0 a little more or less."""
     return 0.0 if abs(value) < ZERO else float(value)
 
 

@@ -20,8 +20,6 @@ from gridpeers.scenarios.schema.participants import inverters_of, without_agent
 
 @dataclass(frozen=True, kw_only=True)
 class InverterGroup:
-    """N inverters that share one frequency."""
-
     names: tuple[str, ...]
     """Order of all arrays."""
     GFM: Flags
@@ -64,7 +62,6 @@ class InverterGroup:
 
     @property
     def gfl(self) -> tuple[GflParameters, ...]:
-        """Parameters of its grid-following inverters, in their order."""
         return tuple(it for it in self.parameters if isinstance(it, GflParameters))
 
     @property
@@ -81,7 +78,6 @@ class InverterGroup:
 
     @property
     def kappa(self) -> Floats:
-        """Rates m_p / k_p (1/s)."""
         return self.m_p / self.gains.k_p
 
     @property

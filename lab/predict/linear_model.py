@@ -55,10 +55,7 @@ class Ticks:
 
 @dataclass(frozen=True)
 class Path:
-    """Frequency, powers and set-points at the ticks after the load's step."""
-
     t: Floats
-    """Time since the step (s)."""
     e: Floats
     """Frequency error (pu)."""
     power: Floats
@@ -69,8 +66,6 @@ class Path:
 
 @dataclass(kw_only=True)
 class _Delays:
-    """Ticks, spread out; rows are receivers."""
-
     link: list[list[int]]
     measurement: list[int]
     setpoint: list[int]
@@ -83,8 +78,6 @@ class _Delays:
 
 @dataclass(frozen=True, kw_only=True)
 class Loop:
-    """Law and plant of some inverters under given delays."""
-
     inverters: InverterGroup
     ticks: Ticks = field(default_factory=Ticks)
     plant: PlantModel = "lagged"
@@ -117,7 +110,6 @@ class Loop:
 
     @property
     def _heard(self) -> Floats:
-        """Links that carry something, without those that are muted."""
         if not self.muted:
             return self.inverters.heard
         return np.where(np.array(self._delays.link) < self.muted, self.inverters.heard, 0.0)
@@ -179,12 +171,10 @@ class Loop:
 
     @property
     def matrix(self) -> Floats:
-        """Map of the state of one tick to that of the next, the constant load last in it."""
         return self._built[0]
 
     @cached_property
     def free_map(self) -> Floats:
-        """The map without its constants: the load, and inverters that do not run the law."""
         matrix = self.matrix
         frozen = np.zeros(matrix.shape[0], bool)
         frozen[-1] = True

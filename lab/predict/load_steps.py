@@ -22,8 +22,6 @@ from gridpeers.scenarios.schema.participants import inverters_of
 
 @dataclass(frozen=True, kw_only=True)
 class IslandStep:
-    """One island after one event."""
-
     label: str
     t_s: float
     roster: tuple[str, ...]

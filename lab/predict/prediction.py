@@ -43,7 +43,6 @@ LIMITS: dict[DelayKind, str] = {
 }
 
 WIDTH = 100
-"""Columns of the text."""
 
 
 def predict(scenario: Scenario | str | Path, case: str, *, voltage: bool = True) -> Prediction:
@@ -70,7 +69,6 @@ def predict(scenario: Scenario | str | Path, case: str, *, voltage: bool = True)
 
 
 def predictions(spec: ScenarioModel, feeder: Feeder, *, voltage: bool) -> dict[str, Prediction]:
-    """Predict all cases of a scenario; the plant is asked once for its loads."""
     others = {case: law.name for case in spec.cases if (law := law_of(spec, case)).name != PAPER}
     if others:
         raise ScenarioError(
@@ -104,7 +102,6 @@ class Prediction:
         plant: VarResponse | None,
     ) -> None:
         self.title = title
-        """Scenario and case."""
         self._inverters, self._islands, self._plant = inverters, islands, plant
 
     @property
@@ -170,7 +167,6 @@ class Prediction:
         return found
 
     def __str__(self) -> str:
-        """Return the text that the command `gridpeers predict` prints."""
         if not self._has_law:
             words = "No secondary control: no modes, no limits of delay. Droop alone decides, at once: `gridpeers run`."
             return "\n".join([self.title, *_wrapped(words)])
@@ -185,7 +181,6 @@ class Prediction:
         return f"<Prediction {self.title}>"
 
     def _rows(self) -> list[tuple[str, str, str, str]]:
-        """Return quantity, by the continuous law, by ours in discrete time, meaning."""
         inverters, found = self._inverters, modes(self._inverters)
         loop, T_c = Loop(inverters=inverters), inverters.T_c
         slowest = settling_in_ticks(loop.spectral_radius, T_c) if loop.stable else math.inf

@@ -54,7 +54,6 @@ class Response:
 
 
 def response(inverters: InverterGroup, plant: PlantModel = "lagged") -> Response:
-    """Return the plant of some inverters, over one control period with set-points held."""
     if not inverters.GFM.any():
         raise ValueError(f"no GFM among {', '.join(inverters.names)}: their island has no voltage; give it one")
     return _quasi_steady(inverters) if plant == "quasi-steady" else _lagged(inverters)

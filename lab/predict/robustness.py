@@ -24,12 +24,9 @@ EXACT = 16
 """Most agents for which all pairs of sets are tried: 3^16 pairs, by a recursion over 2^16 sets."""
 
 _BELOW = 1e-9
-"""By how much an eigenvalue may be too large."""
 
 
 class Robustness(NamedTuple):
-    """Bounds of r, equal where it is exact."""
-
     least: int
     most: int
 

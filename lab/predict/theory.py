@@ -48,7 +48,6 @@ def feeder_of(spec: ScenarioModel) -> Feeder:
 
 
 def without_faults(spec: ScenarioModel) -> ScenarioModel:
-    """Return a scenario whose links do nothing to messages."""
     return replace(spec, netem=Netem())
 
 

@@ -25,7 +25,6 @@ from gridpeers.scenarios.results.metrics import F_BAND, MPSI_BAND
 Key = TypeVar("Key")
 
 HORIZON = 120.0
-"""Longest time (s) for which a step is followed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,11 +51,9 @@ class Times:
     """Until MPSI < 0.01 for good."""
     stable: bool
     note: str = ""
-    """In words, why a time is None; empty if none is."""
 
     @property
     def report_s(self) -> float | None:
-        """The report's "restored in" (s): both for good."""
         both = self.restore_s, self.share_s
         return None if both[0] is None or both[1] is None else max(both[0], both[1])
 

@@ -58,7 +58,6 @@ class VarResponse:
     """How q and v of each inverter (row) answer to a pulse of V_set of each (column), at the ticks 1, 2, ... after."""
 
     names: tuple[str, ...]
-    """Order of rows and columns."""
     q: Floats
     """pu per pu, shape (K, N, N)."""
     v: Floats
@@ -162,7 +161,6 @@ def _factors(inverters: InverterGroup) -> tuple[Floats, Floats]:
 
 
 def _mean_of_neighbours(inverters: InverterGroup) -> Floats:
-    """Return D^-1 A of those that run the law."""
     return np.asarray(inverters.heard / np.maximum(inverters.degree, 1.0)[:, None])
 
 

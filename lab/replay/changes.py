@@ -40,8 +40,6 @@ Entry = TypeVar("Entry", Fault, Partition)
 
 @dataclass(frozen=True, kw_only=True)
 class Changes:
-    """Changes that somebody asks for."""
-
     without: tuple[str, ...] = ()
     """Links that are cut, as patterns: "inv4 -> inv7"."""
     without_loss: bool = False
@@ -50,9 +48,7 @@ class Changes:
     law: str = ""
     """Another law; "" keeps that of the record."""
     keys: Mapping[str, Any] = field(default_factory=dict)
-    """Values of further keys of the scenario, by their paths."""
     since: float = 0.0
-    """From when on (s of run time)."""
 
     def __bool__(self) -> bool:
         return bool(self.without or self.without_loss or self.without_link_commands or self.law or self.keys)
@@ -218,7 +214,6 @@ def lossless(fault: Fault) -> Fault | None:
 
 
 def without_loss(netem: Netem) -> Netem:
-    """Return faults without the loss of each; those that were loss alone are gone."""
     links = (lossless(fault) for fault in netem.links)
     return replace(netem, links=tuple(fault for fault in links if fault is not None))
 
@@ -247,14 +242,12 @@ def _spliced(before: tuple[Entry, ...], after: tuple[Entry, ...], since: float) 
 
 
 def _with_links(scenario: ScenarioModel, case: str, netem: Netem) -> ScenarioModel:
-    """Return a scenario whose case has all faults of links, with their times, as entries of its own."""
     common = replace(scenario.netem, links=(), partitions=())
     own = replace(scenario.cases[case].netem, links=netem.links, partitions=netem.partitions)
     return replace(scenario, netem=common, cases={case: replace(scenario.cases[case], netem=own)})
 
 
 def _setup(record: RunRecord, scenario: ScenarioModel, feeder: Feeder, netem: Netem) -> dict[str, Any]:
-    """Return the configuration of the links, with the faults of nodes as they were."""
     was = record.info.plant.links
     setup = EmulationConfig.of_tree(was) if was else setup_of(netem, scenario, feeder, real_nodes=True)
     nodes = setup.netem.nodes if was else ()

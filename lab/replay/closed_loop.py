@@ -78,7 +78,6 @@ _CALL, _ARRIVAL = 0, 1
 """Order of calls at the same time: processes that share a session send before they hear."""
 
 _NOT_YET = Message("", b"not yet")
-"""In place of a message that its sender is yet to send."""
 
 
 class LoopProcess:
@@ -87,17 +86,13 @@ class LoopProcess:
     def __init__(self, recorded: RecordedProcess) -> None:
         self.recorded, self.name = recorded, recorded.name
         self.again: ReplayedProcess | None = None
-        """None before its start."""
         self.config: AgentConfig | None = None
-        """Of an agent that was made again."""
         self._steps: Iterator[RecordedStep] = recorded.steps()
         self.head: RecordedStep | None = next(self._steps, None)
-        """Its next call; None at its end."""
         self._sent: dict[str, int] = {}
 
     @property
     def agent(self) -> RealtimeAgent | None:
-        """Its node, if it is an agent that was made again."""
         return self.again.node if self.again is not None and isinstance(self.again.node, RealtimeAgent) else None
 
     def next(self) -> None:
@@ -127,7 +122,6 @@ class ClosedLoop:
     ) -> None:
         self._record, self._rule, self._take, self._make_plant = record, rule, take, make_plant
         self._changed = rule is not None and rule.changes.since <= 0.0
-        """The change is made."""
         self._laws: list[Law] = []
         self._processes: dict[tuple[str, int], LoopProcess] = {}
         self._due: list[tuple[float, int, int, LoopProcess, Message | None]] = []
@@ -137,15 +131,11 @@ class ClosedLoop:
         """Messages that were sent in the replay, by stream, epoch and number, and when."""
         self._delays = LinkDelays()
         self._statuses: dict[str, deque[Message]] = {}
-        """Latest statuses of each agent, by key."""
         self._listens = _listeners(record)
         self._lost = frozenset(_lost(record)) if rule is not None and rule.changes.without_loss else frozenset()
         self._number = -1
-        """Number of the last telemetry."""
         self._t = 0.0
-        """Run time of the plant (s)."""
         self.notes: list[str] = []
-        """Sentences on what the replay leaves out."""
 
     def run(self) -> None:
         info = self._record.info
@@ -250,7 +240,6 @@ class ClosedLoop:
     # ---------------------------------------------------------------- the change
 
     def _change_if_due(self, plant: RealtimePlant, step: RecordedStep) -> None:
-        """Make the change before the plant measures at its time."""
         rule = self._rule
         if rule is None or self._changed or not isinstance(step.entry, WakeUp) or step.entry.work:
             return
@@ -362,7 +351,6 @@ class ClosedLoop:
 
 
 def _listeners(record: RunRecord) -> dict[str, frozenset[str]]:
-    """Return the in-neighbours of each agent in the record, if all agents were there."""
     nameplates = {config.name: nameplate_of(config) for config in record.info.agents}
     found = {}
     for config in record.info.agents:

@@ -45,7 +45,6 @@ MISSING = (
     "-: no number: not steady at the end of the window, or never restored (f, and MPSI where it counts); metrics.json "
     "has the reasons. Where there are several islands, each shares for itself and has rows of its own"
 )
-"""Line below a table in which numbers are missing."""
 
 
 def counterfactual(
@@ -161,7 +160,6 @@ class Counterfactual:
 
     @cached_property
     def table(self) -> pd.DataFrame:
-        """Metrics of both and their difference, a row per (window, metric)."""
         return self._comparison.table
 
     @property
@@ -223,7 +221,6 @@ def _in_simulated_time(record: RunRecord, rule: ChangedRule, take: Take) -> list
 
 
 def _as_recorded(record: RunRecord, folder: Path, until: float) -> Recorded:
-    """Write the rows of a record up to a time (s) as the driver did."""
     with Recorder(folder, gaps=True) as recorder:
         for message in record.telemetry():
             rows = tuple(row for row in message.rows if row[0] <= until + 1e-9)

@@ -31,7 +31,6 @@ BLUE, GREEN, ORANGE = STYLES[0][0], STYLES[2][0], OTHER_STYLES[1][0]
 
 
 def counterfactual_figure(was: Drawing, would_be: Drawing, words: str, since: float) -> Figure:
-    """Draw two runs, each with one history of the same inverters."""
     with mpl.rc_context(PAGE):
         figure = Figure(figsize=(7.4, 6.4), layout="constrained")
         top, middle, bottom = figure.subplots(3, 1, sharex=True)

@@ -30,7 +30,6 @@ class Recomputed(NamedTuple):
 
     @property
     def agrees(self) -> bool:
-        """Both states have the same bytes."""
         return encode(self.decision.state) == encode(self.state)
 
 

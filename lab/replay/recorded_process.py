@@ -28,7 +28,6 @@ CALLS = ("start", "session", "leave")
 """Kinds of process events that are calls of the node; the others say what it did."""
 
 Input = Token | MessageReference | ReceivedMessage | RejectedCount | WakeUp | ProcessEvent
-"""An entry that is a call of the node."""
 
 
 class ReplayError(ValueError):
@@ -53,8 +52,6 @@ def tick_message(message: Message | SentMessage | ReceivedMessage) -> State | Me
 
 
 class RecordedStep(NamedTuple):
-    """One call of a node."""
-
     due: float
     """When it was called (s, monotonic): a message waits from its arrival until the calls before are done."""
     entry: Input
@@ -71,7 +68,6 @@ class RecordedStep(NamedTuple):
 
     @property
     def instance(self) -> str:
-        """Instance of the process, if this is its start."""
         entry = self.entry
         return entry.text.rpartition(" ")[2] if isinstance(entry, ProcessEvent) and entry.kind == "start" else ""
 
@@ -85,7 +81,6 @@ class RecordedProcess:
         """Why its steps end before the process did; "" as far as that is not known."""
 
     def steps(self) -> Iterator[RecordedStep]:
-        """Yield its calls, in their order."""
         held: tuple[float, Input, float] | None = None
         sent: list[SentMessage] = []
         due = -inf
@@ -139,7 +134,6 @@ class JournalParts:
         self.of = lru_cache(maxsize=16)(self._of)
 
     def _of(self, number: int) -> dict[tuple[str, int], list[tuple[Journal, list[Entry]]]]:
-        """Return the journals in one part of the file, by name and epoch of their process."""
         found: dict[tuple[str, int], list[tuple[Journal, list[Entry]]]] = {}
         for journal, entry in self.index.part(number).entries:
             parts = found.setdefault((journal.sender, journal.epoch), [])
@@ -149,7 +143,6 @@ class JournalParts:
         return found
 
     def processes(self) -> Iterator[RecordedProcess]:
-        """Yield all processes, in the order in which their journals begin."""
         first: dict[tuple[str, int], tuple[int, float]] = {}
         for number in range(self.count):
             for record in self.index.file.part(number):

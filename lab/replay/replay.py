@@ -53,7 +53,6 @@ TOLERANCE = 1e-9
 """Largest difference of two numbers that count as the same, in their units: set-points in W and V."""
 
 UNITS = {"P": "W", "Q": "var", "V": "V", "f": "Hz", "P_set": "W", "V_set": "V", "t": "s"}
-"""Units of the fields of measurements and states."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,11 +60,9 @@ class ReplayedPart:
     """The replay of one process, or of the plant's physics."""
 
     name: str
-    """The agent, or "plant"."""
     count: int
     """Number of states of an agent, or of rows of the plant, that were compared."""
     t_end: float
-    """Run time of the last of them (s)."""
     difference: Difference | None
     note: str = ""
     """Why not everything was compared; "" if it was."""
@@ -76,7 +73,6 @@ class Replay:
     """A record beside its replay."""
 
     parts: tuple[ReplayedPart, ...]
-    """The plant, then each process of an agent."""
 
     @property
     def difference(self) -> Difference | None:
@@ -137,7 +133,6 @@ class Difference(NamedTuple):
     recorded: Any
     replayed: Any
     unit: str = ""
-    """Unit of both; "" if they have none."""
 
     def __str__(self) -> str:
         unit = f" {self.unit}" if self.unit else ""
@@ -149,7 +144,6 @@ class Difference(NamedTuple):
 
 
 def same(a: Any, b: Any) -> bool:
-    """Return whether two values are the same, numbers within `TOLERANCE`."""
     if isinstance(a, float) and isinstance(b, float):
         return a == b or abs(a - b) <= TOLERANCE or (isnan(a) and isnan(b))
     if isinstance(a, dict) and isinstance(b, dict):
@@ -297,7 +291,6 @@ class ComparedRows:
         self._numbers = -1
         self.count, self.t = 0, 0.0
         self.difference: Difference | None = None
-        """The first difference; None so far."""
 
     def take(self, message: AnyMessage) -> None:
         """Compare the rows of telemetry that come again; some may be missing in the record."""

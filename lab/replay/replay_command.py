@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 
 CHANGES = "--without, --without-loss, --without-link-commands, --law or --set"
-"""Options that change something, in words."""
 
 
 def replay(
@@ -102,7 +101,6 @@ def _key_and_value(text: str) -> tuple[str, Any]:
 
 
 def _replay(record: RunRecord, since: float, out: Path | None) -> bool:
-    """Replay a record and print what came of it; return whether something differs."""
     if since:
         fail([f"--from {since:g}: nothing is changed from then on; give {CHANGES}"], BAD_INPUT)
     if out is not None:
@@ -139,7 +137,6 @@ def _tell_notes(notes: Iterable[str]) -> None:
 
 
 def _counterfactual(record: RunRecord, changes: Changes, out: Path | None) -> bool:
-    """Run a counterfactual, print its table, write its folder; return whether it differs before, or a law failed."""
     require({"matplotlib": "the figure", "pandas": "the table"})
 
     from datetime import datetime

@@ -25,7 +25,6 @@ from gridpeers.wire.messages import PLANT
 from gridpeers.wire.node import Loss
 
 MakePlant = Callable[[PlantConfig], LivePlant]
-"""Starts the plant of a configuration."""
 
 
 class _Outbox:
@@ -61,7 +60,6 @@ class ReplayedProcess:
         node.traffic = self._sent
 
     def use_links(self, links: Links) -> None:
-        """Put emulated links before a node that has none."""
         self.links = links
         self.node.use_links(links)
 
@@ -152,7 +150,6 @@ def recorded_links(info: RecordInfo, name: str) -> Links | None:
 
 
 def start_plant_of(info: RecordInfo, make_plant: MakePlant) -> LivePlant:
-    """Start the plant of a run."""
     try:
         return make_plant(info.plant)
     except (ValueError, RuntimeError, OSError) as error:

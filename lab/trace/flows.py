@@ -14,16 +14,12 @@ from gridpeers.wire.messages import PLANT, Measurement, State
 
 
 class Flow(NamedTuple):
-    """One message on its way to one receiver; each copy of an emulated link is one of its own."""
+    """One message on its way to one receiver, with run times (s); each copy of an emulated link is one of its own."""
 
     sent: float
-    """When it was sent (s of run time)."""
     src: str
-    """Name of its sender."""
     dst: str
-    """Name of its receiver."""
     number: int
-    """Its number."""
     arrived: float | None
     """When it arrived (s of run time); None if it never did."""
     fate: str = ""
@@ -32,7 +28,6 @@ class Flow(NamedTuple):
 
     @property
     def is_lost(self) -> bool:
-        """Whether it never arrived."""
         return self.arrived is None
 
 
@@ -71,7 +66,6 @@ def _judged(src: str, dst: str, number: int, t: float, outcome: Outcome, least: 
 
 
 def _implied(record: RunRecord, since: float, until: float) -> Iterator[Flow]:
-    """Yield the messages of simulated time without emulated links."""
     T = record.info.T_c
     for agent in record.agents:
         last: dict[str, tuple[int, int]] = {}
@@ -90,31 +84,20 @@ def _implied(record: RunRecord, since: float, until: float) -> Iterator[Flow]:
 
 
 def _noted(record: RunRecord, since: float, until: float) -> Iterator[Flow]:
-    """Yield the messages of wall-clock time as their receivers noted them; clocks of one host agree."""
-    sent = _sent_at(record, since, until)
-    for receiver in (*record.agents, PLANT):
-        for message in record.heard(receiver, since=since, until=until):
-            if message.kind not in _KINDS:
-                continue
-            begun = sent.get((message.key, message.epoch, message.number))
-            way = 0.0 if begun is None or message.at is None else max(0.0, message.at - begun)
-            speed = record.info.agents[0].speed if record.info.agents else 1.0
-            yield Flow(message.t, message.sender, receiver, message.number, message.t + way * speed, message.rejected)
-
-
-def _sent_at(record: RunRecord, since: float, until: float) -> dict[tuple[str, int, int], float]:
-    """Return when measurements and states were sent (s, monotonic), by key, epoch and number.
-
-    The journals of their senders tell: the plant notes states too, but not when they were sent.
-    """
-    found = {}
-    for sender in (*record.agents, PLANT):
+    """Yield the messages of real time as their receivers noted them; clocks of one host agree."""
+    everybody = (*record.agents, PLANT)
+    sent = {}  # when (s, monotonic), by the journal of the sender: the plant notes states too, but not when
+    for sender in everybody:
         for entry in record.entries(sender, since=since, until=until):
             if isinstance(entry, SentMessage) and entry.at is not None and kind_of(entry.key) in EACH_TICK:
                 message = sound(entry.payload)
                 if message is not None:
-                    found[entry.key, message.epoch, message.seq] = entry.at
-    return found
-
-
-_KINDS = (State.__name__, Measurement.__name__)
+                    sent[entry.key, message.epoch, message.seq] = entry.at
+    speed = record.info.agents[0].speed if record.info.agents else 1.0
+    for receiver in everybody:
+        for heard in record.heard(receiver, since=since, until=until):
+            if heard.kind not in (State.__name__, Measurement.__name__):
+                continue
+            begun = sent.get((heard.key, heard.epoch, heard.number))
+            way = 0.0 if begun is None or heard.at is None else max(0.0, heard.at - begun)
+            yield Flow(heard.t, heard.sender, receiver, heard.number, heard.t + way * speed, heard.rejected)

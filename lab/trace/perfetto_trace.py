@@ -17,9 +17,8 @@ import numpy as np
 
 from gridpeers.lab.trace.flows import Flow, flows
 from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.scenarios.results.history import Nameplates
-from gridpeers.scenarios.results.metrics import MPSI
 from gridpeers.scenarios.results.run_files import write_whole
+from gridpeers.scenarios.results.sharing_index import sharing_index
 from gridpeers.scenarios.short_texts import in_order
 from gridpeers.wire.messages import PLANT
 
@@ -31,8 +30,6 @@ _SEQUENCE = 1
 
 
 class PerfettoTrace:
-    """Collect the packets of a trace, and write them in the order of time."""
-
     def __init__(self) -> None:
         from perfetto.protos.perfetto.trace import perfetto_trace_pb2 as protos
 
@@ -71,7 +68,6 @@ class PerfettoTrace:
         return event
 
     def counter(self, t: float, track: int, value: float) -> None:
-        """Add a value of a counter."""
         if isfinite(value):
             event = self._packet(t, 1).track_event
             event.type, event.track_uuid = self._protos.TrackEvent.TYPE_COUNTER, track
@@ -131,7 +127,6 @@ def _add_messages(trace: PerfettoTrace, found: list[Flow], T_c: float) -> int:
 
 
 def _add_cuts(trace: PerfettoTrace, found: list[Flow], T_c: float) -> None:
-    """Add a slice to each link for each time in which it let nothing pass."""
     by_link: dict[tuple[str, str], list[Flow]] = {}
     for flow in found:
         by_link.setdefault((flow.dst, flow.src), []).append(flow)
@@ -145,7 +140,6 @@ def _add_cuts(trace: PerfettoTrace, found: list[Flow], T_c: float) -> None:
 
 
 def _add_physics(trace: PerfettoTrace, record: RunRecord) -> None:
-    """Add f and P of each inverter, and MPSI of the agents' inverters, as counters."""
     history = record.physics()
     rated = {config.name: config.P_rated for config in record.info.agents}
     present = [name for name in history.inverters if name in rated]
@@ -155,24 +149,9 @@ def _add_physics(trace: PerfettoTrace, record: RunRecord) -> None:
         for row, t in enumerate(history.t):
             trace.counter(float(t), f, float(history.f[row, column]))
             trace.counter(float(t), P, float(history.P[row, column]) / rated[name])
-    indices = MPSI(history, _nameplates(record, history.inverters))
+    configs = [record.info.agent(name) for name in history.inverters]
+    s, m_p = (np.array([getattr(c, key, 1.0) for c in configs]) for key in ("P_rated", "m_p"))
+    shares = np.array([c is not None for c in configs], bool)
     track = trace.track("run", "MPSI", unit="pu")
-    for t, value in zip(history.t, indices, strict=True):
+    for t, value in zip(history.t, sharing_index(history.P, s, m_p, history.present & shares), strict=True):
         trace.counter(float(t), track, float(value))
-
-
-def _nameplates(record: RunRecord, inverters: tuple[str, ...]) -> Nameplates:
-    """Return the nameplates of the columns of a history; inverters without an agent do not count in the indices."""
-    configs = [record.info.agent(name) for name in inverters]
-    numbers = np.array(
-        [(1.0, 1.0, 1.0, 1.0) if c is None else (c.P_rated, c.V_nom, c.m_p, c.m_q) for c in configs], float
-    ).reshape(-1, 4)
-    return Nameplates(
-        names=inverters,
-        GFM=np.array([c is not None and c.kind == "GFM" for c in configs], bool),
-        s=numbers[:, 0],
-        V_nom=numbers[:, 1],
-        m_p=numbers[:, 2],
-        m_q=numbers[:, 3],
-        shares=np.array([c is not None for c in configs], bool),
-    )

@@ -18,13 +18,11 @@ REACH = 0.6
 """Part of the way to its receiver at which a lost message ends."""
 
 WIDTH, ROW = 7.4, 0.38
-"""Width of the figure, and height of a time axis (inches)."""
 
 
 def space_time_diagram(
     flows: Sequence[Flow], nodes: Sequence[str], since: float, until: float, usual: float, title: str
 ) -> Figure:
-    """Draw the messages between some nodes."""
     place = {name: -i for i, name in enumerate(nodes)}
     shown = [flow for flow in flows if flow.src in place and flow.dst in place]
     with mpl.rc_context(PAGE):
@@ -61,7 +59,6 @@ def space_time_diagram(
 
 
 def _end(flow: Flow, place: dict[str, int], usual: float) -> tuple[float, float]:
-    """Return where the line of a message ends."""
     if flow.arrived is not None:
         return flow.arrived, place[flow.dst]
     return flow.sent + REACH * usual, place[flow.src] + REACH * (place[flow.dst] - place[flow.src])

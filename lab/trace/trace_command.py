@@ -89,7 +89,6 @@ def trace(
 
 
 def _draw(record: RunRecord, file: Path, since: float, until: float, agents: str) -> str:
-    """Draw the messages of a window; return how many."""
     from gridpeers.lab.trace.flows import flows
     from gridpeers.lab.trace.space_time_diagram import space_time_diagram
     from gridpeers.scenarios.results.plots.style import save
