@@ -8,9 +8,6 @@ from typing import Any, Literal
 import msgspec
 
 from gridpeers.netem.fault_schedule import Heal
-from gridpeers.netem.models.delay import Constant
-from gridpeers.netem.models.loss import Bernoulli
-from gridpeers.netem.models.medium import Cut
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.scenarios.emulation.link_data import EVERYTHING, LinkCommand
 from gridpeers.scenarios.live.run_address import RunAddress, UsageError, check_name
@@ -76,17 +73,16 @@ class PageAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
                 return ["load", self.subject, *chain.from_iterable(options)]
         return ["link", self.kind, self.subject, self.other]
 
+    def fault(self) -> dict[str, Any]:
+        """Return the entry of a scenario that does this to the link; without a model it only names it."""
+        value = {"cut": True, "delay": self.value, "loss": self.value}.get(self.kind)
+        return {"on": f"{self.subject} <-> {self.other}"} | ({} if value is None else {self.kind: value})
+
     def link_command(self) -> LinkCommand:
-        """Return what links are told."""
-        on = EVERYTHING if self.kind == "heal all" else f"{self.subject} <-> {self.other}"
-        match self.kind:
-            case "cut":
-                return LinkCommand(fault=Fault(on=on, cut=Cut()))
-            case "delay":
-                return LinkCommand(fault=Fault(on=on, delay=Constant(delay_s=self.value)))
-            case "loss":
-                return LinkCommand(fault=Fault(on=on, loss=Bernoulli(p=self.value)))
-        return LinkCommand(heal=Heal(on=on, from_s=0.0))
+        if self.kind in ("heal", "heal all"):
+            on = EVERYTHING if self.kind == "heal all" else self.fault()["on"]
+            return LinkCommand(heal=Heal(on=on, from_s=0.0))
+        return LinkCommand(fault=Fault(**self.fault()))
 
 
 def _exact(value: float) -> str:
@@ -156,26 +152,19 @@ def scenario_form(action: PageAction) -> str:
     on = "inv1 <-> inv4"
     loss = 0.25
     """
-    link: dict[str, Any] = {"on": f"{action.subject} <-> {action.other}"}
     match action.kind:
         case "open" | "close":
-            return _entry("event", {action.kind: [action.subject]})
+            keys: dict[str, Any] = {action.kind: [action.subject]}
         case "synchronise":
-            return _entry("event", {"close": [action.subject], "synchronised": True})
-        case "stop":
-            return _entry("event", {"leave": [action.subject]})
-        case "start":
-            return _entry("event", {"join": [action.subject]})
+            keys = {"close": [action.subject], "synchronised": True}
+        case "stop" | "start":
+            keys = {"leave" if action.kind == "stop" else "join": [action.subject]}
         case "load":
             given = {"factor": action.factor, "P_kW": action.P_kW, "Q_kvar": action.Q_kvar}
-            power = {key: value for key, value in given.items() if value is not None}
-            return _entry("event", {"load": {action.subject: power}})
-        case "cut":
-            return _entry("link", link | {"cut": True})
-        case "delay" | "loss":
-            return _entry("link", link | {action.kind: action.value})
-    return ""
-
-
-def _entry(table: str, keys: dict[str, Any]) -> str:
+            keys = {"load": {action.subject: {key: value for key, value in given.items() if value is not None}}}
+        case "heal" | "heal all":
+            return ""
+        case _:
+            keys = action.fault()
+    table = "link" if "on" in keys else "event"
     return "\n".join([f"[[{table}]]", *(f"{key} = {inline(value)}" for key, value in keys.items())])

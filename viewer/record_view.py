@@ -14,7 +14,6 @@ from math import cos, pi, sin
 from msgspec.structs import replace
 
 from gridpeers.plant.equipment import Feeder
-from gridpeers.plant.equipment.named_loads import set_power
 from gridpeers.plant.tables import FeederError, read_feeder
 from gridpeers.rooms import ROOMS
 from gridpeers.scenarios.emulation.link_data import NO_MESSAGES
@@ -35,6 +34,11 @@ WINDOW = 1.0
 
 AGE_STEP = 0.001
 """Step of the ages of links (s)."""
+
+_UNSEEN = {"phase": "running", "waits_for": "", "lateness": 0.0} | dict.fromkeys(
+    ("epoch", "seq", "received", "rejected", "lost", "ticks", "missed"), 0
+)
+"""Fields of a status that a record does not have."""
 
 _STILL = Pacing(steps=0, late=0, p50=0.0, p95=0.0, p99=0.0, worst=0.0, slipped=0.0)
 
@@ -144,17 +148,17 @@ class RecordView:
         positions = dict(self._switches)
         for event in self._until(t):
             name = self._by_name.get(event.subject) if event.kind == "switch" else None
-            if name is not None and (closed := _closed_after(event)) is not None:
-                positions[name] = closed
+            if name is not None and event.closed is not None:
+                positions[name] = event.closed
         return positions
 
     def _loads_at(self, t: float) -> dict[str, tuple[float, float]]:
         """Return real (W) and reactive power (var) of each load that has another one than in its table."""
         powers: dict[str, tuple[float, float]] = {}
         for event in self._until(t):
-            if event.kind == "load" and (power := _power_after(event)) is not None:
-                powers[event.subject] = power.real, power.imag
-        return {name: power for name, power in powers.items() if not _alike(power, self._tables.get(name))}
+            if event.kind == "load" and event.P is not None and event.Q is not None:
+                powers[event.subject] = event.P, event.Q
+        return {name: power for name, power in powers.items() if power != self._tables.get(name)}
 
     def _until(self, t: float) -> Iterator[PlantEvent]:
         self.events  # noqa: B018  reads them, if there are more
@@ -165,18 +169,8 @@ class RecordView:
         if last is None:
             return None
         inverters, row = last
-        message = Telemetry(
-            sender="plant",
-            epoch=1,
-            seq=0,
-            t=row[0],
-            inverters=inverters,
-            rows=(row,),
-            events=(),
-            final=False,
-            outcome="",
-            reproducible=False,
-        )
+        head = {"sender": "plant", "epoch": 1, "seq": 0, "t": row[0], "events": (), "outcome": ""}
+        message = Telemetry(**head, inverters=inverters, rows=(row,), final=False, reproducible=False)  # type: ignore[arg-type]  # its fields
         # a row holds until the next one: what the page takes for silence is a time of the wall clock
         view.telemetry(message, t if t - row[0] <= self._rows.longest_gap else row[0])
         return row[0]
@@ -187,7 +181,16 @@ class RecordView:
         T_c = self.record.info.T_c
         span = min(WINDOW, T_c * (int(t / T_c + 1e-6) + 1))  # in the first second: the periods that have begun
         span = max(T_c, span - self._moments.lost(t - span, t))
-        statuses = [_status(agent, sent[name], tuple(faults.get(name, ()))) for name, agent in agents.items()]
+        statuses = []
+        for name, agent in agents.items():
+            seen = {"island": agent.island, "neighbours": agent.neighbours, "ages": agent.ages, "used": agent.used}
+            about = {
+                "sender": name,
+                "t": max(0.0, agent.t),
+                "sent": sent[name],
+                "impaired": tuple(faults.get(name, ())),
+            }
+            statuses.append(AgentStatus(**_UNSEEN | seen | about))  # type: ignore[arg-type]  # its fields
         view.statuses(statuses, {name: sent[name] / span for name in agents}, t)
         for name in agents:
             if impaired := faults.get(name):
@@ -206,49 +209,6 @@ class RecordView:
             note = ""
         hears = one.hears if agent is None or agent.known else None
         return dataclasses.replace(one, received=None, sent=None, lost=None, hears=hears, note=note)
-
-
-def _status(agent: AgentMoment, sent: int, impaired: tuple[str, ...]) -> AgentStatus:
-    """Return what an agent would have published."""
-    return AgentStatus(
-        sender=agent.name,
-        epoch=1,
-        seq=0,
-        t=max(0.0, agent.t),
-        phase="running",
-        waits_for="",
-        island=agent.island,
-        neighbours=agent.neighbours,
-        ages=agent.ages,
-        used=agent.used,
-        received=0,
-        sent=sent,
-        rejected=0,
-        lost=0,
-        ticks=0,
-        missed=0,
-        lateness=0.0,
-        impaired=impaired,
-    )
-
-
-def _closed_after(event: PlantEvent) -> bool | None:
-    """Return whether a switch is closed after an event; None if that is not told."""
-    if event.closed is None and ("opened" in event.text or "closed" in event.text):  # a record of format 1: words alone
-        return "opened" not in event.text
-    return event.closed
-
-
-def _power_after(event: PlantEvent) -> complex | None:
-    """Return the power (VA) of a load after an event; None if that is not told."""
-    if event.P is None or event.Q is None:  # a record of format 1
-        return set_power(event.text)
-    return complex(event.P, event.Q)
-
-
-def _alike(power: tuple[float, float], other: tuple[float, float] | None) -> bool:
-    """Return whether two powers are the same, to the digits that words have."""
-    return other is not None and abs(complex(*power) - complex(*other)) <= 1e-5 * abs(complex(*other))
 
 
 def _missing(record: RunRecord, *, has_feeder: bool) -> Iterator[str]:
@@ -281,15 +241,11 @@ def inverter_ring(info: RecordInfo) -> FeederMap:
 
     names = sorted(info.inverters, key=group)
     angles = [2.0 * pi * i / max(1, len(names)) for i in range(len(names))]
+    inverters = []
+    for i, name in enumerate(names):
+        config = configs.get(name)
+        inverters.append(MapInverter(name, i, config.kind if config else "GFL", config.microgrid if config else ""))
     return FeederMap(
         buses=tuple((name, sin(angle), cos(angle)) for name, angle in zip(names, angles, strict=True)),
-        inverters=tuple(
-            MapInverter(
-                name,
-                i,
-                configs[name].kind if name in configs else "GFL",
-                configs[name].microgrid if name in configs else "",
-            )
-            for i, name in enumerate(names)
-        ),
+        inverters=tuple(inverters),
     )

@@ -38,8 +38,8 @@ class Cursor(msgspec.Struct, frozen=True):
     t: float = -1.0
     event: int = 0
     links: int = 0
-    switches: int = -1
-    loads: int = -1
+    switches: dict[str, bool] | None = None
+    loads: dict[str, tuple[float, float]] | None = None
 
 
 class Frame(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -83,9 +83,7 @@ class RunView:
         self._known_events: deque[PlantEvent] = deque(maxlen=KEPT)
         self._count = 0
         self._switches: dict[str, bool] = {}
-        self._switches_version = 0
         self._loads: dict[str, tuple[float, float]] = {}
-        self._loads_version = 0
         self._into: dict[str, tuple[int, tuple[LinkView, ...]]] = {}
         """Links into each agent, with the version at which they changed."""
         self._version = 0
@@ -120,10 +118,7 @@ class RunView:
     def plant_status(self, status: PlantStatus) -> None:
         self._monitor.plant_status(status)
         self.wants_status = False
-        if status.switches != self._switches:
-            self._switches, self._switches_version = status.switches, self._switches_version + 1
-        if status.loads != self._loads:
-            self._loads, self._loads_version = status.loads, self._loads_version + 1
+        self._switches, self._loads = status.switches, status.loads
         self._take_events(status.events, old=True)
 
     def status(self, message: AgentStatus, now: float) -> None:
@@ -173,16 +168,16 @@ class RunView:
             points=points,
             events=tuple(event for event in self._events if event.number > cursor.event),
             links={name: links for name, (version, links) in self._into.items() if version > cursor.links},
-            switches=self._switches if self._switches_version != cursor.switches else None,
-            loads=self._loads if self._loads_version != cursor.loads else None,
+            switches=self._switches if self._switches != cursor.switches else None,
+            loads=self._loads if self._loads != cursor.loads else None,
         )
         later = Cursor(
             run=self._run,
             t=points[-1][0] if points else cursor.t,
             event=self._count,
             links=self._version,
-            switches=self._switches_version,
-            loads=self._loads_version,
+            switches=self._switches,
+            loads=self._loads,
         )
         return frame, later
 
