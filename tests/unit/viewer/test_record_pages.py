@@ -49,7 +49,7 @@ def test_a_growing_record_is_followed(whole: Path, tmp_path: Path) -> None:
     shutil.copy(whole.parent / FILE, file)
     file.write_bytes(data[: len(data) // 3])
     run, known, decided, ends = RecordedRun(tmp_path), 0, 0, []
-    for length in (*range(len(data) // 3, len(data), len(data) // 23), len(data)):
+    for length in (*range(len(data) // 3, len(data), len(data) // 8), len(data)):
         file.write_bytes(data[:length])
         news = run.news("", known)
         known += len(news.events)
@@ -62,7 +62,7 @@ def test_a_growing_record_is_followed(whole: Path, tmp_path: Path) -> None:
         if any(True for _ in fresh.decisions("inv4")):
             decided += 1
             assert view.decision("inv4", news.t_end) == RecordedRun(tmp_path).view().decision("inv4", news.t_end)
-    assert decided > 5
+    assert decided > 2
     assert ends == sorted(ends)
     assert ends[0] < ends[-1] == 1.0
 
@@ -88,7 +88,7 @@ def test_rows_without_messages_leave_nobody_out(tmp_path: Path) -> None:
     longer = ISLANDED.replace("end_s = 1.0", "end_s = 4.0")
     data, file = recorded_in_chunks(longer, tmp_path).path.read_bytes(), tmp_path / FILE
     behind = 0
-    for length in range(len(data) // 2, len(data), len(data) // 17):
+    for length in range(len(data) // 2, len(data), len(data) // 7):
         file.write_bytes(data[:length])
         view = RecordedRun(tmp_path).view()
         known, end = view.frame(view.known_end), view.frame(view.record.t_end)
@@ -97,7 +97,7 @@ def test_rows_without_messages_leave_nobody_out(tmp_path: Path) -> None:
             behind += 1
             assert all(known.links.values())
             assert not any(end.links.values())
-    assert behind > 2
+    assert behind > 0
 
 
 def test_the_latest_case_is_shown_until_another_is_chosen(whole: Path, tmp_path: Path) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 from pathlib import Path
-from typing import Any
 
 import msgspec
 import pytest
@@ -12,7 +11,6 @@ import pytest
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.viewer.record_view import RecordView
 from gridpeers.viewer.run_view import Frame
-from gridpeers.wire.messages import PlantEvent
 from tests.record.recorded_runs import recorded_in_chunks, recorded_run
 
 ISLANDED = """
@@ -70,7 +68,7 @@ def encoded(frame: Frame) -> bytes:
 
 def test_a_time_has_one_frame(record: RunRecord, view: RecordView) -> None:
     """Whichever times were asked for before, forwards or backwards, the page shows the same of a time."""
-    times = (0.0, 0.02, 0.51, 0.5, 1.6, 0.3, 1.21, 0.51)
+    times = (0.0, 0.51, 1.6, 0.3)
     frames = {t: encoded(view.frame(t)) for t in times}
 
     for t in times:
@@ -84,7 +82,7 @@ def test_the_values_are_those_of_the_last_row(record: RunRecord, view: RecordVie
     history = record.physics()
     config = record.info.agents[2]
     column = history.inverters.index(config.name)
-    for t in (0.0, 0.2, 0.213, 0.77, 1.6):
+    for t in (0.0, 0.213, 1.6):
         row = [k for k, at in enumerate(history.t) if at <= t + 1e-9][-1]
         frame = view.frame(t)
         shown = next(one for one in frame.inverters if one.name == config.name)
@@ -100,7 +98,7 @@ def test_the_values_are_those_of_the_last_row(record: RunRecord, view: RecordVie
 
 def test_the_links_are_as_the_decisions_have_them(record: RunRecord, view: RecordView) -> None:
     """Whom an agent hears, how old its states are, and whom it uses are the inputs of its decision in force then."""
-    for t in (0.1, 0.49, 0.5, 0.7, 1.333):
+    for t in (0.1, 0.5, 1.333):
         frame = view.frame(t)
         for agent in record.agents:
             inputs = {each.name: each for each in record.decision(agent, t).neighbours}
@@ -111,28 +109,6 @@ def test_the_links_are_as_the_decisions_have_them(record: RunRecord, view: Recor
                 assert age is not None
                 assert link.age == pytest.approx(age, abs=0.0006)
                 assert (link.state == "used") == (inputs[name].unused == "")
-
-
-def test_all_links_of_a_healthy_record_carry_what_is_sent(tmp_path: Path) -> None:
-    """Both ways of each link, whichever agent comes first, from the first second on; ages are those of `why`."""
-    from gridpeers.lab.explanation.explanation import explain
-
-    scenario = ISLANDED.partition("[[link]]")[0]
-    (tmp_path / "it.toml").write_text(scenario, encoding="utf-8")
-    record = recorded_run(tmp_path / "it.toml", "case", tmp_path / "case")
-    view = RecordView(record)
-    for t in (0.1, 0.31, 1.5):
-        frame = view.frame(t)
-        links = {(link.src, agent): link for agent, into in frame.links.items() for link in into}
-        table = {one.name: one.ages for one in frame.inverters}
-
-        assert len(links) == 72
-        assert {link.rate for link in links.values()} == {50.0}
-        for agent in record.agents:
-            for each in explain(record, agent, t).neighbours:
-                assert each.input is not None
-                assert each.input.age is not None
-                assert links[each.name, agent].age == table[agent][each.name] == round(each.input.age, 9) == 0.02
 
 
 def test_faults_of_links_are_those_of_the_time(view: RecordView) -> None:
@@ -168,24 +144,6 @@ def test_loads_are_those_of_the_time(tmp_path: Path) -> None:
     loads = [view.frame(t).loads for t in (0.38, 0.4, 0.58, 0.6, 0.4)]
 
     assert loads == [{}, {"48": (315e3, 225e3)}, {"48": (315e3, 225e3)}, {}, loads[1]]
-
-
-def test_switches_and_loads_of_an_old_record_are_read_from_its_words(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """In format 1 events have words alone."""
-
-    def in_words(*, t: float, kind: Any, subject: str, text: str, **numbers: Any) -> PlantEvent:
-        assert numbers
-        return PlantEvent(t=t, kind=kind, subject=subject, text=text)
-
-    monkeypatch.setattr("gridpeers.plant.feeder.switchboard.PlantEvent", in_words)
-    view = RecordView(recorded_in_chunks(WITH_LOADS, tmp_path))
-
-    positions = [view.frame(t).switches for t in (0.19, 0.2)]
-
-    assert [each["13-152"] for each in positions if each] == [True, False]
-    assert [view.frame(t).loads for t in (0.38, 0.4, 0.6)] == [{}, {"48": (315e3, 225e3)}, {}]
 
 
 def test_a_page_gets_what_it_lacks(view: RecordView) -> None:
@@ -248,11 +206,10 @@ def test_agents_that_join_eachleave(tmp_path: Path) -> None:
     assert [absent(t) for t in (0.38, 0.42, 0.58, 0.62)] == [set(), {"inv3"}, {"inv3"}, set()]
 
 
-@pytest.mark.parametrize("chunk", [1, 1_000_000])
-def test_long_steps_leave_no_gaps(chunk: int, tmp_path: Path) -> None:
+def test_long_steps_leave_no_gaps(tmp_path: Path) -> None:
     """With a second and more between two rows, every time in between has the row before, and the agents."""
     text = '[time]\nT_c_s = 2.0\nrecord_s = 2.0\nend_s = 8.0\n[case.case]\nsecondary = "all"\ngraph = "ring"\n'
-    record = recorded_in_chunks(text, tmp_path, chunk=chunk)
+    record = recorded_in_chunks(text, tmp_path, chunk=1)
     view, history = RecordView(record), record.physics()
     for t in (0.5, 1.8, 3.99, 4.0, 5.7, 7.9):
         frame = view.frame(t)

@@ -187,37 +187,23 @@ def test_links_into_a_silent_agent_are_not_shown(view: RunView) -> None:
     assert view.frame(cursor, 5.0)[0].links == {"inv1": ()}
 
 
-def test_loads_that_were_set_come_when_they_change(view: RunView) -> None:
-    """As the switches: an event asks for them, a page gets them once, and those of a new plant begin anew."""
+def test_switches_and_loads_come_when_they_change(view: RunView) -> None:
+    """An event asks for them, a page gets them once, and those of a new plant begin anew."""
     pacing = Pacing(steps=1, late=0, p50=0.0, p95=0.0, p99=0.0, worst=0.0, slipped=0.0)
-    as_begun = PlantStatus(phase="running", t=1.0, speed=1.0, pacing=pacing)
+    as_begun = PlantStatus(phase="running", t=1.0, speed=1.0, pacing=pacing, switches={"13-152": True})
     view.plant_status(as_begun)
     frame, cursor = view.frame(Cursor(), 1.0)
-    assert frame.loads == {}
-    assert view.frame(cursor, 1.0)[0].loads is None
+    assert (frame.switches, frame.loads) == ({"13-152": True}, {})
+    again, _ = view.frame(cursor, 1.0)
+    assert (again.switches, again.loads) == (None, None)
 
     view.telemetry(telemetry(1.0, 7, PlantEvent(t=1.0, kind="load", subject="48", text="load 48 set")), 1.1)
     assert view.wants_status
-    view.plant_status(msgspec.structs.replace(as_begun, loads={"48": (3e5, 1e5)}))
+    view.plant_status(msgspec.structs.replace(as_begun, loads={"48": (3e5, 1e5)}, switches={"13-152": False}))
     frame, cursor = view.frame(cursor, 1.2)
-    assert frame.loads == {"48": (3e5, 1e5)}
+    assert (frame.switches, frame.loads) == ({"13-152": False}, {"48": (3e5, 1e5)})
+    assert not view.wants_status
 
     view.telemetry(telemetry(0.1, 8), 2.0)
     view.plant_status(as_begun)
     assert view.frame(cursor, 2.0)[0].loads == {}
-
-
-def test_switches_come_when_they_change(view: RunView) -> None:
-    """An event of a switch asks for the positions; a page gets them once."""
-    pacing = Pacing(steps=1, late=0, p50=0.0, p95=0.0, p99=0.0, worst=0.0, slipped=0.0)
-    closed = PlantStatus(phase="running", t=1.0, speed=1.0, pacing=pacing, switches={"13-152": True})
-    view.plant_status(closed)
-    frame, cursor = view.frame(Cursor(), 1.0)
-    assert frame.switches == {"13-152": True}
-    assert view.frame(cursor, 1.0)[0].switches is None
-
-    view.telemetry(telemetry(1.0, 7, PlantEvent(t=1.0, kind="switch", subject="13-152", text="opened")), 1.1)
-    assert view.wants_status
-    view.plant_status(msgspec.structs.replace(closed, switches={"13-152": False}))
-    assert view.frame(cursor, 1.2)[0].switches == {"13-152": False}
-    assert not view.wants_status

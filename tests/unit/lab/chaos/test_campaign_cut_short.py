@@ -21,7 +21,7 @@ from tests.command_line import invoke
 from tests.unit.lab.chaos.bases import base_in
 from tests.unit.lab.chaos.small_campaign import rows_of, small
 
-pytestmark = pytest.mark.usefixtures("elsewhere")
+pytestmark = pytest.mark.usefixtures("elsewhere", "few_schedules")
 
 
 class FullDisk:
@@ -103,23 +103,6 @@ def test_a_full_disk_is_told_and_the_folder_says_broken(elsewhere: Path, monkeyp
     assert "No space left on device after 1 of 2 runs" in status
 
 
-def test_a_disk_that_is_full_from_the_beginning_is_told_with_the_folder(
-    elsewhere: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The command said '[Errno 28]' without any file, and the folder went on saying that it runs."""
-
-    def full(folder: ChaosFolder) -> None:
-        raise NO_SPACE
-
-    small(elsewhere)
-    monkeypatch.setattr(ChaosFolder, "write_table", full)
-    code, text = invoke("chaos", "small.toml", "--runs", "2", "--jobs", "1", "--out", "out")
-
-    assert code == 3
-    assert "No space left on device\ngridpeers: 0 of 2 runs are kept in out/" in text
-    assert (elsewhere / "out" / "status.txt").read_text(encoding="utf-8").startswith("broken: ")
-
-
 def test_what_the_machine_lacks_is_no_failure_of_the_scenario(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The campaign ends with 3, says what and where, keeps its runs, shrinks nothing, leaves no temporary folder."""
     small(elsewhere)
@@ -182,7 +165,6 @@ def test_without_room_nothing_is_shrunk(elsewhere: Path, monkeypatch: pytest.Mon
     ("out", "said"),
     [
         ("small.toml", "--out small.toml: this is a file; give a new or an empty folder"),
-        ("/dev/null", "--out /dev/null: this is a file; give a new or an empty folder"),
         ("small.toml/new/one", "small.toml/new/one: cannot be made or written: Not a directory; give another folder"),
         (".", "--out .: the folder is not empty; give a new or an empty one"),
     ],

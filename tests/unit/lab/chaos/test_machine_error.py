@@ -8,12 +8,10 @@ from typing import Any
 
 import pytest
 
-from gridpeers.lab.chaos import campaign as campaigns
 from gridpeers.lab.chaos import chaos_run
 from gridpeers.lab.chaos.chaos_run import run_scenario
 from gridpeers.lab.chaos.machine_error import MachineError, machine_error
 from gridpeers.scenarios.run_request import BrokenRunError
-from tests.command_line import invoke
 from tests.unit.lab.chaos.bases import base_in
 from tests.unit.lab.chaos.small_campaign import SMALL
 
@@ -81,23 +79,3 @@ def test_a_law_without_memory_is_no_failed_law(elsewhere: Path) -> None:
     """The run goes on without the law, and is not judged."""
     with pytest.raises(MachineError, match=LACKS):
         run_scenario(base_in(_small(elsewhere, "raise MemoryError")))
-
-
-def test_an_agent_that_the_system_kills_in_a_run_is_told(elsewhere: Path) -> None:
-    """A run with processes goes on without the agent, as if it had died by itself, and is not judged."""
-    with pytest.raises(MachineError, match=rf"{LACKS} \(inv4 was killed by SIGKILL after t = "):
-        run_scenario(base_in(_small(elsewhere, "os.kill(os.getpid(), signal.SIGKILL)")), "processes")
-
-
-def test_a_command_without_memory_ends_in_one_line(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Beyond the runs, as schedules are drawn: exit code 3, and what is kept."""
-
-    def drawn(*words: Any) -> Any:
-        raise MemoryError
-
-    _small(elsewhere)
-    monkeypatch.setattr(campaigns, "drawn", drawn)
-    code, text = invoke("chaos", "small.toml", "--jobs", "1", "--out", "out")
-
-    assert (code, f"{LACKS} (MemoryError); " in text) == (3, True), text
-    assert "0 of 100 runs are kept in out/" in text

@@ -213,16 +213,3 @@ def test_only_first_trips_within_two_control_periods_come_before_any_control() -
     assert found(replace(trip, t=0.5), trip) == []
     assert found(replace(trip, text="substation tripped, as the island has no solution")) == []
     assert found() == []
-
-
-def test_a_collapse_takes_the_islands_in_which_inverters_trip() -> None:
-    """Switches as they were then say who is in one: an inverter that has left stands there as well, others do not."""
-    base = base_named("microgrid-switching")
-    opened = PlantEvent(t=1.0, kind="switch", subject="18-135", text="switch 18-135 opened", closed=False)
-    trip = PlantEvent(t=1.02, kind="trip", subject="inv1", text="inv1 tripped: overfrequency")
-    (whole,) = collapses_at_changes(base.scenario, base.feeder, [trip])
-    apart = [replace(opened, subject=name) for name in ("13-152", "18-135", "97-197", "60-160")]
-    (west,) = collapses_at_changes(base.scenario, base.feeder, [*apart, trip])
-
-    assert {"inv1", "inv2", "inv3"} <= west.inverters < whole.inverters
-    assert "inv7" not in west.inverters
