@@ -27,7 +27,7 @@ LINES: tuple[tuple[dict[str, Any], float], ...] = (
 """Lines of the recorded run, below, and of the changed one, on top, each with the part of white in its colours. It is
 no transparency: faint lines of several inverters on top of each other would be strong again."""
 
-BLUE, GREEN, ORANGE = STYLES[0][0], STYLES[2][0], OTHER_STYLES[1][0]
+BLUE, GREEN, ORANGE = STYLES[0][0], STYLES[2][0], STYLES[1][0]
 
 
 def counterfactual_figure(was: Drawing, would_be: Drawing, words: str, since: float) -> Figure:
