@@ -22,7 +22,7 @@ class RecorderFeed(KeptTelemetry):
     def __init__(self, needed: Iterable[str], publish: Callable[[bytes], None], limit: int = KEPT_BYTES) -> None:
         super().__init__()
         self._needed, self._publish, self._limit = frozenset(needed), publish, limit
-        self._due: deque[tuple[int, bytes]] = deque()
+        self._due: deque[tuple[int, memoryview]] = deque()
         self._out_of_reach: set[str] = set()  # recorders whose token went while the run went on
         self.paced = False  # whether `replay` publishes a little in each period; else all goes at once
 
@@ -57,7 +57,7 @@ class RecorderFeed(KeptTelemetry):
         if not self._due:
             self._publish(payload)
             return
-        self._due.append((number, payload))
+        self._due.append(self._kept[-1])
         if not self.paced:
             self.replay()
 
@@ -69,7 +69,7 @@ class RecorderFeed(KeptTelemetry):
 
     def replay(self) -> None:
         for _ in range(min(AT_ONCE, len(self._due)) if self.paced else len(self._due)):
-            self._publish(self._due.popleft()[1])
+            self._publish(bytes(self._due.popleft()[1]))
 
     def end(self) -> None:
         self.paced = False
