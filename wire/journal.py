@@ -181,8 +181,6 @@ _encode_into = msgspec.msgpack.Encoder().encode_into
 
 
 class JournalBuffer:
-    __slots__ = ("_bytes", "_counts", "_ends", "_lost", "_rejected")
-
     def __init__(self) -> None:
         self._bytes = bytearray()
         self._lost = 0
@@ -196,8 +194,8 @@ class JournalBuffer:
     def add(self, entry: Entry) -> None:
         if len(self._bytes) > ROOM:
             self._lost += 1
-            return
-        self._append(entry)
+        else:
+            self._append(entry)
 
     def _append(self, entry: Entry) -> None:
         _encode_into(entry, self._bytes, -1)

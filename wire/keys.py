@@ -74,7 +74,6 @@ def _of_one(kind: str) -> Callable[[Keys, str], str]:
 
 
 def _of_process(kind: str) -> Callable[[Keys, str, str], str]:
-    """Return the method for keys of a kind that end in an inverter's name and one instance."""
     return lambda keys, name, instance: f"{keys.prefix}{kind}/{name}/{instance}"
 
 
@@ -84,7 +83,6 @@ class Keys:
     def __init__(self, run: str) -> None:
         check_name("run", run)
         self.prefix = f"gridpeers/{run}/"
-        """Beginning of every key of the run."""
         self.control = f"{self.prefix}control"
         self.telemetry = f"{self.prefix}telemetry"
         self.command = f"{self.prefix}command"
@@ -138,10 +136,6 @@ def epoch_of(part: str) -> int | None:
 
     An epoch has one text: else the end of another one's token, with a zero before, would be that of the plant.
 
-    Examples
-    --------
-    >>> epoch_of("1763778000000"), epoch_of("late"), epoch_of("9" * 30), epoch_of("01763778000000")
-    (1763778000000, None, None, None)
     """
     return int(part) if re.fullmatch("0|[1-9][0-9]{0,15}", part) and int(part) <= MOST_COUNT else None
 
@@ -152,13 +146,7 @@ def is_token(key: str) -> bool:
 
 
 def run_of_plant(key: str) -> str:
-    """Return the name of the run whose plant has this token; empty for any other key.
-
-    Examples
-    --------
-    >>> run_of_plant("gridpeers/demo/alive/plant/1")
-    'demo'
-    """
+    """Return the name of the run whose plant has this token; empty for any other key."""
     match key.split("/"):
         case ("gridpeers", run, "alive", "plant", _) if is_name(run):
             return run

@@ -93,8 +93,7 @@ def is_usable(links: Links | None, message: State | Measurement, payload: bytes,
 def arrived(links: Links | None, now: float, rejects: RejectedMessages, admission: Admission) -> Iterator[AnyMessage]:
     """Yield the messages that the links have let through by now (s of run time) and that are of use.
 
-    A corrupted message is decoded again; its CRC-32 fails, so it is counted and dropped. A message that
-    was overtaken on its way, or whose sender has gone, is only dropped: delays do that to sound messages.
+    A corrupted message is decoded again; its CRC-32 fails, so it is counted and dropped.
     """
     if links is None:
         return

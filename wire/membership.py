@@ -16,7 +16,6 @@ number: that needs certificates (docs/security.md).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from math import inf
 
 from gridpeers.wire.bounds import MOST_INVERTERS
@@ -36,8 +35,7 @@ PERSISTENT = 50
 class Admission:
     """The valid epoch of each name, and the last numbers of its messages.
 
-    `rate` is how many messages one sender sends at most per s of run time: a larger gap in the numbers is not counted
-    as lost. In simulated time numbers are ticks, and each is awaited.
+    A gap in the numbers that needs more than `rate` messages per s of run time is not counted as lost.
     """
 
     def __init__(self, rate: float = inf) -> None:
@@ -48,7 +46,7 @@ class Admission:
         self._arrived: dict[str, tuple[int, float]] = {}
         """Number and run time (s) of the last message off the wire."""
         self._behind: dict[str, tuple[int, int]] = {}
-        """Number of the last message that arrived after a later one, and the count of such messages in a row."""
+        """Number of the last message behind an earlier one, and the count of rising ones in a row."""
         self._passed: dict[str, int] = {}
 
     def bind(self, name: str, epoch: int) -> None:
@@ -135,12 +133,11 @@ class Membership:
         """Where among the processes without a nameplate the next ones to be asked again begin."""
 
     def has_room(self, name: str) -> bool:
-        """Return whether one more token of a name is to be noted: anybody may hold tokens, each costs every node."""
         instances = self._instances.get(name)
         return len(self._instances) < MOST_INVERTERS if instances is None else len(instances) < MOST_PROCESSES
 
     def notes(self, name: str, instance: str) -> bool:
-        """Return whether a process is noted, one that counts no more included; any thread may ask."""
+        """Return whether a process is noted; any thread may ask."""
         return instance in self._instances.get(name, ()) or self._dismissed.get(name) == instance
 
     def appeared(self, name: str, instance: str) -> bool:
@@ -199,13 +196,13 @@ class Membership:
         return True
 
     @property
-    def unmet(self) -> Iterator[tuple[str, str]]:
+    def unmet(self) -> list[tuple[str, str]]:
         every = ((name, instance) for name, instances in self._instances.items() for instance in instances)
-        return (process for process in every if process not in self._answers)
+        return [process for process in every if process not in self._answers]
 
     def next_unmet(self) -> list[tuple[str, str]]:
-        """Return the next of the processes that have not answered, to be asked again; all come in turn."""
-        unmet = list(self.unmet)
+        """Return the next of the processes that have not answered; all come in turn."""
+        unmet = self.unmet
         begin = self._asked if self._asked < len(unmet) else 0
         self._asked = begin + ASKED_AT_ONCE
         return unmet[begin : self._asked]

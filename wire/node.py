@@ -202,7 +202,6 @@ class Node:
             rejected_as = rejected.kind
             self.rejects.add(rejected.kind, key, rejected.text)
         except Exception as error:
-            # The last line of defence: an error of ours rejects the message that raised it, and nothing else.
             rejected_as = "failed"
             self.rejects.failed(key, error)
         if self.traffic is not None:
@@ -227,8 +226,6 @@ class Node:
         self.rejects.add(loss.kind, key, loss.text, count=loss.number)
         if self.traffic is not None:
             self.traffic.lost(key, loss.kind, loss.number, now)
-
-    # ---------------------------------------------------------------- nameplates
 
     def _process_came(self, name: str, instance: str) -> bool:
         """Note the token of an agent's process and ask for its nameplate; return False if there is no room for it."""
@@ -255,8 +252,6 @@ class Node:
     def _forget_process(self, name: str, instance: str) -> bool:
         self.routes.pop(self.keys.nameplate(name, instance), None)
         return self.members.vanished(name, instance)
-
-    # ---------------------------------------------------------------- checks
 
     def _admit(self, route: Route, message: AnyMessage, now: float) -> None:
         """Raise RejectedError unless a message is from its key's sender, in that sender's epoch."""
@@ -290,14 +285,13 @@ class Node:
             self.traffic.token(key, now, appeared=appeared)
 
     def _publish_journal(self, key: str, epoch: int, t: float, *, empty: bool = False) -> None:
-        """Publish the journal since the last part, if there is anything in it, or also if it is `empty`."""
+        """Publish the journal since the last part; without entries only if asked for an `empty` one."""
         for journal in self._take_journal(epoch, t, empty=empty):
             self._publish(key, encode(journal))
 
     def _take_journal(self, epoch: int, t: float, *, empty: bool = False) -> Iterator[Journal]:
-        if self.journal is None:
-            return
-        for data in self.journal.take_parts() or ([b""] if empty else []):
+        parts = [] if self.journal is None else self.journal.take_parts() or [b""] * empty
+        for data in parts:
             yield Journal(sender=self._name, epoch=epoch, seq=self._journal_parts, t=t, data=data)
             self._journal_parts += 1
 

@@ -57,8 +57,6 @@ class NodeGroup:
         """Queries without an answer, by the key under which it will arrive."""
         self._asked = 0
 
-    # ---------------------------------------------------------------- what the driver needs
-
     @property
     def tokens(self) -> tuple[str, ...]:
         return tuple(node.token for node in self._active)
@@ -128,16 +126,14 @@ class NodeGroup:
         return tuple(line for node in self.nodes for line in node.take_rejects())
 
     def appeared(self, key: str, now: float) -> None:
-        if key not in self.tokens:
-            self._now = now
-            for node in self._active:
-                node.appeared(key, now)
+        self._now = now
+        for node in self._active if key not in self.tokens else ():
+            node.appeared(key, now)
 
     def vanished(self, key: str, now: float) -> None:
-        if key not in self.tokens:
-            self._now = now
-            for node in self._active:
-                node.vanished(key, now)
+        self._now = now
+        for node in self._active if key not in self.tokens else ():
+            node.vanished(key, now)
 
     def received(self, key: str, payload: bytes, now: float) -> None:
         self._now = now
@@ -152,10 +148,6 @@ class NodeGroup:
         return any(node.is_known(key, payload) for node in tuple(self._listeners.get(key, ())))
 
     def is_noted(self, key: str) -> bool:
-        """Whether any of the nodes has noted the holder of a token.
-
-        All are asked: an agent notes no process of its own name, and each has the last roster that it was on.
-        """
         return any(node.is_noted(key) for node in tuple(self._active))
 
     def lost(self, loss: Loss, now: float) -> None:
@@ -175,8 +167,6 @@ class NodeGroup:
         for node in self._active:
             if node.deadline is not None and now >= node.deadline:
                 node.expire(now)
-
-    # ---------------------------------------------------------------- inside
 
     def _perform(self, node: GroupedNode, action: Action | Log, actions: list[Action | Log]) -> None:
         if isinstance(action, Publish):

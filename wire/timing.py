@@ -9,16 +9,12 @@ from typing import NamedTuple
 
 
 def time_of(tick: int, T_c: float) -> float:
-    """Return the run time (s) of a tick.
-
-    It is a product and not a running sum, so every process computes the same bits for the same tick; it is rounded to
-    the nanosecond, like the plant's rows.
-    """
+    """Return the run time (s) of a tick: a product, so that every process computes the same bits."""
     return round(tick * T_c, 9)
 
 
 def ticks_until(end: float, T_c: float) -> int:
-    """Return the number of control periods T_c (s) from 0 to `end` (s), which must be a multiple of T_c."""
+    """Return the number of control periods T_c (s) from 0 to `end` (s), which must be a multiple."""
     if T_c <= 0.0:
         raise ValueError(f"T_c: the control period must be positive, got {T_c:g} s")
     ticks = round(end / T_c)
@@ -102,11 +98,7 @@ class TickBarrier:
         self.deadline = now + self._timeout
 
     def is_over(self, now: float) -> bool:
-        """Whether the deadline has passed.
-
-        A process that is woken much later than it asked for was stopped itself, as by Ctrl-Z or a closed lid. Messages
-        may be waiting for it, so the deadline starts again.
-        """
+        """Whether the deadline has passed; it starts again if this process was stopped itself, as by Ctrl-Z."""
         if self.deadline is None or now < self.deadline:
             return False
         if now > self.deadline + STOOD_STILL:
@@ -158,25 +150,16 @@ class SessionDeadline:
         return next((name for name, since in self._since.items() if now - since >= self._patience + silent[name]), "")
 
 
-BURST = 20
-"""Lines of one kind that may come at once, such as those of all joining agents."""
-
-INTERVAL = 10.0
-"""Time (s) after which one more line may come."""
-
-_KINDS = 200
-"""Number of distinct kinds; all further lines count as one kind."""
-
 _NUMBER = re.compile(r"[0-9]+(?:\.[0-9]+)?")
 
 
 class RateLimit:
-    """Pass the first lines of a kind, then one at each interval with the number of omitted ones.
+    """Pass the first lines of a kind, then one at each interval (s) with the number of omitted ones.
 
-    Lines that differ only in numbers are of one kind.
+    Lines that differ only in numbers are of one kind, and all beyond 200 kinds.
     """
 
-    def __init__(self, burst: int = BURST, interval: float = INTERVAL) -> None:
+    def __init__(self, burst: int = 20, interval: float = 10.0) -> None:
         self._burst, self._interval = burst, interval
         self._allowed: dict[str, tuple[float, float]] = {}
         """Number of lines of each kind that may come, and the time (s) of that number."""
@@ -185,7 +168,7 @@ class RateLimit:
     def admit(self, text: str, now: float) -> str | None:
         """Return a line as it is, or with the number of omitted ones before it, or None to omit it."""
         kind = _NUMBER.sub("0", text)
-        if kind not in self._allowed and len(self._allowed) >= _KINDS:
+        if kind not in self._allowed and len(self._allowed) >= 200:
             kind = ""
         allowed, since = self._allowed.get(kind, (float(self._burst), now))
         allowed = min(float(self._burst), allowed + (now - since) / self._interval)

@@ -35,13 +35,9 @@ class Traffic(Protocol):
     """Takes all messages and tokens of a node; `at` is the driver's clock (s)."""
 
     def sent(self, key: str, payload: bytes) -> None: ...
-
     def received(self, key: str, payload: bytes, at: float, rejected: str) -> None: ...
-
     def lost(self, key: str, kind: str, count: int, at: float) -> None: ...
-
     def token(self, key: str, at: float, *, appeared: bool) -> None: ...
-
     def line(self, text: str) -> None: ...
 
 
@@ -89,11 +85,7 @@ class TickTraffic:
         self._journal.add(ProcessEvent(None, "line", text))
 
     def exchanged(self, tick: int, measurements: Sequence[Measurement], states: Sequence[State]) -> None:
-        """Note a tick in which plant and agents share a process, and send nothing.
-
-        It is encoded at once: to keep the messages of ten ticks for one go is dearer than to encode them, as what is
-        made meanwhile finds its memory cold.
-        """
+        """Note a tick in which plant and agents share a process, and send nothing."""
         self._add_exchange(tick, list(map(astuple, measurements)), list(map(astuple, states)))
 
     def ticked(self, tick: int) -> None:
@@ -133,20 +125,12 @@ class TimedTraffic:
         needless = IN_TELEMETRY if self._arrivals else _NOT_NOTED
         if not (self._arrivals or self._whole) or (kind in needless and not rejected):
             return
-        entry: MessageReference | ReceivedMessage = ReceivedMessage(at, name, payload)
-        if (
-            kind in EACH_TICK
-            and not self._whole
-            and rejected in ("", "stale")  # any other may be of somebody who keeps no journal
-            and (message := sound(payload)) is not None
-        ):
+        shown = payload[:SHOWN_PAYLOAD] if rejected else payload
+        entry: MessageReference | ReceivedMessage = ReceivedMessage(at, name, shown, rejected)
+        noted = kind in EACH_TICK and not self._whole and rejected in ("", "stale")  # by the sender
+        if noted and (message := sound(payload)):
             entry = MessageReference(at, name, message.epoch, message.seq, rejected)
-        elif rejected:
-            entry = ReceivedMessage(at, name, payload[:SHOWN_PAYLOAD], rejected)
-        if rejected:
-            self._journal.add_rejected(entry)
-        else:
-            self._journal.add(entry)
+        (self._journal.add_rejected if rejected else self._journal.add)(entry)
 
     def lost(self, key: str, kind: str, count: int, at: float) -> None:
         self.now = at
