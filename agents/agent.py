@@ -108,28 +108,21 @@ class Agent:
         self._rule = rule_of(config.control)
         self._law = law_in_force(config.control) if law is None else law
         self._law_runs = False
-        """Whether the law has decided since it was last on hold."""
         self._sent_at = 0.0
-        """Run time (s) of the last state for the neighbours."""
         self.nameplate = nameplate_of(config)
         self._known: dict[str, Nameplate] = {config.name: self.nameplate}
         self._neighbours: tuple[Iterable[str], tuple[str, ...]] = (), ()
         """The last roster, and the in-neighbours on it; forgotten when the known agents change."""
         self.heard: dict[str, State] = {} if board is None else board
-        """Last state of each neighbour; one that its law did not send (`quiet`) leaves the one before."""
         self.around: Sequence[Neighbour] = ()
-        """Neighbours in the sums of the last tick."""
         self.in_service = True
         """Whether the own inverter was on the network at the last tick; if not, there were no sums."""
         self.saturated = (0, 0)
-        """Saturated sides of P and V at the last tick."""
         self._takes_part = config.control.acts(config.name, config.kind)
         options = config.control.degraded_communication
         self._weights = StalenessWeights(options)
         self.weighs_alike = self._weights.all_count
-        """Whether every state has the weight 1, whatever its age."""
         self.notes_arrivals = self._weights.ages_count
-        """True if the arrival times of states are needed; otherwise the agent reads them from the shared board."""
         self._silent_at_most = SIGN_OF_LIFE * (options.max_age or (config.max_age if config.clock == "wall" else inf))
         self.watches_saturation = options.anti_windup == "conditional"
         """True if the law is told at which limits the own inverter is saturated."""
@@ -139,9 +132,7 @@ class Agent:
         self._P_set: float | None = None
         self._V_set: float | None = None
         self._islands: tuple[str, str] = ("", "")
-        """Own island at the last two measurements, the latest first."""
         self._apart: frozenset[str] = frozenset()
-        """Neighbours out of step."""
 
     def meet(self, nameplate: Nameplate) -> None:
         """Note an agent's nameplate, and forget the states of its other epochs."""
@@ -152,7 +143,6 @@ class Agent:
         self._neighbours = (), ()
 
     def forget(self, name: str) -> None:
-        """Forget the nameplate and the states of an agent whose process is gone."""
         self._known.pop(name, None)
         self._neighbours = (), ()
         self._drop(name)

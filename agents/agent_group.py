@@ -28,7 +28,6 @@ class AgentGroup:
 
     def __init__(self, configs: Sequence[AgentConfig], laws: Sequence[Law]) -> None:
         self._board: dict[str, State] = {}
-        """Last state of each agent that its neighbours may use."""
         self._agents: dict[str, Agent] = {}
         for config, law in zip(configs, laws, strict=True):
             check_nameplate(config)
@@ -37,11 +36,8 @@ class AgentGroup:
         """In-neighbours of each agent at the next tick; at the first one, no state is there yet."""
         self._listens = self._meet(configs)
         self._journals: dict[str, DecisionJournal] = {}
-        """Journal of each agent, if they keep any."""
         self._parts: Counter[str] = Counter()
-        """Number of parts of each agent's journal that were taken."""
         self._changed: list[State] = []
-        """States whose decisions were noted since the journals were taken."""
         if any(config.record != "physics" for config in configs):
             self._journals = {name: DecisionJournal(agent, JournalBuffer()) for name, agent in self._agents.items()}
         self._notes_arrivals = any(agent.notes_arrivals for agent in self._agents.values())

@@ -27,9 +27,7 @@ class NeighbourStates:
 
     def __init__(self) -> None:
         self._states: dict[str, tuple[State, float]] = {}
-        """Last state of each agent, and its time of arrival (s)."""
         self.measurement: Measurement | None = None
-        """The own last measurement; None before the first."""
         self._measured_at = 0.0
 
     def keep(self, message: State | Measurement, at: float) -> None:
@@ -40,7 +38,6 @@ class NeighbourStates:
 
     @property
     def t(self) -> float:
-        """Time written in the own measurement (s of run time); 0 if there is none."""
         return 0.0 if self.measurement is None else self.measurement.t
 
     def measured(self, at: float, max_age: float) -> Measurement | None:
@@ -82,21 +79,15 @@ class AgentNode(PlantFollower):
         super().__init__(config.name, config.run, rate)
         check_nameplate(config)
         self.stopped = ""
-        """Why the agent closes; empty while it runs."""
         self.failed = ""
         """Why the agent could not continue, or take part at all; empty otherwise."""
         self.plant_seen = False
-        """Whether the agent has ever seen the plant's token."""
         self.session_broken = False
-        """Whether it closes only to begin again with a new session."""
         self._config, self._instance, self._links = config, instance, links
         self._agent = Agent(config, law)
         self.states = NeighbourStates()
-        """The last measurement and the neighbours' last states."""
         self.routes[self.keys.stop_request(config.name, instance)] = Route(PLANT, (Stop,), self._on_stop_request)
         self.routes[self.keys.measurement(config.name)] = Route(PLANT, (Measurement,), self._on_own_measurement)
-
-    # ---------------------------------------------------------------- what the driver needs
 
     @property
     def token(self) -> str:
@@ -122,10 +113,7 @@ class AgentNode(PlantFollower):
         """Note the agents of the same process, whose messages do not come from outside."""
 
     def work(self, now: float) -> bool:
-        """Do nothing: an agent computes when a message permits it, or its tick is due."""
         return False
-
-    # ---------------------------------------------------------------- the others
 
     def appeared(self, key: str, now: float) -> None:
         self._note_token(key, now, appeared=True)
@@ -137,7 +125,6 @@ class AgentNode(PlantFollower):
                 self._process_came(name, instance)
 
     def vanished(self, key: str, now: float) -> None:
-        """Note that a token is gone, and with it its holder."""
         self._note_token(key, now, appeared=False)
         match self.keys.parts(key):
             case ("alive", "plant", epoch) if self._plant_vanished(epoch):
@@ -162,8 +149,6 @@ class AgentNode(PlantFollower):
         if key not in self.routes:
             self.routes[key] = Route(name, (State,), self._on_state)
             self._actions.append(Listen(key))
-
-    # ---------------------------------------------------------------- messages
 
     def _on_own_measurement(self, message: Measurement, payload: bytes, now: float) -> None:
         if message.to != self._name:
@@ -194,8 +179,6 @@ class AgentNode(PlantFollower):
         if type(message) is State:
             self._agent.hear(message)
         self.states.keep(message, at)
-
-    # ---------------------------------------------------------------- reports
 
     def _report_links(self, *, final: bool = False) -> None:
         key, epoch = self.keys.report(self._name), self._config.epoch

@@ -19,10 +19,8 @@ class DecisionJournal:
     def __init__(self, agent: Agent, journal: JournalBuffer) -> None:
         self._agent, self.journal = agent, journal
         self._neighbours: Sequence[str] | None = None
-        """In-neighbours of the last entry; None before the first."""
         self._states: list[int | None] = []
         self._others: tuple[object, ...] = ()
-        """Its further parts, but for the tick."""
         self._plain: Sequence[str] | None = None
         """Its in-neighbours if it says nothing but that: all of the tick before, none weighed; else None."""
         self._weighs = not agent.weighs_alike
@@ -97,17 +95,12 @@ class DecisionJournal:
         )
 
     def _reasons(self, neighbours: Sequence[str], states: Sequence[int | None]) -> list[str]:
-        used = {neighbour.name for neighbour in self._agent.around}
-        return [
-            ""
-            if name in used
-            else "silent"
-            if state is None
-            else "stale"
-            if self._agent.in_service and self._agent.shares_island(name)
-            else "island"
-            for name, state in zip(neighbours, states, strict=True)
-        ]
+        agent, used = self._agent, {neighbour.name for neighbour in self._agent.around}
+        reasons = []
+        for name, state in zip(neighbours, states, strict=True):
+            here = agent.in_service and agent.shares_island(name)
+            reasons.append("" if name in used else "silent" if state is None else "stale" if here else "island")
+        return reasons
 
     def _all_weights(self, neighbours: Sequence[str]) -> list[float]:
         weights = {neighbour.name: neighbour.weight for neighbour in self._agent.around}

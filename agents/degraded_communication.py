@@ -44,11 +44,8 @@ class StalenessWeights:
         self._stale, self._T_age = options.stale, options.T_age
         self._max_age = options.max_age or inf
         self.ages_count = self._stale != "hold"
-        """Whether a weight depends on when states arrived."""
         self.all_count = not self.ages_count and self._max_age == inf
-        """True if each state weighs 1 at any age."""
         self._fresh: set[str] = set()
-        """Neighbours with a new state since the last tick."""
         self._usual: dict[str, deque[float]] = {}
         """Ages (s) of each neighbour's last states, each at the first tick that could use it."""
 
@@ -117,22 +114,17 @@ class SaturationDetector:
 
 def gains_in_force(gains: Gains, options: DegradedCommunication) -> Gains:
     if options.weights == "degree-normalised":
-        gains = replace(
-            gains,
-            beta_GFM=gains.beta_GFM * options.beta_c,
-            beta_GFL=gains.beta_GFL * options.beta_c,
-        )
+        beta_c = options.beta_c
+        gains = replace(gains, beta_GFM=gains.beta_GFM * beta_c, beta_GFL=gains.beta_GFL * beta_c)
     if options.anti_windup == "none":
         gains = replace(gains, P_set_min=-P_BOUND, P_set_max=P_BOUND, V_set_min=0.0, V_set_max=V_BOUND)
     return gains
 
 
 def law_in_force(control: Control) -> Consensus:
-    """Return the paper's law for one inverter, with its gains under these options."""
-    gains = gains_in_force(control.gains, control.degraded_communication)
-    kappa_c = (
-        control.degraded_communication.kappa_c if control.degraded_communication.weights == "degree-normalised" else 0.0
-    )
+    options = control.degraded_communication
+    gains = gains_in_force(control.gains, options)
+    kappa_c = options.kappa_c if options.weights == "degree-normalised" else 0.0
     return Consensus(**msgspec.structs.asdict(gains), kappa_c=kappa_c)
 
 
@@ -158,7 +150,6 @@ class _Pair:
     since: tuple[float, float] | None = None
     """Times (s) from which the two angles count."""
     t: float = 0.0
-    """Time of the last compared state (s)."""
     slip: float = 0.0
     """Difference of the angles beyond the usual one (cycles)."""
     usual: float = 0.0
@@ -166,9 +157,7 @@ class _Pair:
     back: float | None = None
     """Time of the next retry (s); None while it counts as in step."""
     tried: float | None = None
-    """Time of the last retry (s)."""
     hold: float = RETRY
-    """How long it was left out last (s)."""
 
     def compare(self, since: tuple[float, float], t: float, difference: float) -> None:
         if since != self.since:
@@ -189,9 +178,7 @@ class IslandDetector:
     Between islands the slip grows without bound, unless both have exactly the same frequency. A slip beyond
     `slip_max` (cycles) thus proves another island. Nothing proves the same one, so an agent tries a neighbour out of
     step again after a while, and leaves it out for longer if that was too early. Every agent integrates its own
-    frequency and sends the sum, its `angle`: so lost and late states cost nothing.
-
-    The paper has no such detector; its agents know the switches. Out-of-step relays use the same idea.
+    frequency and sends the sum, its `angle`: so lost and late states cost nothing. The paper has no such detector.
     """
 
     def __init__(self, f_nom: float, slip_max: float) -> None:
@@ -203,7 +190,6 @@ class IslandDetector:
 
     @property
     def angle(self) -> Angle | None:
-        """Own angle, for the neighbours; None before the first measurement."""
         return Angle(self._own[-1][2], self._since) if self._own else None
 
     def sensed(self, t: float, f: float) -> None:
@@ -218,7 +204,6 @@ class IslandDetector:
         self._own.append((t, e, angle))
 
     def heard(self, name: str, t: float, angle: Angle | None) -> None:
-        """Note a neighbour's angle at t (s), if it is new."""
         pair = self._pairs.setdefault(name, _Pair())
         if angle is None or (pair.since is not None and t <= pair.t):
             return

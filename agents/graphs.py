@@ -28,30 +28,20 @@ class Member(Protocol):
     """The part of a nameplate that rules use; a `gridpeers.wire.messages.Nameplate` has it."""
 
     @property
-    def kind(self) -> str:
-        """Kind: "GFM" or "GFL"."""
-
+    def kind(self) -> str: ...
     @property
     def microgrid(self) -> str: ...
     @property
-    def P_rated(self) -> float:
-        """Rated power (W)."""
-
+    def P_rated(self) -> float: ...
     @property
-    def V_nom(self) -> float:
-        """Nominal terminal voltage (V, line-to-neutral)."""
-
+    def V_nom(self) -> float: ...
     @property
-    def m_p(self) -> float:
-        """P-f droop (pu per pu)."""
-
+    def m_p(self) -> float: ...
     @property
-    def m_q(self) -> float:
-        """Q-V droop (pu per pu)."""
+    def m_q(self) -> float: ...
 
 
 Members = Mapping[str, Member]
-"""Nameplates by name."""
 
 Graph = Callable[[Members], Mapping[str, Iterable[str]]]
 """From nameplates to each agent's in-neighbours; an agent without an entry has none."""
@@ -113,8 +103,6 @@ def ring(members: Members) -> Mapping[str, Iterable[str]]:
 
 
 class EdgeList:
-    """Let the pairs under the case's key `links` listen to each other."""
-
     links: Annotated[tuple[tuple[str, str], ...], "Pairs; written as the case's own key `links`."] = ()
 
     def __init__(self, links: Iterable[tuple[str, str]] = ()) -> None:
@@ -138,7 +126,6 @@ GRAPHS: Registry[Any] = Registry(
         "links": "gridpeers.agents.graphs:EdgeList",
     },
 )
-"""Rules by name; those of gridpeers come first."""
 
 
 def neighbours_by(rule: Graph, members: Members, name: str, *, strict: bool = False) -> dict[str, tuple[str, ...]]:

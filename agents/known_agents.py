@@ -18,10 +18,8 @@ class KnownAgents:
     def __init__(self, control: Control) -> None:
         self.control = control
         self.members = Membership(Admission())
-        """Tokens and nameplates. Each agent itself binds the epochs of the senders that it listens to."""
         self._rule = rule_of(control)
         self._own: dict[str, Nameplate] = {}
-        """Nameplates of the agents that share this."""
         self._latest: tuple[Prepare | None, dict[str, str]] = None, {}
         self._taken: Prepare | None = None
         self._graph: RosterGraph | None = None

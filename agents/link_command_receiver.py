@@ -8,16 +8,9 @@ from gridpeers.wire.wording import printable
 
 
 class LinkCommandReceiver:
-    """Takes the plant's commands to the links into one agent.
-
-    The plant sends again what is not acknowledged, so a command may come twice, and one behind a lost one waits for it:
-    which of two commands came later decides which of them holds.
-    """
-
     def __init__(self, name: str, epoch: int, links: Links | None) -> None:
         self._name, self._epoch, self._links = name, epoch, links
         self._last = 0
-        """Number of the last command that was taken."""
 
     def restart(self) -> None:
         """Forget all commands: another plant has begun, whose run starts at 0."""

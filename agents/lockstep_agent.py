@@ -62,41 +62,27 @@ class LockstepAgent(AgentNode):
         self._last_heard = self._barrier.last_heard
         self._pairwise = is_pairwise(config.control)
         self._roster: Prepare | None = None
-        """The last roster with this process."""
         self._processes: dict[str, str] = {}
-        """The process of each name on it, in the order of the inverters."""
         self._ready = False
         """Whether the agent is ready for this roster. It stays so if an agent dies: the next roster changes it."""
         self._proofs: dict[tuple[str, str], bool] = {}
         """Processes asked for proof that they know of the subscription to them; True once they have answered."""
         self._answered = False
-        """Whether a nameplate has come since the last `Prepare`: then others may be on their way."""
         self._unproven: dict[str, str] | None = None
         """In-neighbours on the roster whose processes have not answered; None until the whole roster has been met."""
         self._roster_neighbours: tuple[str, ...] = ()
-        """In-neighbours on the roster, once it has been met."""
         self._tick: int | None = None
-        """Number of the next tick; None before the first measurement."""
         self._grant: Measurement | None = None
-        """The measurement that grants it."""
         self._states_on: dict[str, str] = {}
-        """Sender of the states on each key that the agent listens to."""
         self._early: dict[str, tuple[State, bytes]] = {}
         """States of this tick that arrived before it was done, and their bytes."""
         self._neighbours: tuple[str, ...] = ()
-        """In-neighbours on the roster of the last tick."""
         self._neighbours_of: dict[str, str] = {}
-        """Roster of the last tick."""
         self._present: tuple[int, dict[str, str], tuple[str, ...]] = -1, {}, ()
         """Changes of the members by then, the roster, and the in-neighbours whose processes on it count."""
         self._journal_at = 0.0
-        """When the last part of the journal was sent (s on the driver's clock)."""
         self._ending = ""
-        """Why the agent is about to close; empty otherwise."""
         self._reported = False
-        """Whether the last report on emulated links is sent."""
-
-    # ---------------------------------------------------------------- what the driver needs
 
     @property
     def publications(self) -> tuple[str, ...]:
@@ -137,8 +123,6 @@ class LockstepAgent(AgentNode):
         else:
             self.failed = self._barrier.complaint(self.missing_messages(), now)
 
-    # ---------------------------------------------------------------- liveliness
-
     def _plant_came(self, now: float) -> None:
         # The plant may compile, or wait for agents yet to start. If it dies, its token vanishes and ends this wait.
         self._barrier.rest()
@@ -171,8 +155,6 @@ class LockstepAgent(AgentNode):
             self._barrier.came(name)
             self._compute(now)
 
-    # ---------------------------------------------------------------- messages
-
     def received(self, key: str, payload: bytes, now: float) -> None:
         """Take a message; a state before the next measurement is here takes a shorter way, with the same checks.
 
@@ -201,8 +183,6 @@ class LockstepAgent(AgentNode):
                 self._last_heard[name] = message.seq, now
                 return
         super().received(key, payload, now)
-
-    # ---------------------------------------------------------------- messages of the plant
 
     def _used(self, message: AnyMessage, now: float) -> None:
         self._last_heard[message.sender] = message.seq, now
@@ -250,8 +230,6 @@ class LockstepAgent(AgentNode):
             self._reported = True
             self._publish_decisions()
             self._report_links(final=True)
-
-    # ---------------------------------------------------------------- getting ready
 
     def _on_nameplate(self, instance: str, nameplate: Nameplate, payload: bytes, now: float) -> None:
         super()._on_nameplate(instance, nameplate, payload, now)
@@ -331,8 +309,6 @@ class LockstepAgent(AgentNode):
         t = time_of(self._tick or 0, self._config.T_c)
         ready = Ready(sender=self._name, epoch=self._config.epoch, seq=self._roster.seq, t=t)
         self._publish(self.keys.ready(self._name), encode(ready))
-
-    # ---------------------------------------------------------------- ticks
 
     def _on_measurement(self, message: Measurement, payload: bytes, now: float) -> None:
         if not self._ready:

@@ -71,13 +71,10 @@ take what was sent last with it."""
 @dataclass
 class AgentStatistics:
     ticks: int = 0
-    """Ticks done."""
     missed: int = 0
-    """Ticks skipped, as their time was over."""
     sent: int = 0
     """States sent; the number of the next."""
     used: int = 0
-    """Messages that came in and were used."""
     lost: int = 0
     """Messages that did not come off the wire, as the numbers of those that did show."""
     lateness: float = 0.0
@@ -103,7 +100,6 @@ class RealtimeAgent(AgentNode):
         self.phase: Phase = "seeking"
         self.statistics = AgentStatistics()
         self._plant_epoch = 0
-        """Epoch of the plant that was followed last; 0 before the first."""
         self._link_commands = LinkCommandReceiver(config.name, config.epoch, links)
         # a clock that is to drift must drift
         self._timer = TickTimer(config.T_c / config.speed / config.clock_rate, keeps_clear=config.clock_rate == 1.0)
@@ -112,19 +108,14 @@ class RealtimeAgent(AgentNode):
         self._give_up: float | None = None
         self._health = SessionHealth(config.name)
         self._leaving = ""
-        """Reason why it leaves, once it has sent `Leave`."""
         self._ran = False
-        """Whether it has ticked in the present epoch of the plant."""
         self._left = 0
-        """Periods since then."""
         self._skipped = 0
-        """States since the last that neighbours were sent."""
         self.host_moved: Callable[[], bool] = lambda: False
         """Whether the own host has another address than the session knows; the driver sets it."""
         self._forget_everybody()
 
     def _forget_everybody(self) -> None:
-        """Know nothing of the others, as before the first session."""
         self.phase = "seeking"
         self.routes = dict(self._first_routes)
         self._plants.clear()
@@ -134,15 +125,10 @@ class RealtimeAgent(AgentNode):
         self.members.clear()
         self.states.clear()
         self._missing_agents: tuple[str, ...] = ()
-        """Agents that the plant waits for, as it said last."""
         self._run_time = 0.0
         """Run time of the last measurement that came off the wire (s)."""
         self._neighbours: tuple[str, ...] = ()
-        """In-neighbours among the agents that have been met."""
         self._used_neighbours: tuple[str, ...] = ()
-        """Neighbours in the sums of the last tick."""
-
-    # ---------------------------------------------------------------- what the driver needs
 
     @property
     def publications(self) -> tuple[str, ...]:
@@ -250,8 +236,6 @@ class RealtimeAgent(AgentNode):
             self._decisions = DecisionJournal(self._agent, self.journal)
         self._listen()
 
-    # ---------------------------------------------------------------- liveliness
-
     def _plant_came(self, now: float) -> None:
         self._health.plant_seen(now)
         if self.phase == "seeking":
@@ -275,7 +259,6 @@ class RealtimeAgent(AgentNode):
         self._listen()
 
     def _ask_again(self) -> None:
-        """Ask for the nameplates that have not come: a question dies with its link."""
         for name, instance in self.members.next_unmet():
             self._ask(name, instance)
 
@@ -293,14 +276,8 @@ class RealtimeAgent(AgentNode):
             self._health.forget(PLANT)
         self._plant_epoch = epoch
 
-    # ---------------------------------------------------------------- messages
-
     def _used(self, message: AnyMessage, now: float) -> None:
         self.statistics.used += 1
-
-    def _misled(self, expected: str, message: AnyMessage, now: float) -> None:
-        if self.admission.lives(message):
-            self._health.crossed(message.sender, expected, now)
 
     def _on_control(self, message: Waiting | Stop, payload: bytes, now: float) -> None:
         if isinstance(message, Waiting):
@@ -335,8 +312,6 @@ class RealtimeAgent(AgentNode):
         answer = self._link_commands.take(message, self._run_time)
         if answer is not None:
             self._publish(self.keys.link_acknowledgement(self._name), encode(answer))
-
-    # ---------------------------------------------------------------- ticks
 
     def _hold(self, why: str) -> None:
         if self.phase == "running":

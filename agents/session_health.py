@@ -40,12 +40,8 @@ class SessionHealth:
 
     def _begin(self) -> None:
         self._came: dict[str, float] = {}
-        """Time (s) at which the last message of each sender came off the wire."""
-        self._crossed: dict[str, tuple[str, float]] = {}
-        """By sender: the owner of the other key under which its messages came, and the time of the last."""
 
     def next_session(self) -> None:
-        """Begin anew; with more patience, if the last session never was whole."""
         self._patience = self._patience.next()
         self._begin()
 
@@ -59,17 +55,7 @@ class SessionHealth:
         self._came.pop(name, None)
 
     def plant_seen(self, now: float) -> None:
-        """Note that the plant is there: it has appeared, or says that it waits for agents."""
         self._plant_seen = now
-
-    def crossed(self, name: str, key: str, now: float) -> None:
-        """Note a message that came under another's key.
-
-        By itself that proves nothing: anybody may publish it. But if its sender is silent under its own key, although
-        the plant hears it, the key numbers of the session are confused: nobody else can bring that about, and there is
-        no need to wait any longer.
-        """
-        self._crossed[name] = key, now
 
     def problem(
         self, roster: Sequence[str] | None, *, met: Collection[str], neighbours: Collection[str], now: float
@@ -89,10 +75,6 @@ class SessionHealth:
             for name in silent
         }
         lost = self._patience.lost(waits, now)
-        for name in silent:
-            key, at = self._crossed.get(name, ("", -inf))
-            if self._ran and now - at <= SILENT:
-                return f"messages of {name} come under the key of {key}"
         if lost in ("", PLANT):
             return lost and "nothing comes from the plant"
         if lost == own:

@@ -11,7 +11,6 @@ from __future__ import annotations
 from gridpeers.wire.timing import Timer
 
 EARLIEST, LATEST = 0.25, 0.75
-"""Bounds of the middle half."""
 
 CONVINCED = 5
 """Measurements in a row that come at a bad time before the ticks are moved: one may just have been late."""
@@ -39,7 +38,6 @@ class TickTimer:
         self._measured = at
 
     def take(self, now: float) -> int:
-        """Note that a tick is done now; return the number of ticks that were skipped for it."""
         skipped = self._timer.take(now)
         if self._measured is not None and self._keeps_clear:
             self._keep_clear(self._measured)

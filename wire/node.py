@@ -258,7 +258,6 @@ class Node:
         if route.sender == ANYBODY:
             return
         if message.sender != route.sender:
-            self._misled(route.sender, message, now)
             raise RejectedError("foreign", f"sender {message.sender}, {route.sender} was expected")
         if not route.early:
             self.admission.check(message)
@@ -270,8 +269,6 @@ class Node:
         """
         if self.vouches is not None and not self.vouches(name):
             raise RejectedError("impostor", f"{name} says who it is, but no link has the certificate of {name}")
-
-    def _misled(self, expected: str, message: AnyMessage, now: float) -> None: ...
 
     def _used(self, message: AnyMessage, now: float) -> None: ...
 

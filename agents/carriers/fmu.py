@@ -32,10 +32,8 @@ from gridpeers.wire.schema.table_reading import read_parameters
 from gridpeers.wire.wording import printable, suggestion
 
 OWN = tuple(f"own_{name}" for name in Own._fields if name != "name")
-"""Inputs of the own inverter."""
 
 OF_NEIGHBOUR = tuple(name for name in Neighbour._fields if name not in ("name", "shared"))
-"""Inputs of each neighbour, without their prefix."""
 
 NEIGHBOUR = re.compile(r"neighbour_([1-9][0-9]{0,3})_(?:shared_)?(\w+)")
 """Name of an input of a neighbour: its place, and what it is."""
@@ -67,12 +65,6 @@ def fmu_problems(path: Path, parameters: Mapping[str, Any]) -> list[tuple[str, s
             wrong.append(f"{path.name} has an input {name}; {suggestion(name, known, 'inputs')}")
     wrong += [f"{path.name} has no output {name}" for name in ("P_set", "V_set") if name not in outputs]
     settable = named(description, "parameter")
-    real = "Float64" if is_fmi3(description) else "Real"
-    used = inputs | outputs | {name: variable for name, variable in settable.items() if name in parameters}
-    for name, variable in used.items():
-        if variable.type != real or variable.dimensions:
-            array = "an array of " if variable.dimensions else ""
-            wrong.append(f"{path.name} has {name} as {array}{variable.type}; declare it as a scalar {real}")
     unknown = [name for name in parameters if name not in (*settable, *LIMITS)]
     found = [("fmu", text) for text in wrong]
     found += [(name, f"unknown parameter; {suggestion(name, [*settable, *LIMITS], 'parameters')}") for name in unknown]
@@ -86,7 +78,6 @@ def fmu_problems(path: Path, parameters: Mapping[str, Any]) -> list[tuple[str, s
 
 
 def is_fmi3(description: Any) -> bool:
-    """Return whether an FMU follows FMI 3, which names types and functions differently from FMI 2."""
     return str(description.fmiVersion).startswith("3")
 
 
@@ -97,10 +88,6 @@ def _is_of_neighbour(name: str) -> bool:
 
 def named(description: Any, causality: str) -> dict[str, Any]:
     return {variable.name: variable for variable in description.modelVariables if variable.causality == causality}
-
-
-LOADING = 10.0
-"""Least time (s) that an FMU has to be loaded."""
 
 
 class FmuLaw(ProgramLaw):
@@ -118,7 +105,7 @@ class FmuLaw(ProgramLaw):
         except ValueError:
             shutil.rmtree(self._unpacked, ignore_errors=True)
             raise
-        self._patience = max(LOADING, self._patience)
+        self._patience = max(10.0, self._patience)  # s, to be loaded
 
     def load(self) -> None:
         """Wait until the FMU is loaded; raise LawError if it cannot be."""

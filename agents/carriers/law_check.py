@@ -17,36 +17,30 @@ from gridpeers.wire.schema.table_reading import read_parameters, read_table
 from gridpeers.wire.schema.table_schema import Problem
 from gridpeers.wire.wording import is_no_path
 
-_BINARY = (b"\x7fELF", b"\xcf\xfa\xed\xfe", b"\xce\xfa\xed\xfe", b"\xca\xfe\xba\xbe", b"MZ")
-"""First bytes of programs for Linux, of macOS and of Windows; the last may be run by an emulator."""
+
+_NO_FIRST_LINE = "has no first line such as #!/usr/bin/env python3, and is no compiled program; write one"
 
 
 def executable_problem(file: Path) -> str:
-    """Return why the system cannot run a file, as the end of a sentence; "" if it may."""
+    """Return why the system cannot run a script, as the end of a sentence; "" if it may."""
     try:
         with file.open("rb") as opened:
             first = opened.readline(256)
     except OSError:  # a program that may be run but not read
         return ""
-    if first.startswith(_BINARY):
-        return ""
     if not first.startswith(b"#!"):
-        return (
-            "has no first line such as #!/usr/bin/env python3, and is no compiled program; write one, or name its "
-            "interpreter first"
-        )
-    interpreter, _, argument = first[2:].decode(errors="replace").strip().partition(" ")
+        return "" if b"\0" in first or not first.isascii() else _NO_FIRST_LINE
     if first.endswith(b"\r\n"):
         return "has lines that end as those of Windows, which #! cannot have; write it with Unix line ends"
-    if not Path(interpreter).is_file():
-        return f"asks in its first line for {interpreter or 'nothing'}, and there is no such program"
-    if Path(interpreter).name == "env" and not argument.startswith("-") and not shutil.which(argument.strip()):
-        return f"asks in its first line for {argument.strip() or 'nothing'}, which is not on the PATH"
-    return ""
+    interpreter, *arguments = first[2:].decode(errors="replace").split() or ["nothing"]
+    if Path(interpreter).name == "env" and arguments and not arguments[0].startswith("-"):
+        interpreter = arguments[0]
+    return (
+        "" if shutil.which(interpreter) else f"asks in its first line for {interpreter}, and there is no such program"
+    )
 
 
 PAPER = LawChoice().use
-"""Name of the paper's law; its parameters are `[gains]` and `[degraded_communication]`."""
 
 
 def law_problems(table: Mapping[str, Any]) -> list[Problem]:

@@ -16,7 +16,6 @@ CARRIERS = ("use", "command", "fmu")
 """Keys of a scenario's table `law`, one of which says what the law is."""
 
 KEYS = (*CARRIERS, "folder", "time_limit_s")
-"""Keys of the table `law` that are no parameters of the law."""
 
 METHODS = ("start", "close", "terms")
 """Methods of a law that are called beside `step`; a law may leave them as they are in `Law`."""
@@ -42,7 +41,6 @@ LAWS: Registry[type[Law]] = Registry(
         "resilient": "gridpeers.agents.laws.resilient:Resilient",
     },
 )
-"""Laws by name; those of gridpeers come first."""
 
 
 def make_law(control: Control) -> Law:

@@ -43,7 +43,7 @@ def fuzz(
         If one raises an error that its receiver does not have for bad input.
     """
     with tempfile.TemporaryDirectory() as home:
-        return _fuzz(count, seed, receivers(Path(home)), progress)
+        return _fuzz(count, seed, receivers(), progress)
 
 
 def _fuzz(

@@ -9,7 +9,6 @@ from __future__ import annotations
 import random
 from collections import Counter
 from collections.abc import Callable
-from importlib.util import find_spec
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Protocol
@@ -35,7 +34,6 @@ from gridpeers.viewer.run_view import Cursor, RunView
 from gridpeers.wire.codec import CRC, RejectedError, decode, encode
 from gridpeers.wire.keys import Keys, epoch_of, run_of_plant
 from gridpeers.wire.messages import AgentStatus, Answer, LinkAcknowledgement, LinkReport, Telemetry
-from gridpeers.wire.trust.key_folder import KeysError, open_credentials
 from tests.fuzz.journals import Journals
 from tests.hostile.scenes import (
     EPOCH,
@@ -264,41 +262,8 @@ class Readers:
         return ""
 
 
-class Keyring:
-    """A folder of certificates and keys in which somebody has written: a command opens it, or says what is wrong."""
-
-    FILES = ("members.json", "ca.pem", "inv1.pem", "inv1.key")
-
-    def __init__(self, home: Path) -> None:
-        from gridpeers.wire.trust.site_authority import issue, make_site
-
-        self._folder = home / "lab"
-        make_site(self._folder)
-        issue(self._folder, "inv1")
-        self._whole = {name: (self._folder / name).read_bytes() for name in self.FILES}
-
-    def take(self, payload: bytes, rng: random.Random) -> str:
-        """Write bytes into one of its files, open it, and mend it."""
-        name = rng.choice(self.FILES)
-        whole = self._whole[name]
-        at = rng.randrange(len(whole))
-        part = payload[: rng.choice((0, 1, 1, 4, 100_000))]
-        (self._folder / name).write_bytes(
-            whole[:at] + part + whole[at + rng.choice((0, len(part), len(part), 100_000)) :]
-        )
-        try:
-            open_credentials(self._folder, ("agent",), "inv1")
-            refused = ""
-        except KeysError as error:
-            refused = str(error)
-        finally:
-            (self._folder / name).write_bytes(whole)
-        assert refused.isprintable(), refused
-        return "refused" if refused else ""
-
-
-def receivers(home: Path) -> dict[str, Receiver]:
-    """Return all receivers by name; one has its files in a folder."""
+def receivers() -> dict[str, Receiver]:
+    """Return all receivers by name."""
     return {
         "codec": Codec(),
         "agent, real time": Core(RealtimeAgentScene),
@@ -311,4 +276,4 @@ def receivers(home: Path) -> dict[str, Receiver]:
         "view": View(),
         "readers": Readers(),
         "checks": Journals(),
-    } | ({"keys": Keyring(home)} if find_spec("cryptography") else {})
+    }

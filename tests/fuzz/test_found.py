@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import subprocess
 import sys
 from pathlib import Path
@@ -10,23 +9,17 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from gridpeers.netem.ledger import LinkTrace
-from gridpeers.scenarios.emulation.link_data import LinkCommand, data_of, decode_statuses
+from gridpeers.scenarios.emulation.link_data import LinkCommand, decode_statuses
 from gridpeers.scenarios.live.feeder_map import read_feeder_map
 from gridpeers.scenarios.live.run_requests import read_config
 from gridpeers.scenarios.record.journal_reader import entries_of, values_of
 from gridpeers.scenarios.results.run_files import FolderError
 from gridpeers.scenarios.results.run_journal import JOURNAL, rows_in
 from gridpeers.scenarios.sweep.sweep_case import SweepRow
-from gridpeers.wire.bounds import LONGEST_MESSAGE, MOST_COUNT
-from gridpeers.wire.messages import LinkReport
+from gridpeers.wire.bounds import LONGEST_MESSAGE
 from gridpeers.wire.trust.key_folder import KeysError, read_list
 from gridpeers.wire.trust.site_authority import issue, make_site
-from tests.fuzz.journals import judged, link_report
 from tests.hostile.cases import sealed
-
-NO_UTF8 = b"\x81\xa4typ\xe5\x01"
-"""A map with a key whose text ends within a character."""
 
 LIST_AS_KEY = b"\x81\x91\x01\x01"
 
@@ -44,51 +37,11 @@ def test_a_journal_longer_than_a_message_is_refused_before_it_is_read() -> None:
         list(entries_of(bytes(LONGEST_MESSAGE + 1)))
 
 
-def test_a_text_that_is_no_utf8_is_no_report() -> None:
-    """Here msgspec raises a UnicodeDecodeError, which is none of its own errors."""
-    with pytest.raises(msgspec.DecodeError):
-        data_of(LinkReport(sender="inv1", epoch=1, seq=0, t=0.0, data=NO_UTF8))
-    with pytest.raises(msgspec.DecodeError):
-        decode_statuses(NO_UTF8)
-    assert read_feeder_map(b'{"buses": [["\xe5", 0, 0]]}') is None
-
-
 @pytest.mark.parametrize("statuses", [{"inv2": {"holds": ["\x1b[2Jall is well"]}}, {"\x1b[2J": {"holds": []}}])
 def test_the_state_of_a_link_cannot_write_on_a_terminal(statuses: dict[str, object]) -> None:
     """`gridpeers link show` prints what a receiver says of its links, and of whose they are."""
     with pytest.raises(msgspec.DecodeError):
         decode_statuses(msgspec.msgpack.encode(statuses))
-
-
-def test_verdicts_of_a_link_do_not_have_a_check_count_to_2_53() -> None:
-    """The first message of all and the last that there can be: what lies between took a check months."""
-    trace = LinkTrace("inv2", "inv1", (0, MOST_COUNT), (0.0, 0.02), (0.0, 0.0))
-    sums, unreadable = judged([], [link_report("inv1", trace)], clock="simulated")
-
-    assert (sums.finish(unreadable).unreadable, unreadable) == (1, 1)
-
-
-def test_a_certificate_of_an_unknown_curve_is_told_in_one_line(tmp_path: Path) -> None:
-    """It loads, and only its key fails, when it is asked for."""
-    pytest.importorskip("cryptography", reason="certificates need the extra keys")
-    from cryptography.hazmat.primitives import serialization
-    from cryptography.x509 import load_pem_x509_certificate
-
-    from gridpeers.wire.trust.key_folder import KeysError, open_credentials
-    from gridpeers.wire.trust.site_authority import issue, make_site
-
-    folder = tmp_path / "lab"
-    make_site(folder)
-    issue(folder, "inv1")
-    path = folder / "inv1.pem"
-    der = load_pem_x509_certificate(path.read_bytes()).public_bytes(serialization.Encoding.DER)
-    p256, unknown = bytes.fromhex("2a8648ce3d030107"), bytes.fromhex("2a8648ce3d03017f")
-    assert p256 in der
-    text = base64.encodebytes(der.replace(p256, unknown)).decode()
-    path.write_text(f"-----BEGIN CERTIFICATE-----\n{text}-----END CERTIFICATE-----\n")
-
-    with pytest.raises(KeysError, match=r"inv1\.pem: is no certificate in PEM"):
-        open_credentials(folder, ("agent",), "inv1")
 
 
 @pytest.mark.parametrize(

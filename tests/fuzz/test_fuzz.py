@@ -21,7 +21,7 @@ def test_no_bytes_raise_an_error_that_nobody_expects(tmp_path: Path) -> None:
 
     assert min(ways.values()) > 15
     assert {"", "corrupt", "garbled", "unknown", "not finite", "implausible", "oversized"} - kinds <= {"oversized"}
-    assert {name for name, _ in outcomes} == set(receivers(tmp_path))
+    assert {name for name, _ in outcomes} == set(receivers())
     for name in {name for name, _ in outcomes}:
         assert sum(count for (to, kind), count in outcomes.items() if to == name and kind) > 30, name
     assert {kind for name, kind in outcomes if "agent" in name or "plant" in name} <= {"", *KINDS} - {"failed"}
@@ -34,7 +34,7 @@ def test_an_error_is_told_with_the_bytes_that_raised_it(monkeypatch: pytest.Monk
         def take(self, payload: bytes, rng: random.Random) -> str:
             return str(payload[40])
 
-    monkeypatch.setattr(fuzzing, "receivers", lambda home: {"codec": Weak(), "weak": Weak()})
+    monkeypatch.setattr(fuzzing, "receivers", lambda: {"codec": Weak(), "weak": Weak()})
     with pytest.raises(FuzzError, match=r"message \d+ of seed 5 \(.*\), codec: IndexError: .*; b'"):
         fuzz(1_000, seed=5)
 

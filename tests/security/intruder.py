@@ -88,40 +88,6 @@ def credentials(folder: Path, name: str) -> Credentials:
     return Unruly(**structs.asdict(open_credentials(folder, ROLES, name)[0]))
 
 
-def forged(folder: Path, signer: str, common_name: str, into: Path) -> tuple[Path, Path]:
-    """Return certificate, with its chain, and key of a name whose certificate a member has signed by its own key."""
-    from cryptography import x509
-    from cryptography.hazmat.primitives import hashes
-    from cryptography.hazmat.primitives.asymmetric import ec
-    from cryptography.hazmat.primitives.serialization import (
-        Encoding,
-        NoEncryption,
-        PrivateFormat,
-        load_pem_private_key,
-    )
-    from cryptography.x509.oid import NameOID
-
-    above = x509.load_pem_x509_certificate((folder / f"{signer}.pem").read_bytes())
-    signing = load_pem_private_key((folder / f"{signer}.key").read_bytes(), None)
-    assert isinstance(signing, ec.EllipticCurvePrivateKey)
-    own = ec.generate_private_key(ec.SECP256R1())
-    certificate = (
-        x509.CertificateBuilder()
-        .subject_name(x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, common_name)]))
-        .issuer_name(above.subject)
-        .public_key(own.public_key())
-        .serial_number(x509.random_serial_number())
-        .not_valid_before(above.not_valid_before_utc)
-        .not_valid_after(above.not_valid_after_utc)
-        .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
-        .sign(signing, hashes.SHA256())
-    )
-    pem, key = into / "forged.pem", into / "forged.key"
-    pem.write_bytes(certificate.public_bytes(Encoding.PEM) + (folder / f"{signer}.pem").read_bytes())
-    key.write_bytes(own.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption()))
-    return pem, key
-
-
 def handshake(endpoint: str, certificate: Path | None, key: Path | None = None) -> str:
     """Return the alert with which the other end refuses a TLS handshake; empty if it takes the certificate.
 

@@ -11,11 +11,9 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from gridpeers.scenarios.drivers.free_endpoint import parse_endpoint
 from gridpeers.wire.messages import Command, Measurement, Message, State
-from gridpeers.wire.trust.key_folder import tls_refusal
 from tests.processes.terminals import wait_for
-from tests.security.intruder import PATIENCE, Intruder, answered, credentials, forged, handshake
+from tests.security.intruder import Intruder, answered, credentials, handshake
 from tests.security.recording import Recording
 from tests.toy.town import Town
 
@@ -61,25 +59,6 @@ def test_with_a_certificate_of_another_site_nobody_gets_a_link(town: Town, tmp_p
     wait_for(town.folder / "plant.log", "invalid peer certificate: ")
 
 
-def test_a_command_learns_why_there_is_no_link(town: Town, lab: Path, tmp_path: Path) -> None:
-    """One handshake with the plant tells which side refuses the other's certificate; a member is refused nothing."""
-    from gridpeers.wire.trust.site_authority import issue, make_site
-
-    make_site(other := tmp_path / "lab")
-    issue(other, "inv3")
-    endpoint, member, foreign = parse_endpoint(town.endpoint), credentials(lab, "inv3"), credentials(other, "inv3")
-    assert endpoint is not None
-    mixed = replace(foreign, ca=member.ca)
-    told = [tls_refusal(endpoint.host, endpoint.port, shown, PATIENCE) for shown in (member, foreign, mixed, None)]
-
-    assert told[1].startswith(f"shows a certificate that {foreign.ca} does not accept ")
-    assert told[:1] + told[2:] == [
-        "",
-        "does not accept the certificate of inv3: by the ca.pem there it is of another site",
-        "asks for a certificate",
-    ]
-
-
 def test_with_an_expired_certificate_nobody_gets_a_link(town: Town, lab: Path, tmp_path: Path) -> None:
     """One of our own site, that ended a day ago."""
     from gridpeers.wire.trust.site_authority import issue
@@ -91,14 +70,6 @@ def test_with_an_expired_certificate_nobody_gets_a_link(town: Town, lab: Path, t
     assert handshake(town.endpoint, site / "inv3.pem", site / "inv3.key") == "SSLV3_ALERT_CERTIFICATE_EXPIRED"
     wait_for(town.folder / "plant.log", "certificate expired")
     assert handshake(town.endpoint, lab / "inv3.pem", lab / "inv3.key") == ""
-
-
-def test_a_member_is_no_authority(town: Town, lab: Path, tmp_path: Path) -> None:
-    """A certificate of an operator that inv3 has signed with its own key is refused, with the whole chain shown."""
-    told = handshake(town.endpoint, *forged(lab, "inv3", "operator:operator", tmp_path))
-
-    assert told == "SSLV3_ALERT_CERTIFICATE_UNKNOWN"
-    wait_for(town.folder / "plant.log", "EndEntityUsedAsCa")
 
 
 def many(state: State) -> list[State]:
@@ -150,17 +121,6 @@ def test_a_viewer_cannot_command(town: Town, lab: Path) -> None:
         attack(town, intruder, town.keys.request, stop)
     assert town.keys.alive_agent("inv1", "").rstrip("/") in "".join(town.tokens)
     assert not [event for event in town.events if event.subject == "inv1" and "left" in event.text]
-
-
-def test_an_operator_commands(town: Town, lab: Path) -> None:
-    """The way is open that a viewer does not have: the plant answers a command that it cannot carry out."""
-    nothing = Command(sender="visitor", epoch=0, seq=1, t=0.0, verb="stop", argument="inv9", reply_to="observer")
-    before = len(town.answers)
-    with Intruder(town.endpoint, credentials(lab, "operator")) as operator:
-        attack(town, operator, town.keys.command, nothing)
-    town.until(lambda: len(town.answers) > before, "the plant's answer")
-
-    assert not town.answers[-1].ok
 
 
 def asks(intruder: Intruder, question: str, key: str, lies: Sequence[Message]) -> None:

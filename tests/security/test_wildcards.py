@@ -78,30 +78,3 @@ def test_an_agent_gets_no_configuration_but_its_own(town: Town, lab: Path) -> No
 
         town.until(come, "the own configuration")
     assert answered == {own}
-
-
-def test_nobody_is_asked_in_anothers_place(town: Town, lab: Path) -> None:
-    """A queryable on the nameplate of inv1, on configurations or on everything gets no query; the own one does."""
-    (instance,) = (key.rpartition("/")[2] for key in town.tokens if "/alive/agent/inv1/" in key)
-    asked = (town.keys.nameplate("inv1", instance), town.keys.config("inv1"))
-    own = town.keys.nameplate("inv3", "z6")
-    seen: list[str] = []
-    with Intruder(town.endpoint, credentials(lab, "inv3")) as intruder:
-
-        def answer(query: Any) -> None:
-            with query:
-                seen.append(str(query.key_expr))
-                query.reply(query.key_expr, b"lie")
-
-        intruder.linked(4)
-        kept = [intruder.raw.declare_queryable(key, answer, complete=True) for key in (*asked, "**", own)]
-
-        def ask() -> bool:
-            for key in (*asked, own):
-                town.session.fetch(key)
-            return own in seen
-
-        town.until(ask, "a query on the own nameplate")
-        assert {*seen} == {own}
-        for queryable in kept:
-            queryable.undeclare()

@@ -198,8 +198,8 @@ def test_a_program_may_have_any_parameter() -> None:
 
 @pytest.mark.parametrize(("text", "said"), [
     ("print(1)\n", r"\./law has no first line such as #!/usr/bin/env python3, and is no compiled program; write one"),
-    ("#!/nowhere/python\n", r"\./law asks in its first line for /nowhere/python, and there is no such program"),
-    ("#!/usr/bin/env pithon3\n", r"\./law asks in its first line for pithon3, which is not on the PATH"),
+    ("#!/nowhere/python\n", r"\./law asks in its first line for /nowhere/python, which is not there"),
+    ("#!/usr/bin/env pithon3\n", r"\./law asks in its first line for pithon3, which is not there"),
     ("#!/bin/sh\r\n", r"\./law has lines that end as those of Windows"),
 ])  # fmt: skip
 def test_a_program_that_the_system_cannot_run_is_refused(text: str, said: str, tmp_path: Path) -> None:

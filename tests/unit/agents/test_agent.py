@@ -106,24 +106,6 @@ def test_only_who_takes_part_moves(secondary: Any, name: str, moves: bool) -> No
     assert ((decided.P_set, decided.V_set) != (50e3, 277.0)) == moves
 
 
-def test_a_neighbour_never_heard_from_is_left_out() -> None:
-    """Silence does not pull: with one of two neighbours heard, d is 1."""
-    silent, alone = met(), met()
-    for agent in (silent, alone):
-        agent.hear(state("inv2"))
-
-    assert silent.tick(measurement(0), ("inv2", "inv3")) == alone.tick(measurement(0), ("inv2",))
-
-
-def test_the_last_value_heard_counts() -> None:
-    """A neighbour that has fallen silent keeps its last value until it is taken out of the neighbours."""
-    agent, other = met(), met()
-    agent.hear(state("inv2", 4, P_set=90e3))
-    other.hear(state("inv2", 9, P_set=90e3))
-
-    assert agent.tick(measurement(10), ("inv2",)) == other.tick(measurement(10), ("inv2",))
-
-
 def test_another_life_of_a_name_begins_anew() -> None:
     """After a restart the new nameplate counts, and the last state of the life before is forgotten, later or not."""
     for life in (2, 0):
@@ -132,11 +114,6 @@ def test_another_life_of_a_name_begins_anew() -> None:
         agent.meet(plate("inv2", epoch=life))
 
         assert agent.tick(measurement(8), ("inv2",)) == fresh.tick(measurement(8), ("inv2",))
-
-
-def test_unknown_names_on_the_roster_are_no_neighbours() -> None:
-    """The rule ignores agents whose nameplates have not been seen."""
-    assert met().in_neighbours((*ROSTER, "inv7")) == ("inv2", "inv3")
 
 
 def test_out_of_service_an_agent_stands_still_and_begins_again_from_what_the_plant_holds() -> None:

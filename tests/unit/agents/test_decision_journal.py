@@ -46,19 +46,6 @@ class Deciding:
         return [entry for entry in entries if isinstance(entry, Decision)]
 
 
-def test_in_ticks_only_what_changes_is_noted() -> None:
-    """An entry holds until the next one: as long as all states are those of the tick before, there is none."""
-    agent = Deciding()
-    for tick in range(1, 5):
-        agent.hear(tick - 1, *NEIGHBOURS)
-        agent.use(*NEIGHBOURS)
-        assert agent.journal.tick(tick, 0, NEIGHBOURS) == (tick == 1)
-
-    (entry,) = agent.noted()
-    assert (entry.tick, entry.measurement, entry.neighbours) == (1, 0, list(NEIGHBOURS))
-    assert (entry.states, entry.unused, entry.weights) == ([1, 1, 1, 1], [], [])
-
-
 @pytest.mark.parametrize("what", ["older", "measurement", "saturated", "fewer", "another"])
 def test_in_ticks_each_change_is_noted(what: str) -> None:
     """An older state, a late measurement, a saturated side, a neighbour less, another neighbour."""
@@ -97,18 +84,6 @@ def test_in_ticks_each_reason_is_its_own() -> None:
     (entry,) = agent.noted()
     assert entry.states == [1, None, 4, 4]
     assert entry.unused == ["", "silent", "stale", "island"]
-
-
-def test_out_of_service_no_state_is_stale() -> None:
-    """An agent whose inverter is off the network is in nobody's island, however new or old their states are."""
-    agent = Deciding()
-    agent.in_service = False
-    agent.hear(4, "inv2", "inv3", "inv5")
-    agent.use()
-
-    agent.journal.tick(5, 0, NEIGHBOURS)
-
-    assert [entry.unused for entry in agent.noted()] == [["island", "island", "silent", "island"]]
 
 
 def test_in_real_time_each_decision_is_noted_with_its_reasons() -> None:

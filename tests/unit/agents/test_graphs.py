@@ -20,12 +20,10 @@ from gridpeers.agents.graphs import (
     in_neighbours,
     is_pairwise,
     make_graph,
-    natural_order,
     neighbours_by,
 )
 from gridpeers.wire.messages import Measurement
 from gridpeers.wire.plugins.plugin import Plugin, plugin_of, plugin_problems
-from gridpeers.wire.plugins.registry import PluginError
 from tests.toy.toy_configs import agent_config
 
 PAPER = {
@@ -116,26 +114,12 @@ def test_a_ring_runs_in_natural_order(names: list[str]) -> None:
     assert set(in_neighbours(ring, "inv1", members)) == {"inv2", "inv12"}
 
 
-def test_a_ring_closes_around_who_left() -> None:
-    """With inv5 gone, inv4 and inv6 are neighbours."""
-    members = {name: plate for name, plate in PAPER.items() if name != "inv5"}
-
-    assert set(in_neighbours(rule("ring"), "inv4", members)) == {"inv3", "inv6"}
-
-
 @pytest.mark.parametrize(("n", "expected"), [(1, ()), (2, ("inv2",))])
 def test_a_small_ring_has_no_double_links(n: int, expected: tuple[str, ...]) -> None:
     """Alone there is no neighbour, in a pair the other is one, not two."""
     members = {f"inv{i + 1}": SimpleNamespace(kind="GFL", microgrid="mg1") for i in range(n)}
 
     assert in_neighbours(rule("ring"), "inv1", members) == expected
-
-
-def test_mixed_names_sort_naturally() -> None:
-    """Digits count as numbers, also between words."""
-    names = ["mg10_inv1", "mg2_inv10", "mg2_inv9", "inv"]
-
-    assert sorted(names, key=natural_order) == ["inv", "mg2_inv9", "mg2_inv10", "mg10_inv1"]
 
 
 def test_missing_links_are_left_out_of_any_rule_both_ways() -> None:
@@ -258,16 +242,6 @@ def test_what_is_no_graph_is_told_in_one_line(rule: object, said: str) -> None:
     assert "\n" not in str(caught.value)
 
 
-def test_who_has_not_been_met_yet_is_left_out(folder: str) -> None:
-    """In wall-clock time agents meet one after the other: a rule that names inv1 works before inv1 is there."""
-    agent = Agent(agent_config("inv3", control("my_graphs:star", folder)))
-    agent.meet(Agent(agent_config("inv2")).nameplate)
-
-    assert agent.in_neighbours(("inv3", "inv2")) == ()
-    agent.meet(Agent(agent_config("inv1")).nameplate)
-    assert agent.in_neighbours(("inv3", "inv1", "inv2")) == ("inv1",)
-
-
 def test_an_agent_whose_rule_fails_in_a_run_stands_still_and_says_so(folder: str) -> None:
     """The run goes on: its state tells the fault once, and is idle until the rule works with the roster again."""
     agent = Agent(agent_config("inv1", control("my_graphs:of_three", folder)))
@@ -287,19 +261,6 @@ def test_an_agent_whose_rule_fails_in_a_run_stands_still_and_says_so(folder: str
     assert (first.idle, first.P_set) == (True, 3e4)
     assert (second.idle, second.fault) == (True, "")
     assert (third.idle, third.fault) == (False, "")
-
-
-def test_a_decorators_name_is_a_rule_and_never_taken_over() -> None:
-    """A rule that gridpeers or a plug-in has registered under a name stays."""
-
-    @GRAPHS.register("nobody-at-all")
-    def nobody(members):  # type: ignore[no-untyped-def]
-        """Nobody."""
-        return {}
-
-    assert GRAPHS.resolve("nobody-at-all") is nobody
-    with pytest.raises(PluginError, match='there is a graph "ring" already; choose another name'):
-        GRAPHS.register("ring")(nobody)
 
 
 def test_two_modules_of_one_name_are_not_taken_for_each_other(folder: str, tmp_path: Path) -> None:

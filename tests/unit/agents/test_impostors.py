@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tests.unit.agents.realtime_lab import KEYS, T_C, Lab
+from tests.unit.agents.realtime_lab import T_C, Lab
 
 
 def test_a_neighbour_whose_certificate_no_link_has_is_not_used() -> None:
@@ -35,33 +35,3 @@ def test_a_plant_whose_certificate_no_link_has_commands_nobody() -> None:
 
     assert lab.side.phase != "running"
     assert lab.side.rejects.counts["impostor"] == 9
-
-
-def test_with_certificates_of_all_a_run_is_as_without() -> None:
-    """The check changes nothing for those whom links name."""
-    lab = Lab()
-    lab.side.vouches = {"plant", "inv2"}.__contains__
-    lab.token("plant")
-    lab.meet("inv2")
-    lab.measure(1)
-    lab.state("inv2", 1, T_C)
-    lab.go(T_C)
-
-    assert lab.side.phase == "running"
-    assert not lab.side.rejects.counts
-
-
-def test_the_end_of_a_token_with_the_plants_epoch_in_another_text_ends_nothing() -> None:
-    """Whoever holds one for a moment, with a zero before, would else have every agent give up its plant."""
-    lab = Lab()
-    lab.token("plant")
-    lab.meet("inv2")
-    lab.measure(1)
-    lab.go(T_C)
-    for text in ("01", "001"):
-        lab.side.appeared(KEYS.alive_plant(text), lab.now)
-        lab.side.vanished(KEYS.alive_plant(text), lab.now)
-
-    assert lab.side.phase == "running"
-    lab.token("plant", gone=True)
-    assert lab.side.phase != "running"

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gridpeers.agents.degraded_communication import LONGEST_RETRY, RETRY, T_GAP, T_LEAK, TRUSTED, IslandDetector
+from gridpeers.agents.degraded_communication import LONGEST_RETRY, IslandDetector
 
 T, F_NOM, SLIP_MAX = 0.02, 60.0, 0.01
 
@@ -50,36 +50,6 @@ def test_another_frequency_is_seen_as_soon_as_the_slip_is_too_large(difference: 
     assert SLIP_MAX / abs(difference) <= k * T <= 1.1 * SLIP_MAX / abs(difference) + 3 * T
 
 
-def test_sensors_that_disagree_a_little_are_in_step() -> None:
-    """Below slip_max / T_LEAK the slip never gets there, however long one waits."""
-    here, there = pair()
-    for k in range(10_000):
-        here.sensed(k * T, 60.0)
-        there.sensed(k * T, 60.0 + 0.9 * SLIP_MAX / T_LEAK)
-        here.heard("inv4", k * T, there.angle)
-
-    assert not here.apart("inv4", 200.0)
-
-
-@pytest.mark.parametrize("frozen", ["here", "there"])
-def test_who_slept_is_in_step_when_it_wakes(frozen: str) -> None:
-    """Its angle counts anew, as nobody knows what the frequency was meanwhile; any later state tells the others."""
-    here, there = pair()
-    for k in range(300):
-        asleep = 100 <= k < 200
-        f = 59.5 if asleep else 60.0
-        if not (asleep and frozen == "here"):
-            here.sensed(k * T, f)
-        if not (asleep and frozen == "there"):
-            there.sensed(k * T, f)
-        if not asleep:
-            here.heard("inv4", k * T, there.angle)
-        assert not here.apart("inv4", k * T)
-
-    assert here.angle is not None
-    assert here.angle.since == (4.0 if frozen == "here" else 0.0)
-
-
 def test_whoever_was_apart_is_tried_again_ever_more_rarely() -> None:
     """After 10 s, then 20 s and so on up to ten minutes, as long as it does not stay in step."""
     here, there = pair()
@@ -99,24 +69,6 @@ def test_whoever_was_apart_is_tried_again_ever_more_rarely() -> None:
     assert gaps[-1] == pytest.approx(LONGEST_RETRY, abs=1.0)
 
 
-def test_after_some_time_in_step_the_next_time_apart_counts_as_the_first() -> None:
-    """Islands that were one for a while fall apart anew: that is news, not a retry that failed."""
-    here, there = pair()
-    times, was_apart = [], False
-    joined = RETRY + 1.0, RETRY + 1.0 + 2 * TRUSTED
-    for k in range(5000):
-        t = k * T
-        here.sensed(t, 60.0)
-        there.sensed(t, 60.0 if joined[0] - 2.0 <= t < joined[1] else 60.1)
-        here.heard("inv4", t, there.angle)
-        apart = here.apart("inv4", t)
-        if apart != was_apart:
-            times.append(t)
-        was_apart = apart
-
-    assert [b - a for a, b in zip(times[::2], times[1::2], strict=False)][:2] == pytest.approx([RETRY, RETRY], abs=0.1)
-
-
 def test_nothing_is_known_of_whom_nothing_was_heard_and_on_the_grid() -> None:
     """A neighbour without angle, one that was forgotten, and all at a restart: none of them is left out."""
     here, there = pair()
@@ -133,14 +85,3 @@ def test_nothing_is_known_of_whom_nothing_was_heard_and_on_the_grid() -> None:
     assert before == [True, True, False, False]
     assert after == (False, True)
     assert not here.apart("inv5", 2.0)
-
-
-def test_a_state_from_before_what_is_known_is_of_no_use() -> None:
-    """Samples older than the own measurements, or much later than the last of them, are not compared."""
-    here, there = pair()
-    here.sensed(5.0, 60.0)
-    for t in (0.0, 5.0 + 2 * T_GAP):
-        there.sensed(t, 70.0)
-        here.heard("inv4", t, there.angle)
-
-    assert not here.apart("inv4", 6.0)

@@ -5,21 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from msgspec.structs import replace
-
 from gridpeers.agents.agent import Agent
 from gridpeers.agents.agent_config import Control
 from gridpeers.agents.graphs import RosterGraph
 from gridpeers.agents.known_agents import KnownAgents
-from gridpeers.agents.lockstep_agent import LockstepAgent
-from gridpeers.wire.codec import encode
-from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import Prepare
-from gridpeers.wire.node import Fetch
 from tests.toy.toy_configs import agent_config
 
 NAMES = ("inv1", "inv2", "inv3", "inv4")
-KEYS = Keys("toy")
 RING = Control(secondary="all", graph="ring")
 
 
@@ -51,18 +44,6 @@ def test_a_rule_is_evaluated_once_for_all_agents_of_a_roster() -> None:
     assert calls == [list(NAMES)]
 
 
-def test_a_new_roster_has_a_new_graph() -> None:
-    """The ring closes over the gap of an agent that has gone."""
-    known = introduced(*NAMES)
-    known.take(roster(0, *NAMES))
-    assert known.in_neighbours("inv1") == ("inv2", "inv4")
-
-    known.gone("inv2", "inv2")
-    known.take(roster(1, "inv1", "inv3", "inv4"))
-    assert known.unmet("inv1") == []
-    assert known.in_neighbours("inv1") == ("inv3", "inv4")
-
-
 def test_a_member_without_a_nameplate_is_missing_to_all_but_itself() -> None:
     """A process whose token is gone, or another one than the roster's, is not met."""
     known = introduced("inv1", "inv2", "inv3")
@@ -71,18 +52,3 @@ def test_a_member_without_a_nameplate_is_missing_to_all_but_itself() -> None:
 
     assert known.unmet("inv1") == ["inv2", "inv4"]
     assert known.unmet("inv2") == ["inv4"]
-
-
-def test_agents_that_share_ask_their_neighbours_alone() -> None:
-    """The one query is the proof of the subscription: nobody asks n agents for n nameplates."""
-    known = introduced(*NAMES)
-    nodes = [LockstepAgent(replace(agent_config(name, RING), epoch=1), name, known=known) for name in NAMES]
-    message = roster(0, *NAMES)
-    for node in nodes:
-        node.start(0.0)
-        node.appeared(KEYS.alive_plant(1), 0.0)
-        node.take_actions()
-        node.received(KEYS.control, encode(message), 0.0)
-
-    asked = [[KEYS.parts(a.key)[1] for a in node.take_actions() if isinstance(a, Fetch)] for node in nodes]
-    assert asked == [["inv2", "inv4"], ["inv1", "inv3"], ["inv2", "inv4"], ["inv1", "inv3"]]

@@ -9,9 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gridpeers.agents.carriers.law_registry import LAWS
-from gridpeers.agents.carriers.time_limit import TimeLimited
 from gridpeers.agents.laws.call import decide
-from gridpeers.agents.laws.law import Law, Neighbour, Own, SetPoints
+from gridpeers.agents.laws.law import Neighbour, Own
 
 NAMES = ("consensus", "dapi", "event-triggered", "finite-time", "centralised", "resilient")
 
@@ -96,18 +95,3 @@ def test_the_paper_s_terms() -> None:
     assert (sharing.name, sharing.neighbour, error.name) == ("power sharing", "inv2", "frequency error")
     assert sharing.value == pytest.approx(0.5 * (1 - 2.718281828459045 ** (-2 * 0.01 / 0.0007 * 0.02)) * 0.2)
     assert error.value == pytest.approx((1 - 2.718281828459045 ** (-0.01 / 0.0007 * 0.02)) * 0.1)
-
-
-def test_a_law_need_not_name_any() -> None:
-    """A law without terms has none, also behind its time limit; one with terms keeps them there."""
-
-    class Plain(Law):
-        def step(self, own, neighbours, T):  # type: ignore[no-untyped-def]
-            return SetPoints(own.P_set, own.V_set)
-
-    own = Own("inv1", True, 1.0, 0.5, 0.0, 1.0, -0.001, 0.0, 0.5, 1.0, 0.01, 0.05, 6e5, 277.0, 60.0)
-    assert TimeLimited(Plain(), 1.0).terms(own, (), 0.02) is None
-    limited = TimeLimited(LAWS.resolve("dapi", "")(), 1.0).terms(own, (), 0.02)
-    assert limited is not None
-    assert [term.name for term in limited.P_set] == ["frequency error"]
-    assert limited.P_set[0].value == pytest.approx(0.01)

@@ -5,10 +5,8 @@ from itertools import pairwise
 import pytest
 from msgspec.structs import replace
 
-from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.wire.messages import Leave, Stop
 from gridpeers.wire.node import MOST_PLANTS
-from tests.toy.toy_configs import agent_config
 from tests.unit.agents.realtime_lab import KEYS, T_C, Lab, running
 
 
@@ -78,16 +76,6 @@ def test_a_silent_neighbour_is_out_after_max_age_and_back_with_its_next_state() 
     assert lab.decided()[0].P_set > aged[-1].P_set
 
 
-def test_a_state_that_was_long_on_its_way_is_old_when_it_comes() -> None:
-    """After a cut, buffered states arrive in a bunch: their run time tells."""
-    lab = running("inv2")
-    lab.measure(100)
-    lab.state("inv2", 7, t=1.0)
-    lab.go(T_C)
-
-    assert lab.decided()[0].P_set == 50e3
-
-
 def test_a_neighbour_in_another_island_is_left_out() -> None:
     """Its state says where it stands; the status shows it as a neighbour that is not used."""
     lab = running("inv2", "inv3")
@@ -100,17 +88,6 @@ def test_a_neighbour_in_another_island_is_left_out() -> None:
     assert {state.P_set for state in lab.decided()} == {50e3}
     assert lab.status().neighbours == ("inv2", "inv3")
     assert lab.status().used == ("inv3",)
-
-
-def test_a_lost_token_takes_a_neighbour_out_at_once() -> None:
-    """Leaving and dying are seen alike."""
-    lab = running("inv2")
-    lab.state("inv2", 0)
-    lab.token("inv2", gone=True)
-    lab.measure(1)
-    lab.go(T_C)
-
-    assert lab.decided()[0].P_set == 50e3
 
 
 def test_a_restarted_neighbour_is_heard_again_and_its_ghost_is_not() -> None:
@@ -130,23 +107,6 @@ def test_a_restarted_neighbour_is_heard_again_and_its_ghost_is_not() -> None:
 
     assert ghost == 50e3
     assert lab.decided()[0].P_set > 50e3
-    assert lab.side.rejects.counts["ghost"] == 1
-
-
-def test_a_second_process_of_a_name_waits_until_the_first_is_gone() -> None:
-    """Somebody that only claims a neighbour's name does not push it out."""
-    lab = running("inv2")
-    lab.token("inv2", "b")
-    lab.plate("inv2", "b", life=2)
-    lab.state("inv2", 0)
-    lab.measure(1)
-    lab.go(T_C)
-    assert lab.decided()[0].P_set > 50e3
-    lab.state("inv2", 1, epoch=2)
-    assert lab.side.rejects.counts["ghost"] == 1
-
-    lab.token("inv2", "a", gone=True)
-    lab.state("inv2", 2, epoch=2)
     assert lab.side.rejects.counts["ghost"] == 1
 
 
@@ -190,20 +150,6 @@ def test_it_survives_the_plants_death_and_follows_its_new_life() -> None:
     assert lab.side.rejects.counts["ghost"] == 1
 
 
-def test_woken_late_it_drops_what_it_knew() -> None:
-    """After SIGCONT what lies in the inbox is seconds old, though it comes in now."""
-    lab = running("inv2")
-    lab.now += 3.0
-    lab.measure(1)
-    lab.state("inv2", 0)
-    lab.go(0.0)
-    assert lab.decided() == []
-    lab.measure(160, P_set=61e3)
-    lab.go(T_C)
-
-    assert [state.P_set for state in lab.decided()] == [61e3]
-
-
 def test_it_leaves_properly() -> None:
     """Leave goes out, of itself or at the plant's word; it closes when the plant answers; refused, it just closes."""
     asked, stopped, refused = running(), running(), Lab()
@@ -241,16 +187,6 @@ def test_who_leaves_and_is_not_answered_closes_after_a_second() -> None:
     assert frozen.side.stopped == "asked to leave: SIGTERM"
 
 
-def test_gaps_in_the_numbers_are_counted_as_lost() -> None:
-    """Zenoh drops silently; the numbers tell."""
-    lab = running("inv2")
-    for seq in (0, 1, 4):
-        lab.state("inv2", seq)
-    lab.measure(3)
-
-    assert lab.side.statistics.lost == 2 + 2
-
-
 def test_a_nameplate_that_does_not_come_is_asked_for_again() -> None:
     """A question can die with the link it went over, though the other's token stays; the answer ends the asking."""
     lab = running()
@@ -262,27 +198,6 @@ def test_a_nameplate_that_does_not_come_is_asked_for_again() -> None:
 
     assert lab.fetched.count(KEYS.nameplate("inv2", "a")) == 3
     assert lab.listened == [KEYS.state("inv2")]
-
-
-def test_a_plant_whose_clock_lags_is_followed_once_the_old_token_is_gone() -> None:
-    """Its epoch is lower than its predecessor's, whose last words count for nothing from then on."""
-    lab = Lab()
-    lab.token("plant", epoch=900)
-    lab.measure(500, epoch=900)
-    lab.go(0.0)
-    lab.token("plant", epoch=40)
-    lab.measure(0, epoch=40, P_set=33e3)
-    lab.measure(501, epoch=900)
-    lab.go(T_C)
-    before = [state.P_set for state in lab.decided()]
-    lab.token("plant", epoch=900, gone=True)
-    lab.measure(502, epoch=900)
-    lab.measure(1, epoch=40, P_set=33e3)
-    lab.go(T_C)
-
-    assert before == [50e3, 50e3]
-    assert [state.P_set for state in lab.decided()] == [33e3]
-    assert lab.side.rejects.counts == {"ghost": 2}
 
 
 def test_nobody_but_the_plant_that_is_followed_stops_an_agent() -> None:
@@ -338,25 +253,3 @@ def test_the_plant_that_is_followed_stays_whoever_else_claims_to_be_one() -> Non
     assert lab.side.phase == "running"
     lab.token("plant", gone=True)
     assert lab.side.phase == "waiting"
-
-
-def test_of_a_token_it_says_whether_its_holder_is_noted() -> None:
-    """The others and the plant, as long as their tokens are there; not the own, and nobody of whom it knows nothing."""
-    lab = running("inv2")
-    tokens = KEYS.alive_agent("inv2", "a"), KEYS.alive_plant(1)
-    before = [lab.side.is_noted(key) for key in (*tokens, lab.side.token, KEYS.alive_agent("inv3", "x"), "x")]
-    lab.token("inv2", gone=True)
-    lab.token("plant", gone=True)
-
-    assert before == [True, True, False, False, False]
-    assert [lab.side.is_noted(key) for key in tokens] == [False, False]
-
-
-def test_a_token_that_no_plant_can_hold_is_no_plant() -> None:
-    """Anybody may hold a token alive/plant/x; whoever sees it goes on seeking."""
-    side = RealtimeAgent(replace(agent_config("inv1"), clock="wall"), "a")
-    side.start(0.0)
-    side.appeared("gridpeers/toy/alive/plant/x", 0.0)
-
-    assert side.phase == "seeking"
-    assert not side.plant_seen

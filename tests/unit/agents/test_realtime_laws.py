@@ -54,17 +54,6 @@ def test_who_does_not_tell_tells_the_plant_alone_and_gives_a_sign_before_it_coun
     )
 
 
-def test_what_was_not_told_does_not_count_as_lost() -> None:
-    """Six numbers that the neighbour skipped are no gap; two more are."""
-    lab = running("inv2")
-    lab.state("inv2", 0)
-    lab.state("inv2", 7, t=0.14, skipped=6)
-    before = lab.side.statistics.lost
-    lab.state("inv2", 12, t=0.24, skipped=2)
-
-    assert (before, lab.side.statistics.lost) == (0, 2)
-
-
 def test_a_law_that_fails_is_told_once_and_the_agent_says_nothing_more() -> None:
     """The plant hears why in a last state, which nobody uses; the log has it too.
 

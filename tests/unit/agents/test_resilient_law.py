@@ -51,7 +51,7 @@ def spread_after(A: np.ndarray, start: np.ndarray, liars: set[int], F: int, said
     return steps
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(seed=st.integers(0, 10_000), n=st.integers(4, 9), F=st.integers(0, 2), links=st.floats(0.3, 1.0))
 def test_w_msr_never_leaves_the_range_of_the_honest_and_they_agree_where_the_graph_is_robust(
     seed: int, n: int, F: int, links: float
@@ -79,14 +79,6 @@ def test_where_robustness_is_missing_the_honest_may_never_agree() -> None:
     assert robustness(A).F == 0
     assert np.ptp(spread_after(A, start, set(), 1, nobody)[-1]) == pytest.approx(0.6)
     assert np.ptp(spread_after(A, start, set(), 0, nobody)[-1]) < 1e-3
-
-
-def test_more_liars_than_F_take_the_honest_wherever_they_want() -> None:
-    """Two liars where one is borne: in a full graph of seven all honest agents end at the liars' value."""
-    A = np.ones((7, 7)) - np.eye(7)
-    steps = spread_after(A, np.full(7, 0.5), {5, 6}, 1, np.full((600, 7, 7), 0.9))
-
-    assert steps[-1].min() > 0.89
 
 
 def test_without_defences_it_is_the_paper_s_law() -> None:
@@ -123,34 +115,6 @@ def test_a_rate_limit_holds_back_what_jumps() -> None:
     assert fast > slow
 
 
-def test_a_rate_limit_holds_vars_as_well_and_grows_with_the_time_of_silence() -> None:
-    """Q of a neighbour moves by 0.01 pu a step at 0.5 pu/s; one that was silent for 0.2 s by 0.1 pu."""
-
-    def V_set(Q: float, silent: int) -> float:
-        law = Resilient(F=0, rate=0.5)
-        law.step(own(t=1.0), [neighbour("a", Q=0.0)], T)
-        for k in range(silent):
-            law.step(own(t=1.0 + T * (k + 1)), [], T)
-        return law.step(own(t=1.0 + T * (silent + 1)), [neighbour("a", Q=Q)], T).V_set
-
-    for silent, most in ((0, 0.01), (9, 0.1)):
-        assert V_set(0.9, silent) == pytest.approx(V_set(most, silent), abs=1e-12)
-        assert V_set(0.9, silent) != pytest.approx(V_set(0.9 * most, silent), abs=1e-12)
-        assert V_set(-0.9, silent) == pytest.approx(V_set(-most, silent), abs=1e-12)
-
-
-def test_plausibility_goes_by_the_neighbour_s_droop() -> None:
-    """With half the own droop it delivers twice as much of a frequency error."""
-    law, low = Resilient(F=0, tolerance=0.1), own(e=-0.004)
-
-    def counts(m_p: float) -> bool:
-        terms = law.terms(low, [neighbour("a", 0.5)._replace(m_p=m_p)], T)
-        return "implausible" not in {term.name for term in terms.P_set}
-
-    assert counts(0.01)  # 0.9 pu
-    assert not counts(0.005)  # 1.3 pu
-
-
 def test_asking_why_changes_nothing() -> None:
     """Terms may be asked for at any time: trust ages by steps alone."""
     asked, law = (Resilient(F=0, tolerance=0.1, T_out=0.2) for _ in range(2))
@@ -177,20 +141,6 @@ def test_who_is_implausible_ages_out_and_comes_back_slowly() -> None:
     assert weighed < 0.1 * full
     law.start(own())
     assert law.step(own(t=1.0), [neighbour("a", 0.6)], T).P_set - 0.5 == pytest.approx(full)
-
-
-@pytest.mark.parametrize(("T_out", "held_back"), [(0.0, False), (0.2, True)])
-def test_a_neighbour_that_was_only_ever_implausible_is_held_back_if_it_is_distrusted(
-    T_out: float, held_back: bool
-) -> None:
-    """Nothing of it has counted, so no rate limits its first plausible value; one that lied is no such stranger."""
-    law = Resilient(F=0, tolerance=0.1, rate=0.5, T_out=T_out)
-    law.step(own(t=1.0), [neighbour("a", 5.0)], T)
-    P_set = law.step(own(t=1.0 + T), [neighbour("a", 0.9)], T).P_set
-    trusted = 1.0 if not T_out else 1.0 - (1.0 - math.exp(-T / T_out)) * math.exp(-T / (10.0 * T_out))
-    expected = neighbour("a", 0.51 if held_back else 0.9)._replace(weight=trusted)
-
-    assert P_set == pytest.approx(Resilient(F=0).step(own(), [expected], T).P_set, abs=1e-12)
 
 
 def test_distrust_without_a_tolerance_is_refused() -> None:

@@ -38,13 +38,6 @@ def test_of_two_that_miss_only_each_other_the_one_with_the_smaller_name_goes_fir
     assert lasted("inv5", ("inv2",)) == pytest.approx(PATIENCE + 2.0 * STAGGER, abs=0.02)
 
 
-def test_in_a_ring_too_one_of_two_that_miss_each_other_goes_first() -> None:
-    """Each hears its other neighbour, so either session may be to blame."""
-    ring = "inv1", "inv2", "inv3"
-    assert lasted("inv1", ("inv2",), ring) == pytest.approx(PATIENCE + STAGGER, abs=0.02)
-    assert lasted("inv2", ("inv1",), ring) == pytest.approx(PATIENCE + 2.0 * STAGGER, abs=0.02)
-
-
 def test_who_misses_more_than_half_of_the_others_or_is_unheard_waits_no_longer() -> None:
     """Its own session is to blame."""
     assert lasted("inv5", ("inv1", "inv2", "inv3", "inv4", "inv6")) == pytest.approx(PATIENCE, abs=0.02)

@@ -4,8 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gridpeers.wire.keys import KEY_SPECS, Keys, check_name, is_token
-from gridpeers.wire.messages import MESSAGES
+from gridpeers.wire.keys import Keys, check_name, is_token
 
 zenoh = pytest.importorskip("zenoh")
 
@@ -25,17 +24,6 @@ def test_every_name_that_is_accepted_makes_a_key(name: str) -> None:
     zenoh.KeyExpr(Keys(name).state(name))
 
 
-def test_wildcards_cover_their_keys() -> None:
-    """Whoever watches `any_alive` sees every token, and nothing else."""
-    keys = Keys("demo")
-    tokens = (keys.alive_plant(1), keys.alive_agent("inv1", "a1"), keys.alive_recorder("fleet"))
-    pattern = zenoh.KeyExpr(keys.any_alive)
-
-    assert all(pattern.intersects(zenoh.KeyExpr(token)) for token in tokens)
-    assert not pattern.intersects(zenoh.KeyExpr(keys.state("inv1")))
-    assert not pattern.intersects(zenoh.KeyExpr(Keys("other").alive_plant(1)))
-
-
 def test_tokens_are_told_from_texts_that_somebody_has_made_up() -> None:
     """The longest names make tokens; what no process of a run holds is none."""
     keys = Keys("d" * 64)
@@ -49,15 +37,3 @@ def test_parts_are_those_of_the_own_run_only() -> None:
     """A key of another run, even of one whose name begins alike, has no parts."""
     assert Keys("demo").parts(Keys("demo").state("inv1")) == ("state", "inv1")
     assert Keys("demo").parts(Keys("demo2").state("inv1")) == ()
-
-
-def test_the_documentation_names_every_message_and_key() -> None:
-    """`gridpeers doc keys` has a row for each message type and no key twice."""
-    rows = KEY_SPECS
-    messages = {name for row in rows for name in row.message.split(", ") if name != "-"}
-    expressions = [row.expression for row in rows]
-
-    assert messages == {message.__name__ for message in MESSAGES}
-    assert len(set(expressions)) == len(expressions)
-    assert all(expression.startswith("gridpeers/<run>/") for expression in expressions)
-    assert "gridpeers/<run>/alive/agent/<inverter>/<instance>" in expressions

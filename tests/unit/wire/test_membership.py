@@ -68,16 +68,6 @@ def test_what_a_process_says_of_itself_never_changes() -> None:
     assert made.nameplates["inv2"] == nameplate()
 
 
-def test_a_nameplate_without_a_token_is_a_ghosts() -> None:
-    """Nobody is there for whom it could speak."""
-    made, _ = members("a")
-    made.vanished("inv2", "a")
-
-    with pytest.raises(RejectedError) as refused:
-        made.meet("a", nameplate())
-    assert refused.value.kind == "ghost"
-
-
 def test_a_dismissed_process_counts_no_more_but_may_still_speak() -> None:
     """The last messages of a process are admitted until its token is gone; a successor takes its place at once."""
     made, admission = members("a")
@@ -88,15 +78,6 @@ def test_a_dismissed_process_counts_no_more_but_may_still_speak() -> None:
     assert made.meet("b", nameplate(epoch=5))
     assert not made.vanished("inv2", "a")
     assert (made.instance("inv2"), admission.epochs.get("inv2")) == ("b", 5)
-
-
-def test_a_dismissed_process_that_is_gone_speaks_no_more() -> None:
-    """Nobody speaks for its name then."""
-    made, admission = members("a")
-    made.dismiss("inv2")
-    made.vanished("inv2", "a")
-
-    assert admission.epochs.get("inv2") is None
 
 
 @given(st.integers(0, 2**32 - 1))
@@ -138,17 +119,6 @@ def test_tokens_of_anybody_cost_no_more_than_so_many_questions() -> None:
     assert sum(name == "inv2" for name, _ in noted) == MOST_PROCESSES - 1
     assert len({name for name, _ in noted}) == MOST_INVERTERS
     assert len(made.next_unmet()) == ASKED_AT_ONCE
-
-
-def test_all_who_have_not_answered_are_asked_again_in_turn() -> None:
-    """However many there are, nobody waits for ever for the question."""
-    made, _ = members()
-    for i in range(3 * ASKED_AT_ONCE + 7):
-        made.appeared(f"inv{i}", "a")
-    asked = [process for _ in range(4) for process in made.next_unmet()]
-
-    assert sorted(asked) == sorted(made.unmet)
-    assert made.next_unmet() == asked[:ASKED_AT_ONCE]
 
 
 def state(seq: int, epoch: int = 5, name: str = "inv2") -> State:
@@ -199,19 +169,6 @@ def test_who_is_gone_is_a_ghost_until_it_is_back() -> None:
     with pytest.raises(RejectedError, match="after 7"):
         admission.take(state(7))
     assert admission.take(state(10)) == 2
-
-
-def test_in_a_new_epoch_numbers_begin_anew() -> None:
-    """A restarted agent counts from 0; what its former life said last does not stand in its way."""
-    admission = bound(5)
-    admission.take(state(500))
-    admission.passes(state(500))
-    admission.release("inv2")
-    admission.bind("inv2", 3)
-
-    assert admission.take(state(0, 3)) == 0
-    assert admission.passes(state(0, 3))
-    assert not admission.passes(state(501, 5))
 
 
 def test_a_number_that_nobody_can_have_reached_mutes_its_sender_for_a_second_only() -> None:

@@ -91,15 +91,6 @@ def test_a_message_goes_to_every_node_with_a_route_for_it() -> None:
     assert b.heard == [("state/a", b"1"), ("state/c", b"2"), ("measurement/b", b"3")]
 
 
-def test_a_key_is_subscribed_to_once() -> None:
-    """Whichever node listens first declares the subscription of all."""
-    a, b = Node("a"), Node("b")
-    both = group(a, b)
-    a.to_do, b.to_do = [Listen("state/c")], [Listen("state/c")]
-
-    assert both.take_actions() == [Listen("state/c")]
-
-
 def test_a_query_is_shared_unless_a_subscription_was_declared_in_between() -> None:
     """The answer to an older query would prove nothing about a younger subscription."""
     a, b = Node("a"), Node("b")
@@ -152,17 +143,6 @@ def test_nodes_inside_meet_without_the_session() -> None:
     assert (a.known, b.known) == ({"alive/b"}, {"alive/a"})
     assert a.heard == [("nameplate/b", b"I am b")]
     assert a.siblings == {"a", "b"}
-
-
-def test_a_token_is_noted_while_one_of_the_nodes_knows_its_holder() -> None:
-    """Then its end comes to all of them."""
-    a, b = Node("a"), Node("b")
-    both = group(a, b)
-    b.appeared("alive/c", 0.0)
-
-    assert both.is_noted("alive/c")
-    both.vanished("alive/c", 0.0)
-    assert not both.is_noted("alive/c")
 
 
 def test_a_node_that_has_finished_takes_its_token_along() -> None:

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -69,22 +68,3 @@ def test_a_command_without_a_package_that_it_starts_with_ends_in_one_line(packag
     assert done.returncode == 2
     assert done.stderr.startswith(f"gridpeers: {package} is not installed; gridpeers needs it: pip install '{package}")
     assert done.stderr.count("\n") == 1
-
-
-def test_a_run_with_a_damaged_package_says_which(tmp_path: Path) -> None:
-    """The run breaks with the package and its reason, not with the class of an error and a traceback."""
-    (tmp_path / "scipy.py").write_text("raise ImportError('libopenblas.so.0: cannot open shared object file')")
-    words = ["run", "islanding", "--case", "IV", "--driver", "inprocess", "--out", str(tmp_path / "out")]
-
-    done = subprocess.run(
-        [sys.executable, "-m", "gridpeers", *words],
-        env=os.environ | {"PYTHONPATH": str(tmp_path)},
-        capture_output=True,
-        text=True,
-        timeout=100,
-        check=False,
-    )
-
-    assert done.returncode == 3
-    assert "the run broke: scipy is installed, but cannot be imported (ImportError: libopenblas.so.0" in done.stderr
-    assert "pip install --force-reinstall scipy" in done.stderr

@@ -19,12 +19,6 @@ def test_bytes_of_a_code_page_are_named_with_their_line(encoding: str) -> None:
         text_of("a\nsüd".encode(encoding))
 
 
-def test_a_truncated_text_is_refused() -> None:
-    """Half a letter at the end, as a download that broke off leaves it."""
-    with pytest.raises(TextFileError, match="is damaged: it begins as UTF-16"):
-        text_of("bus".encode("utf-16")[:-1])
-
-
 @pytest.mark.parametrize("separator", [",", ";", "\t", "|"])
 def test_any_separator_is_read(separator: str) -> None:
     """Spreadsheets part cells by what their country does."""
@@ -73,8 +67,3 @@ def test_empty_rows_and_columns_of_a_spreadsheet_are_left_out() -> None:
     data = b"\n,,,\nbus,kW,,\n48,1,,\n,,,\n49,2\n,,,\n,,,\n"
 
     assert read_table_text(data, ["bus", "kW"], ["kW"]) == (["bus", "kW"], [(4, ["48", "1"]), (6, ["49", "2"])])
-
-
-def test_an_empty_file_has_no_column() -> None:
-    """What it lacks is for its reader to say."""
-    assert read_table_text(b"", ["bus"], []) == read_table_text(b"\n\n", ["bus"], []) == ([], [])

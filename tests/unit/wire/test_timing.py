@@ -8,9 +8,7 @@ import re
 import pytest
 
 from gridpeers.wire.driver.drive import limit_log
-from gridpeers.wire.messages import PlantEvent, Telemetry
-from gridpeers.wire.timing import STOOD_STILL, Awaited, RateLimit, TickBarrier
-from tests.unit.plant.realtime.realtime_lab import running
+from gridpeers.wire.timing import STOOD_STILL, RateLimit, TickBarrier
 
 
 def barrier() -> TickBarrier:
@@ -18,28 +16,6 @@ def barrier() -> TickBarrier:
     made = TickBarrier("plant", 10.0)
     made.wait_for({"inv1": "State(4)", "inv2": "State(4)"}, now=5.0)
     return made
-
-
-def test_it_opens_with_the_last_that_comes() -> None:
-    """The number of messages counts down, to one at the least: somebody else may speak."""
-    made = barrier()
-    counted = []
-    for name in ("inv2", "inv1"):
-        assert not made.is_open
-        counted.append(made.messages_needed)
-        made.came(name)
-
-    assert [*counted, made.messages_needed] == [2, 1, 1]
-    assert made.is_open
-
-
-def test_what_is_missing_is_named_in_the_order_of_the_wait() -> None:
-    """Each with what it should send."""
-    made = barrier()
-    assert made.missing_messages() == (Awaited("State(4)", "inv1"), Awaited("State(4)", "inv2"))
-    made.came("inv1")
-
-    assert made.missing_messages() == (Awaited("State(4)", "inv2"),)
 
 
 def test_the_deadline_counts_from_the_last_progress() -> None:
@@ -95,19 +71,6 @@ def test_a_flood_is_thinned_out_and_every_line_is_counted() -> None:
     assert counted([*said, *limit.left_out()]) >= 1000
     assert other == "inv1 joined"
     assert len(many) < 250
-
-
-def test_a_plant_that_is_ever_late_does_not_drown_its_own_log_and_record() -> None:
-    """2,626 lines of one run once: now a few, and at the end how many there were."""
-    lab = running(end=None)
-    lab.step(2000, delay=0.5)
-    lab.side.close("enough", lab.now)
-    events: list[PlantEvent] = [event for message in lab.take(Telemetry) for event in message.events]
-    late = [event.text for event in events if event.text.startswith("fell ")]
-    lab.do()
-
-    assert 5 <= len(late) <= 5 + 2000 * 0.52 / 10.0 + 2
-    assert sum("more of this kind" in line for line in late) >= 2
 
 
 def test_a_log_leaves_out_what_repeats_itself(caplog: pytest.LogCaptureFixture) -> None:

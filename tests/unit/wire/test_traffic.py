@@ -7,12 +7,9 @@ from typing import Any
 import pytest
 
 from gridpeers.scenarios.record.journal_reader import entries_of
-from gridpeers.wire.bounds import LONGEST_MESSAGE
 from gridpeers.wire.codec import encode
 from gridpeers.wire.journal import (
     AT_ONCE,
-    COUNTED_KEYS,
-    LOT,
     NOTED_REJECTED,
     Entry,
     Exchange,
@@ -26,8 +23,7 @@ from gridpeers.wire.journal import (
     WakeUp,
 )
 from gridpeers.wire.keys import Keys
-from gridpeers.wire.messages import Leave, Measurement, State
-from gridpeers.wire.node import TOKENS, Loss, Node
+from gridpeers.wire.messages import Leave, State
 from gridpeers.wire.traffic import SHOWN_PAYLOAD, TickTraffic, TimedTraffic
 
 KEYS = Keys("toy")
@@ -116,20 +112,6 @@ def test_what_the_record_has_anyway_is_not_noted() -> None:
         ]
 
 
-def test_without_arrivals_a_node_notes_what_it_sends() -> None:
-    """And the plant the states of all, but no status: it decides nothing but events."""
-    for whole in (False, True):
-        traffic, journal = timed(arrivals=False, whole=whole)
-        traffic.token(KEYS.alive_agent("inv2", "b"), 0.5, appeared=True)
-        traffic.woken(1.0)
-        traffic.received(KEYS.state("inv2"), STATE, 2.0, "")
-        traffic.received(KEYS.status("inv2"), b"it", 2.0, "")
-        traffic.sent(KEYS.state("inv1"), STATE)
-        assert noted(journal) == [ReceivedMessage(2.0, "state/inv2", STATE)] * whole + [
-            SentMessage(2.0, "state/inv1", STATE)
-        ]
-
-
 def test_in_ticks_the_plant_notes_a_tick_as_one_entry() -> None:
     """Measurements and states in their order; all else one by one, and a tick in which nothing came not at all."""
     journal = JournalBuffer()
@@ -175,26 +157,6 @@ def test_the_messages_of_many_agents_are_several_entries(count: int) -> None:
     assert [raw for entry in entries for raw in entry.states] == [b"s%d" % number for number in range(count)]
 
 
-@pytest.mark.parametrize("count", [1, AT_ONCE, AT_ONCE + 1])
-def test_in_one_process_a_tick_has_the_values_of_its_messages(count: int) -> None:
-    """In the order of the fields, as nothing was encoded to be sent."""
-    journal = JournalBuffer()
-    measurement = Measurement(
-        sender="plant", epoch=1, seq=4, t=0.08, to="inv1", P=5e4, Q=0.0, V=277.0, f=60.0,
-        P_set=5e4, V_set=277.0, grid_connected=False, island="inv1", roster=(),
-    )  # fmt: skip
-    state = State(sender="inv1", epoch=1, seq=4, t=0.08, P_set=5e4, V_set=277.0, Q=0.0)
-    TickTraffic(KEYS, ("inv1",), journal).exchanged(4, [measurement] * count, [state] * count)
-
-    entries = [entry for entry in noted(journal) if isinstance(entry, Exchange)]
-    assert {entry.tick for entry in entries} == {4}
-    measurements = [raw for entry in entries for raw in entry.measurements]
-    states = [raw for entry in entries for raw in entry.states]
-    assert (len(measurements), len(states)) == (count, count)
-    assert dict(zip(State.__struct_fields__, states[-1], strict=True))["P_set"] == 5e4
-    assert dict(zip(Measurement.__struct_fields__, measurements[-1], strict=True))["to"] == "inv1"
-
-
 def test_a_flood_of_rejected_messages_does_not_fill_the_journal() -> None:
     """The first since the journal was taken are noted with their bytes, the number of the others by key and kind."""
     journal = JournalBuffer()
@@ -207,54 +169,3 @@ def test_a_flood_of_rejected_messages_does_not_fill_the_journal() -> None:
 
             assert sum(isinstance(entry, ReceivedMessage) for entry in entries) == 1_000 + NOTED_REJECTED
             assert entries[-1] == RejectedCount(at, "state/inv2", "garbled", 1_000 - NOTED_REJECTED)
-
-
-def test_messages_that_were_dropped_unread_are_noted_by_their_number() -> None:
-    """By key and kind, and the time by which they had come; a part of the journal has one entry about each."""
-    traffic, journal = timed()
-    traffic.woken(9.0)
-    traffic.lost(KEYS.state("inv2"), "excess", 500, 9.5)
-    traffic.lost(KEYS.state("inv2"), "excess", 20, 9.7)
-    traffic.lost(KEYS.command, "oversized", 1, 9.7)
-
-    assert noted(journal) == [
-        WakeUp(9.0),
-        RejectedCount(9.7, "state/inv2", "excess", 520),
-        RejectedCount(9.7, "command", "oversized", 1),
-    ]
-    assert noted(journal) == []
-
-
-def test_tokens_that_were_dropped_are_counted_under_one_key() -> None:
-    """Whatever texts they were: the journal has the key of all tokens of the run."""
-    node, (traffic, journal) = Node("inv1", "toy"), timed()
-    node.traffic = traffic
-    for at in (9.5, 9.7):
-        node.lost(Loss(TOKENS, "excess", "288000 tokens were waiting, of others", 7), at)
-
-    assert noted(journal) == [RejectedCount(9.7, "alive/**", "excess", 14)]
-    assert any("gridpeers/toy/alive/**" in line for line in node.rejects.take_lines())
-
-
-def test_a_journal_that_is_full_still_counts() -> None:
-    """What finds no room is what a flood brings; and keys are many only if somebody makes them up."""
-    journal = JournalBuffer()
-    for _ in range(2_000):
-        journal.add(ReceivedMessage(None, "state/inv2", bytes(1_000), "corrupt"))
-    for number in range(COUNTED_KEYS + 50):
-        journal.count(RejectedCount(1.0, f"state/{number}", "excess", 2))
-    counts = [entry for entry in noted(journal) if isinstance(entry, RejectedCount)]
-
-    assert len(counts) == COUNTED_KEYS + 1
-    assert counts[-1] == RejectedCount(1.0, "", "excess", 100)
-
-
-def test_counts_of_long_keys_come_in_parts_that_fit_into_a_message() -> None:
-    """Whatever is counted, a part that is longer than a message would cost all entries in it."""
-    journal = JournalBuffer()
-    for number in range(COUNTED_KEYS):
-        journal.count(RejectedCount(1.0, f"{number}/{'k' * 2_000}", "excess", 2))
-    parts = journal.take_parts()
-
-    assert max(map(len, parts)) < 2 * LOT < LONGEST_MESSAGE
-    assert b"".join(parts).count(b"excess") == COUNTED_KEYS

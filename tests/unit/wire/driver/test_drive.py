@@ -6,10 +6,6 @@ import logging
 from types import SimpleNamespace
 from typing import Any, cast
 
-import pytest
-
-import gridpeers.scenarios.drivers.telemetry_client as telemetry_client
-from gridpeers.scenarios.drivers.telemetry_client import TelemetryClient
 from gridpeers.wire.driver.drive import drive
 from gridpeers.wire.driver.inbox import MOST_TOKENS, Inbox
 from gridpeers.wire.driver.session import Session
@@ -51,11 +47,3 @@ def test_a_node_is_asked_about_strangers_whose_tokens_were_there_before_it() -> 
     drive(cast(Core, core), cast(Session, session), logging.getLogger("test"))
 
     assert [loss.number for loss in session.inbox.take_losses()] == [EXCESS]
-
-
-def test_a_recorder_is_asked_about_strangers_whose_tokens_were_there_before_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It follows one plant, and anybody may hold tokens of a plant."""
-    monkeypatch.setattr(telemetry_client, "Session", Crowded)
-    client = TelemetryClient("history", "toy", "tcp/127.0.0.1:1", "wall", lambda message: None)
-
-    assert [loss.number for loss in client.inbox.take_losses()] == [EXCESS]

@@ -44,28 +44,6 @@ def test_ctrl_c_and_sigterm_share_a_handler(ignored: bool) -> None:
             signal.signal(number, handler)
 
 
-SCRIPT = """
-import sys
-from gridpeers.wire.driver.ending import speaking
-with speaking("gridpeers"):
-    print("before")
-    try:
-        {foreign}
-    except OSError as error:
-        print(error)
-    print("after")
-"""
-
-
-def test_output_that_somebody_has_replaced_ends_without_a_traceback() -> None:
-    """A stream of their own that is closed, or none, has nothing to be written at the end."""
-    foreign = "import io; sys.stdout.flush(); sys.stdout = io.TextIOWrapper(io.BytesIO())"
-    script = SCRIPT.format(foreign=foreign).replace('print("after")', "sys.stdout.close(); sys.stderr = None")
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=30.0)
-
-    assert (done.returncode, done.stdout, done.stderr) == (0, "before\n", "")
-
-
 THREAD_SCRIPT = """
 import threading
 from gridpeers.wire.driver.ending import leave

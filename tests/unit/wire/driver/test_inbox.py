@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from gridpeers.wire.bounds import LONGEST_MESSAGE
-from gridpeers.wire.codec import KINDS, decode, encode, is_marked
+from gridpeers.wire.codec import decode, encode, is_marked
 from gridpeers.wire.driver.inbox import BYTES, MOST_OF_ONE, MOST_TOKENS, ROOM, Inbox
 from gridpeers.wire.messages import MESSAGES, Message, State
 from gridpeers.wire.node import TOKENS, Loss
@@ -27,16 +27,6 @@ def of_inv2(key: str, payload: bytes) -> bool:
 def events(inbox: Inbox) -> list[tuple[str, str]]:
     """Kind and key of all that waits."""
     return [(kind, key) for kind, key, _, _ in inbox.take(1, 0.0)]
-
-
-def test_what_is_no_message_is_taken_at_once_whenever_it_came() -> None:
-    """A token or word that came while the owner computed does not wait for the messages that are wanted."""
-    inbox = Inbox()
-    inbox.take(1, timeout=0.0)
-    inbox.put(("vanished", "a", b""))
-
-    assert [event[:3] for event in inbox.take(9, timeout=30.0)] == [("vanished", "a", b"")]
-    assert inbox.take(9, timeout=0.0) == []
 
 
 @pytest.mark.parametrize(("count", "timeout"), [(9, 30.0), (1, 0.01)])
@@ -111,18 +101,6 @@ def test_in_simulated_time_no_message_of_a_known_sender_is_lost() -> None:
     assert [loss.number for loss in inbox.take_losses()] == [2]
 
 
-def test_what_is_longer_than_a_message_never_waits() -> None:
-    """The first is told with its length, all are counted."""
-    inbox = Inbox()
-    for length in (LONGEST_MESSAGE + 1, LONGEST_MESSAGE + 2):
-        inbox.put(("message", "state/inv2", bytes(length)))
-    text = f"{LONGEST_MESSAGE + 1} bytes, at most {LONGEST_MESSAGE} are allowed"
-
-    assert inbox.take(1, 0.0) == []
-    assert inbox.take_losses() == (Loss("state/inv2", "oversized", text, 2),)
-    assert {"oversized", "excess"} <= set(KINDS)
-
-
 @pytest.mark.parametrize("kind", MESSAGES)
 def test_every_message_of_ours_is_recognised_by_its_first_bytes(kind: type[Message]) -> None:
     """With the longest name and the largest epoch; another epoch, or another name, is a stranger's."""
@@ -165,14 +143,3 @@ def test_the_end_of_a_holder_comes_in_if_the_owner_has_noted_it_or_is_about_to()
     inbox.put(("vanished", "b", b""))
     inbox.put(("vanished", "a", b""))
     assert events(inbox) == [("vanished", "b")]
-
-
-def test_an_owner_that_has_said_nothing_of_whom_it_notes_loses_no_token() -> None:
-    """Then nobody counts as a stranger."""
-    inbox = Inbox()
-    for i in range(MOST_TOKENS + 1):
-        inbox.put(("appeared", f"a{i}", b""))
-    inbox.put(("vanished", "c", b""))
-
-    assert len(events(inbox)) == MOST_TOKENS + 2
-    assert inbox.take_losses() == ()

@@ -24,10 +24,6 @@ from gridpeers.wire.trust.credentials import (
 PLANT, OPERATOR, VIEWER = (Member(name=role, role=role) for role in ("plant", "operator", "viewer"))
 INV1, INV2, INV3 = (Member(name=f"inv{k}", role="agent") for k in (1, 2, 3))
 ALL = (PLANT, OPERATOR, VIEWER, INV1, INV2, INV3)
-MESSAGES = (
-    "put", "delete", "declare_subscriber", "declare_queryable", "query", "reply", "liveliness_token",
-    "declare_liveliness_subscriber", "liveliness_query",
-)  # fmt: skip
 DEMO = Keys("demo")
 CONCRETE = tuple(
     spec.expression.replace("<run>", "demo").replace("<inverter>", name).replace("<instance>", "a1")
