@@ -17,7 +17,6 @@ from gridpeers.wire.schema.table_reading import read_parameters, read_table
 from gridpeers.wire.schema.table_schema import Problem
 from gridpeers.wire.wording import is_no_path
 
-
 _NO_FIRST_LINE = "has no first line such as #!/usr/bin/env python3, and is no compiled program; write one"
 
 
@@ -35,9 +34,7 @@ def executable_problem(file: Path) -> str:
     interpreter, *arguments = first[2:].decode(errors="replace").split() or ["nothing"]
     if Path(interpreter).name == "env" and arguments and not arguments[0].startswith("-"):
         interpreter = arguments[0]
-    return (
-        "" if shutil.which(interpreter) else f"asks in its first line for {interpreter}, and there is no such program"
-    )
+    return "" if shutil.which(interpreter) else f"asks in its first line for {interpreter}, which is not there"
 
 
 PAPER = LawChoice().use
