@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections import Counter
 from collections.abc import Callable
-from pathlib import Path
 
 from tests.fuzz.mutation import Mutation
-from tests.fuzz.receivers import Receiver, receivers
+from tests.fuzz.receivers import receivers
 
 SEED = 16
 """Seed of the command and of the test."""
@@ -21,34 +19,12 @@ class FuzzError(AssertionError):
 def fuzz(
     count: int, seed: int = SEED, progress: Callable[[int], None] = lambda done: None
 ) -> tuple[Counter[tuple[str, str]], Counter[str]]:
-    """Make messages and give each to the codec and to one other receiver.
+    """Make messages and give each to the codec and to one other receiver; call `progress` every ten thousand.
 
-    Parameters
-    ----------
-    count : int
-        Number of messages.
-    seed : int, optional
-        The same seed makes the same messages for the same receivers.
-    progress : Callable[[int], None], optional
-        Called with the number of messages so far, every ten thousand.
-
-    Returns
-    -------
-    tuple[Counter, Counter]
-        Messages by receiver and kind of rejection, "" for those that were used; and by the way in which they were made.
-
-    Raises
-    ------
-    FuzzError
-        If one raises an error that its receiver does not have for bad input.
+    Return the messages by receiver and kind of rejection, "" for those that were used, and by the way in which they were
+    made. Raise FuzzError if one raises an error that its receiver does not have for bad input.
     """
-    with tempfile.TemporaryDirectory() as home:
-        return _fuzz(count, seed, receivers(), progress)
-
-
-def _fuzz(
-    count: int, seed: int, targets: dict[str, Receiver], progress: Callable[[int], None]
-) -> tuple[Counter[tuple[str, str]], Counter[str]]:
+    targets = receivers()
     mutation = Mutation(seed)
     codec, others = "codec", [name for name in targets if name != "codec"]
     outcomes: Counter[tuple[str, str]] = Counter()
