@@ -21,8 +21,8 @@ def fuzz(
 ) -> tuple[Counter[tuple[str, str]], Counter[str]]:
     """Make messages and give each to the codec and to one other receiver; call `progress` every ten thousand.
 
-    Return the messages by receiver and kind of rejection, "" for those that were used, and by the way in which they were
-    made. Raise FuzzError if one raises an error that its receiver does not have for bad input.
+    Return the messages by receiver and kind of rejection, "" for those that were used, and by the way in which they
+    were made. Raise FuzzError if one raises an error that its receiver does not have for bad input.
     """
     targets = receivers()
     mutation = Mutation(seed)

@@ -202,7 +202,7 @@ class View:
         self._begin()
 
     def _begin(self) -> None:
-        self._client = SimpleNamespace(keys=Keys("toy"), epochs={EPOCH})
+        self._client = SimpleNamespace(keys=Keys("toy"), _tokens=SimpleNamespace(epochs={EPOCH}))
         self._view, self._taken = RunView("toy"), 0
         self._view.presence(plant=True, agents=NAMES, now=0.0)
 
