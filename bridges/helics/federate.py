@@ -17,8 +17,6 @@ PROCESS = Path(__file__).with_name("federate_process.py")
 
 USER = "a HELICS federate"
 
-MISSING = f"{USER} needs the package helics; install it: pip install 'gridpeers[helics]'"
-
 IMPORT = 60.0
 """Longest time (s) until the process has imported HELICS, on a machine that is busy."""
 
@@ -50,21 +48,12 @@ class HelicsFederate:
         ready = self._take(IMPORT, f"its process did not start within {IMPORT:g} s")
         if "not_importable" in ready:
             self._process.close(FAREWELL)
-            raise HelicsError(damaged("helics", ready["not_importable"], USER) if ready["installed"] else MISSING)
+            missing = f"{USER} needs the package helics; install it: pip install 'gridpeers[helics]'"
+            raise HelicsError(damaged("helics", ready["not_importable"], USER) if ready["installed"] else missing)
         host, port = endpoint(settings.broker)
+        request = {"do": "join", "name": settings.name, "host": host, "port": port, "federates": settings.federates}
         late = f"{settings.broker} did not answer as a HELICS broker of core type ZMQ within {deadline:g} s"
-        self._ask(
-            {
-                "do": "join",
-                "name": settings.name,
-                "host": host,
-                "port": port,
-                "federates": settings.federates,
-                "wait": 0.9 * deadline,
-            },
-            late,
-            deadline + LATER,
-        )
+        self._ask(request | {"wait": 0.9 * deadline}, late, deadline + LATER)
 
     def begin(
         self, publications: Sequence[Topic], subscriptions: Sequence[Topic], publish: Mapping[str, Value]
@@ -76,12 +65,7 @@ class HelicsFederate:
         settings = self._settings
         wanted = f"the broker waits for {settings.federates} federates" if settings.federates else "are all started?"
         late = f"the federation at {settings.broker} did not begin within {settings.wait:g} s ({wanted})"
-        request = {
-            "do": "begin",
-            "publications": publications,
-            "subscriptions": subscriptions,
-            "publish": publish,
-        }
+        request = {"do": "begin", "publications": publications, "subscriptions": subscriptions, "publish": publish}
         federation = self._ask(request, late, settings.wait)
         self._others = " or ".join(federation["others"]) or "the broker"
         return federation
@@ -94,7 +78,8 @@ class HelicsFederate:
         If they are `needed`, a publisher of which none came must not have left.
         """
         late = f"{self._others} did not let time go on to {t:g} s within {self._deadline:g} s"
-        answer = self._ask({"do": "step", "publish": publish, "time": t + after, "needed": needed}, late)
+        request = {"do": "step", "publish": publish, "time": t + after, "needed": needed}
+        answer = self._ask(request, late, self._deadline)
         if answer["gone"]:
             raise HelicsError(
                 f"HELICS, {self._when}: {' and '.join(answer['gone'])} left the federation before the end; "
@@ -107,7 +92,7 @@ class HelicsFederate:
     def end(self, publish: Mapping[str, Value]) -> None:
         """Publish the last values and leave the federation, which goes on without this federate."""
         try:
-            self._ask({"do": "end", "publish": publish}, "the federate did not leave")
+            self._ask({"do": "end", "publish": publish}, "the federate did not leave", self._deadline)
         except HelicsError:
             pass  # the run has its end already
         finally:
@@ -119,12 +104,10 @@ class HelicsFederate:
             self._process.send({"do": "abort", "reason": f"{self._settings.name}: {reason}"})
             self._process.close(FAREWELL)
 
-    def _ask(self, request: Mapping[str, Any], late: str, wait: float | None = None) -> dict[str, Any]:
+    def _ask(self, request: Mapping[str, Any], late: str, wait: float) -> dict[str, Any]:
         self._process.send(request)
         try:
-            answer = self._take(self._deadline if wait is None else wait, late)
-            if "died" in answer:
-                raise HelicsError(f"HELICS, {self._when}: {answer['died']}")
+            answer = self._take(wait, late)
             if "error" in answer:
                 raise HelicsError(f"HELICS, {self._when}: {self._explained(answer['error'], request['do'])}")
         except HelicsError as error:
@@ -139,13 +122,10 @@ class HelicsFederate:
             return answer
         self._process.send({"do": "times"})
         until = monotonic() + ASK
-        times: list[str] = []
-        while (answer := self._answer(until)) is not None:
-            if "times" in answer:
-                times = answer["times"]
-                break
+        while (answer := self._answer(until)) is not None and "times" not in answer:
+            pass  # what was waited for, too late
         silent = "" if self._when == BEFORE else "; nor did the broker answer where they stand"
-        where = f": {', '.join(times)}" if times else silent
+        where = f": {', '.join(answer['times'])}" if answer and answer["times"] else silent
         key = "plant.helics.wait_s" if self._when == BEFORE else "processes.deadline_s"
         raise HelicsError(f"HELICS, {self._when}: {late}{where}; end what hangs, or raise {key}")
 

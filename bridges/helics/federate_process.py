@@ -11,9 +11,6 @@ answer; what HELICS prints goes to standard error.
     {"do": "end", "publish": {key: value}}              publish, leave the federation, end
     {"do": "times"}                                     times of the others; also in the middle of a wait
     {"do": "abort", "reason": text}                     end the federation at once; also in the middle of a wait
-
-HELICS takes half a minute to notice that a process was killed, or never does. So in a wait this process looks every
-second whether the broker and the others still listen at their ports: {"died": text} is the answer if one does not.
 """
 
 from __future__ import annotations
@@ -43,12 +40,8 @@ NOBODY = "any"
 PROBE = 0.1
 """Time (s) between two attempts to reach a broker."""
 
-LOOK = 1.0
-"""Time (s) of a wait after which it looks, and looks again, whether the others still listen. A process that stands
-still listens; only one that has ended does not."""
-
-Address = tuple[str, int]
-"""Host and port."""
+GONE = ("disconnected", "finalized", "error")
+"""States of a federate that publishes no more."""
 
 
 class RefusedError(Exception):
@@ -56,7 +49,7 @@ class RefusedError(Exception):
 
 
 class Federate:
-    """The federate with its topics."""
+    """The federate with its topics; each method but `abort` and `times` answers the request of its name."""
 
     def __init__(self) -> None:
         import helics
@@ -69,37 +62,23 @@ class Federate:
         self.subscriptions: dict[str, tuple[Any, str]] = {}
         self.publishers: dict[str, set[str]] = {}
         """By federate: our subscriptions that it publishes."""
-        self.waits_since: float | None = None
-        """Since when (s, monotonic) it waits for the federation; None while it does not."""
-        self.begun = False
-        """Whether all federates are at t = 0, so that nobody comes any more."""
-        self._broker_at: Address | None = None
-        """Where the broker of somebody else listens."""
-        self._has_broker = ""
-        """Name of the federate of gridpeers that has the broker in its process."""
-        self._others_at: dict[Address, list[str]] = {}
-        """Where the others' processes listen, and the names of the federates in each."""
-        self._cores: set[str] = set()
-        """HELICS's names of the processes that were asked for it."""
 
     def join(self, request: dict[str, Any]) -> dict[str, Any]:
         """Start the broker if asked for, and connect to it."""
         helics, host, port = self.helics, request["host"], request["port"]
-        loopback = host == "127.0.0.1"
         self.name = request["name"]
         if request["federates"]:
             _require_free(host, port)
             options = f"-f {request['federates']} --loglevel=no_print --localinterface=tcp://{host}:{port}"
-            self.broker = helics.helicsCreateBroker("zmq", self.name + _OF_BROKER, options)
+            self.broker = helics.helicsCreateBroker("zmq", f"{self.name}-broker", options)
             if not helics.helicsBrokerIsConnected(self.broker):
                 raise RefusedError(f"cannot start a broker at tcp://{host}:{port}")
         else:
             _reach(host, port, request["wait"])
-            self._broker_at = host, port
         info = helics.helicsCreateFederateInfo()
         helics.helicsFederateInfoSetCoreTypeFromString(info, "zmq")
         options = f"--federates=1 --loglevel=no_print --broker_address=tcp://{host}:{port}"
-        if loopback:
+        if host == "127.0.0.1":
             options += f" --localinterface=tcp://{host}"
         helics.helicsFederateInfoSetCoreInitString(info, options)
         helics.helicsFederateInfoSetIntegerProperty(
@@ -108,7 +87,7 @@ class Federate:
         # a value that comes between two requested times must not wake it: its times are those of the control period
         helics.helicsFederateInfoSetFlagOption(info, helics.HELICS_FLAG_UNINTERRUPTIBLE, True)
         self.fed = helics.helicsCreateValueFederate(self.name, info)
-        return {"version": helics.helicsGetVersion()}
+        return {}
 
     def begin(self, request: dict[str, Any]) -> dict[str, Any]:
         """Register all topics, wait for the whole federation, and tell which topics nobody publishes."""
@@ -120,12 +99,9 @@ class Federate:
         helics.helicsFederateSetFlagOption(self.fed, helics.HELICS_HANDLE_OPTION_CONNECTION_OPTIONAL, True)
         for key, kind, unit in request["subscriptions"]:
             self.subscriptions[key] = helics.helicsFederateRegisterSubscription(self.fed, key, unit), kind
-        self.waits_since = time.monotonic()
         helics.helicsFederateEnterInitializingMode(self.fed)
         self._publish(request["publish"])
         helics.helicsFederateEnterExecutingMode(self.fed)
-        self.waits_since, self.begun = None, True
-        self.meet()
         others = [name for name in self._names("root", "federates") if name != self.name]
         for name in others:
             if keys := self.subscriptions.keys() & set(self._names(name, "publications")):
@@ -140,9 +116,7 @@ class Federate:
         """Publish, go to a time, and return what was published since the last step."""
         helics = self.helics
         self._publish(request["publish"])
-        self.waits_since = time.monotonic()
         helics.helicsFederateRequestTime(self.fed, request["time"])
-        self.waits_since = None
         read = {
             "double": helics.helicsInputGetDouble,
             "boolean": lambda topic: bool(helics.helicsInputGetBoolean(topic)),
@@ -156,7 +130,7 @@ class Federate:
         gone = []
         if request["needed"]:
             silent = [name for name, keys in self.publishers.items() if not keys & values.keys()]
-            gone = [name for name in silent if self._query(name, "state") in _GONE]
+            gone = [name for name in silent if self._query(name, "state") in GONE]
         return {"values": values, "gone": gone}
 
     def end(self, request: dict[str, Any]) -> dict[str, Any]:
@@ -180,46 +154,13 @@ class Federate:
         if self.fed is None:
             return []
         answer = self._query("root", "global_time")
-        found = []
-        for core in answer.get("cores", []) if isinstance(answer, dict) else []:
-            for federate in core.get("federates", []):
-                name = federate.get("attributes", {}).get("name", "")
-                if name != self.name:
-                    found.append(f"{name} stands at t = {max(federate.get('granted_time', 0.0), 0.0):g} s")
-        return found
-
-    def meet(self) -> None:
-        """Note where the processes of the others listen that have joined by now."""
-        state = self._state()
-        name, of_ours, _ = str(state.get("attributes", {}).get("name", "")).partition(_OF_BROKER)
-        self._has_broker = name if of_ours else ""
-        for core in state.get("cores", []):
-            attributes = core["attributes"]
-            each = [federate["attributes"] for federate in state.get("federates", [])]
-            names = [its["name"] for its in each if its["parent"] == attributes["id"]]
-            if not names or self.name in names or attributes["name"] in self._cores:
-                continue
-            self._cores.add(attributes["name"])
-            host, _, port = str(self._query(attributes["name"], "address")).rpartition("://")[2].rpartition(":")
-            if port.isdecimal() and not _has_ended((host, int(port))):
-                self._others_at[host, int(port)] = names
-
-    def dead(self) -> str:
-        """Return who has ended without leaving the federation, as a sentence; empty if nobody has."""
-        if self._broker_at is not None and _has_ended(self._broker_at):
-            broker = f"the broker at tcp://{self._broker_at[0]}:{self._broker_at[1]}"
-            return f"{self._has_broker} died, and with it {broker}" if self._has_broker else f"{broker} has ended"
-        ended = {name: at for at, names in self._others_at.items() if _has_ended(at) for name in names}
-        if not ended:
-            return ""
-        left = {it["attributes"]["name"] for it in self._state().get("federates", []) if it["state"] in _GONE}
-        died = [f"{name} died: nothing listens at tcp://{at[0]}:{at[1]} any more" for name, at in ended.items()]
-        return "; ".join(text for name, text in zip(ended, died, strict=True) if name not in left)
-
-    def _state(self) -> dict[str, Any]:
-        """Return what the broker knows of the federation, which it answers at once."""
-        state = self._query("root", "current_state")
-        return state if isinstance(state, dict) else {}
+        cores = answer.get("cores", []) if isinstance(answer, dict) else []
+        times = {
+            federate.get("attributes", {}).get("name", ""): max(federate.get("granted_time", 0.0), 0.0)
+            for core in cores
+            for federate in core.get("federates", [])
+        }
+        return [f"{name} stands at t = {t:g} s" for name, t in times.items() if name != self.name]
 
     def _publish(self, values: dict[str, Any]) -> None:
         helics = self.helics
@@ -243,13 +184,6 @@ class Federate:
             return self.helics.helicsQueryExecute(query, self.fed)
         finally:
             self.helics.helicsQueryFree(query)
-
-
-_OF_BROKER = "-broker"
-"""What the name of a broker of ours has after that of its federate."""
-
-_GONE = ("disconnected", "finalized", "error")
-"""States of a federate that publishes no more."""
 
 
 def _require_free(host: str, port: int) -> None:
@@ -278,65 +212,15 @@ def _reach(host: str, port: int, wait: float) -> None:
             time.sleep(PROBE)
 
 
-def _has_ended(at: Address) -> bool:
-    """Return whether a host that answers refuses connections on a port."""
-    try:
-        socket.create_connection(at, timeout=LOOK).close()
-    except ConnectionRefusedError:
-        return True
-    except OSError:  # as of a host that is out of reach: HELICS may have other ways
-        return False
-    return False
-
-
-def _reason(error: Exception) -> str:
-    """Return the text of an error of HELICS without its number."""
-    text = str(error)
-    return text.partition("] ")[2] if text.startswith("[") else text
-
-
 def main() -> None:
     """Answer requests until the end of standard input."""
     answers = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(2, 1)
     requests: queue.Queue[dict[str, Any]] = queue.Queue()
-    federate: Federate | None = None
 
     def answer(content: dict[str, Any]) -> None:
         with contextlib.suppress(OSError):  # the parent is gone: so is this process, in a moment
             answers.write(json.dumps(content) + "\n")
-
-    def answer_times() -> None:
-        with contextlib.suppress(Exception):
-            answer({"times": federate.times() if federate else []})
-
-    def listen() -> None:
-        """Take requests; do at once what must not wait for the present one."""
-        for line in sys.stdin:
-            request = json.loads(line)
-            if request["do"] == "times":  # HELICS asks a dead federate, too, and waits long for it
-                threading.Thread(target=answer_times, daemon=True).start()
-            elif request["do"] == "abort":
-                if federate:
-                    federate.abort(request["reason"])
-                os._exit(0)
-            else:
-                requests.put(request)
-        if federate:
-            federate.abort(f"{federate.name}: its gridpeers process was killed")
-        os._exit(0)
-
-    def look() -> None:
-        """Look who has come, until all are at t = 0; and in a wait, who has died."""
-        while True:
-            time.sleep(LOOK)
-            since = federate.waits_since if federate else None
-            with contextlib.suppress(Exception):
-                if federate and since is not None and time.monotonic() - since >= LOOK and (died := federate.dead()):
-                    answer({"died": died})
-                    return
-                if federate and federate.fed is not None and not federate.begun:
-                    federate.meet()
 
     try:
         federate = Federate()
@@ -345,14 +229,33 @@ def main() -> None:
         answer({"not_importable": f"{type(error).__name__}: {error}", "installed": not missing})
         return
     answer({"ready": True})
+
+    def answer_times() -> None:
+        with contextlib.suppress(Exception):
+            answer({"times": federate.times()})
+
+    def listen() -> None:
+        """Take requests; do at once what must not wait for the present one."""
+        for line in sys.stdin:
+            request = json.loads(line)
+            if request["do"] == "times":  # HELICS asks a dead federate, too, and waits long for it
+                threading.Thread(target=answer_times, daemon=True).start()
+            elif request["do"] == "abort":
+                federate.abort(request["reason"])
+                os._exit(0)
+            else:
+                requests.put(request)
+        federate.abort(f"{federate.name}: its gridpeers process was killed")
+        os._exit(0)
+
     threading.Thread(target=listen, daemon=True).start()
-    threading.Thread(target=look, daemon=True).start()
     while True:
         request = requests.get()
         try:
             answer(getattr(federate, request["do"])(request))
         except Exception as error:
-            answer({"error": _reason(error)})
+            text = str(error)  # of HELICS with a number before it
+            answer({"error": text.partition("] ")[2] if text.startswith("[") else text})
         if request["do"] == "end":
             answers.close()
             os._exit(0)

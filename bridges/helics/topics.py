@@ -7,6 +7,7 @@ A plant publishes at every record time t what its sensors show at t. A controlle
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Literal, NamedTuple
 
 ACT = 1e-6
@@ -26,37 +27,36 @@ class Topic(NamedTuple):
     """Unit as HELICS knows it: it converts from a publisher's other one. "" for none."""
 
 
-SENSORS = (("f", "Hz"), ("P", "W"), ("Q", "var"), ("V", "V"))
+SENSORS = (
+    Topic("f", "double", "Hz"),
+    Topic("P", "double", "W"),
+    Topic("Q", "double", "var"),
+    Topic("V", "double", "V"),
+)
 """Measurements that a plant publishes of every inverter, in the order of a recorded row."""
 
-HELD = (("P_set_held", "W"), ("V_set_held", "V"))
+HELD = (Topic("P_set_held", "double", "W"), Topic("V_set_held", "double", "V"))
 """Set-points that an inverter follows, after its bounds; in the order of a recorded row, behind the sensors."""
 
-SET_POINTS = (("P_set", "W"), ("V_set", "V"))
+WHERE = (Topic("grid_connected", "boolean", ""), Topic("island", "string", ""))
+"""An inverter's island: whether the substation feeds it, and its name."""
+
+SET_POINTS = (Topic("P_set", "double", "W"), Topic("V_set", "double", "V"))
 """Set-points that a controller publishes for every inverter."""
 
 
-def sensors(prefix: str, inverter: str) -> list[Topic]:
-    """Return the topics that a controller needs of an inverter."""
-    return [Topic(f"{prefix}/{inverter}/{name}", "double", unit) for name, unit in SENSORS]
+def topics(prefix: str, inverters: Iterable[str], *groups: Iterable[Topic]) -> list[Topic]:
+    """Return the topics of some groups for each of some inverters.
 
-
-def held(prefix: str, inverter: str) -> list[Topic]:
-    """Return the topics of the set-points that an inverter follows."""
-    return [Topic(f"{prefix}/{inverter}/{name}", "double", unit) for name, unit in HELD]
-
-
-def where(prefix: str, inverter: str) -> list[Topic]:
-    """Return the topics of an inverter's island: whether the substation feeds it, and its name."""
+    >>> topics("grid", ["inv1"], SET_POINTS)[0]
+    Topic(key='grid/inv1/P_set', type='double', unit='W')
+    """
     return [
-        Topic(f"{prefix}/{inverter}/grid_connected", "boolean", ""),
-        Topic(f"{prefix}/{inverter}/island", "string", ""),
+        topic._replace(key=f"{prefix}/{inverter}/{topic.key}")
+        for inverter in inverters
+        for group in groups
+        for topic in group
     ]
-
-
-def set_points(prefix: str, inverter: str) -> list[Topic]:
-    """Return the topics that a controller publishes for an inverter."""
-    return [Topic(f"{prefix}/{inverter}/{name}", "double", unit) for name, unit in SET_POINTS]
 
 
 def events(prefix: str) -> Topic:
@@ -65,11 +65,5 @@ def events(prefix: str) -> Topic:
 
 
 def number(value: Value) -> float:
-    """Return a value as a number; not-a-number for HELICS's mark of a double that is none, -1e49.
-
-    Examples
-    --------
-    >>> number(60.0), number(-1e49)
-    (60.0, nan)
-    """
+    """Return a value as a number; not-a-number for HELICS's mark of a double that is none, -1e49."""
     return float(value) if abs(float(value)) < 1e40 else math.nan

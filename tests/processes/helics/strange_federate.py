@@ -3,7 +3,6 @@
 It imports helics alone. Its inverters, nine if it is not told which, show the same all the time.
 """
 
-import os
 import sys
 import threading
 
@@ -34,8 +33,6 @@ def main(broker: str, what: str, name: str = "strange", first: str = "1", last: 
         wrong = k * STEP >= WRONG
         if wrong and what == "leaves":
             break
-        if wrong and what == "dies":
-            os._exit(1)
         if wrong and what == "hangs":
             threading.Event().wait()
         if wrong and what == "error":
