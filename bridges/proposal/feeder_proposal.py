@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import accumulate
 from math import ceil
@@ -31,7 +31,8 @@ def islanding_switch(feeder: Feeder) -> tuple[str, str, frozenset[str]]:
     if feeder.source is None:
         raise NoProposalError("the feeder has no substation to island from")
     graph, load = Connectivity(feeder), feeder.load_by_bus()
-    if sum(load.values()) <= 0.0:
+    total = sum(load.values())
+    if total <= 0.0:
         raise NoProposalError("the feeder has no load, which inverters are rated by")
     places = set(three_phase(feeder))
     best, head, beyond, most = "", "", frozenset[str](), (False, 0.0, 0)
@@ -43,43 +44,35 @@ def islanding_switch(feeder: Feeder) -> tuple[str, str, frozenset[str]]:
             best, beyond, most = switch.alias or switch.name, buses, weight
             head = switch.to_bus if switch.to_bus in buses else switch.from_bus
     large, cut_off, _ = most
-    if not large or cut_off < ENOUGH * sum(load.values()):
-        lines = heads(feeder, more_than=1.01 * cut_off, small=not large)
+    if not large or cut_off < ENOUGH * total:
+        lines = _heads(feeder, feeder.source.bus, places, more_than=1.01 * cut_off, small=not large)
         if lines or cut_off <= 0.0:
             raise NoSwitchError(lines)
     return best, head, beyond
 
 
-def heads(feeder: Feeder, more_than: float, *, small: bool, count: int = 3) -> list[str]:
-    """Return three-phase lines that would make switches, the best first.
+def _heads(feeder: Feeder, source: str, three_phase: set[str], more_than: float, *, small: bool) -> list[str]:
+    """Return up to three three-phase lines that would make switches, the best first.
 
     They cut off more than so much load (W): half of all load or more as near to the substation as possible, else
     as much as possible. Lines that cut off a lumped load come last, and only with `small`.
     """
-    if feeder.source is None:
-        return []
     load, near = feeder.load_by_bus(), neighbours(feeder)
-    total = sum(load.values())
-    where = {bus: place for place, bus in enumerate(depth_first(near, [feeder.source.bus]))}
-    number = defaultdict[frozenset[str], int](int)
-    for one, other, _ in feeder.branches():
-        number[frozenset((one, other))] += 1
-    below = cut_off_sums(near, feeder.source.bus, load)
-    places = cut_off_sums(near, feeder.source.bus, dict.fromkeys(three_phase(feeder), 1.0))
+    where = {bus: place for place, bus in enumerate(depth_first(near, [source]))}
+    parallel = Counter(frozenset((one, other)) for one, other, _ in feeder.branches())
+    below, places = (cut_off_sums(near, source, what) for what in (load, dict.fromkeys(three_phase, 1.0)))
     found: list[tuple[bool, bool, float, int, str]] = []
     for row in feeder.elements:
         kind, _, name = row.name.partition(".")
         buses = {bus for bus, _ in row.nodes}
-        if kind in LINES and len(row.nodes) >= 6 and len(buses) == 2 and number[frozenset(buses)] == 1:
+        if kind in LINES and len(row.nodes) >= 6 and len(buses) == 2 and parallel[frozenset(buses)] == 1:
             one, other = sorted(buses, key=lambda bus: where.get(bus, -1))
-            weight = below.get((one, other), 0.0)
-            if weight > more_than:
-                enough = weight >= ENOUGH * total
+            weight, lumped = below.get((one, other), 0.0), places.get((one, other), 0.0) < GROUP
+            if weight > more_than and (small or not lumped):
+                enough = weight >= ENOUGH * sum(load.values())
                 nearness = where[one] if enough else -weight
-                lumped = places.get((one, other), 0.0) < GROUP
-                if small or not lumped:
-                    found.append((lumped, not enough, nearness, where[one], f"{LINES[kind]}.{name}"))
-    return [name for *_, name in sorted(found)[:count]]
+                found.append((lumped, not enough, nearness, where[one], f"{LINES[kind]}.{name}"))
+    return [name for *_, name in sorted(found)[:3]]
 
 
 def three_phase(feeder: Feeder) -> list[str]:
@@ -180,7 +173,7 @@ def phase_powers(feeder: Feeder, switch: str, head: str) -> NDArray[np.complex12
     """Return the power (VA) through a switch of each phase of its far side, while the substation feeds everything.
 
     It is without fixed generation. So loads between phases, behind transformers and on split-phase services count where
-    they come from.
+    they come from. It is empty where the power flow has no solution.
     """
     loads = tuple(part for part in feeder.load_parts if part.S.real >= 0.0)
     network = Network(replace(feeder, load_parts=loads, inverters=()))
@@ -198,8 +191,7 @@ def phase_powers(feeder: Feeder, switch: str, head: str) -> NDArray[np.complex12
 
 def heaviest_phase(S: NDArray[np.complex128]) -> float:
     """Return the load of the heaviest phase in relation to the mean of all, from the power (VA) of each; 1 of none."""
-    P = S.real
-    return float(3.0 * P.max() / P.sum()) if P.sum() > 0.0 else 1.0
+    return float(3.0 * S.real.max() / S.real.sum()) if S.real.sum() > 0.0 else 1.0
 
 
 def neighbours(feeder: Feeder) -> dict[str, list[str]]:
@@ -265,11 +257,10 @@ class NoSwitchError(NoProposalError):
 
 
 class TooLargeError(NoProposalError):
-    """An inverter would be larger than its voltage allows."""
+    """An inverter would be larger than its voltage allows; so many inverters as `needed` may be enough."""
 
     def __init__(self, row: InverterRow, most: float, load: float, count: int) -> None:
         self.needed = ceil(count * row.P_rated / most)
-        """Inverters that may be enough."""
         super().__init__(
             f"{count} inverters for the load of {load / 1e3:.0f} kW need one of {row.P_rated / 1e3:.0f} kW at bus "
             f"{row.bus}, where {most / 1e3:.0f} kW are plausible; give more --inverters, if there are buses for "
@@ -287,8 +278,6 @@ SMALLEST = 20e3
 """Load (W) below which a section has no inverters of its own."""
 DROOPS = 0.01, 0.05
 """P-f and Q-V droop (pu)."""
-MOST_TRIES = 8
-"""Counts that are tried where the inverters of the first one would be too large."""
 
 
 class Proposal(NamedTuple):
@@ -301,8 +290,6 @@ class Proposal(NamedTuple):
     """First P_set of every inverter (pu of its rating)."""
     load: float
     """Load (W) beyond the switch."""
-    generation: float
-    """Fixed generation (W) beyond the switch."""
     heaviest: float
     """Load of the heaviest phase in relation to the mean of the phases."""
 
@@ -315,20 +302,14 @@ def propose(feeder: Feeder, count: int | None = None) -> Proposal:
     of the load. Without a count each section has one group; sections of more load have more groups, and all have more
     where an inverter would be larger than its voltage allows.
     """
-    try:
-        return _propose(feeder, count)
-    except TooLargeError as error:
-        if count is not None:
-            raise
-        problem = error
-    for _ in range(MOST_TRIES):
+    needed = 0
+    while True:
         try:
-            return _propose(feeder, problem.needed)
+            return _propose(feeder, count or needed or None)
         except TooLargeError as error:
-            if error.needed <= problem.needed:  # there are no buses for more
-                break
-            problem = error
-    raise problem
+            if count is not None or error.needed <= needed:  # there are no buses for more
+                raise
+            needed = error.needed
 
 
 def _propose(feeder: Feeder, count: int | None) -> Proposal:
@@ -345,25 +326,25 @@ def _propose(feeder: Feeder, count: int | None) -> Proposal:
     along = depth_first(near, [head, *(bus.name for bus in feeder.buses if bus.name in beyond)])
     known = set(three_phase(feeder))
     sections = [
-        _Section(sum(load[bus] for bus in buses), [bus for bus in along if bus in buses])
+        (sum(load[bus] for bus in buses), [bus for bus in along if bus in buses])
         for part in by_bus(Connectivity(feeder).parts(closed=()))
         if len(buses := {bus for bus, _ in part} & beyond) > 1 and buses & known
     ]
-    sections.sort(key=lambda section: -section.load)
-    chosen = [section for section in sections if section.load >= SMALLEST][:MOST_GROUPS] or sections[:1]
+    sections.sort(key=lambda section: -section[0])
+    chosen = [section for section in sections if section[0] >= SMALLEST][:MOST_GROUPS] or sections[:1]
     if not chosen:
         raise NoProposalError(f'beyond switch "{switch}" no bus has phases A, B and C, which an inverter needs')
-    there = [len(possible_places(feeder, known, section.along, 0.0, GROUP)) for section in chosen]
-    groups = group_sizes([section.load for section in chosen], there, count)
+    there = [len(possible_places(feeder, known, buses, 0.0, GROUP)) for _, buses in chosen]
+    groups = group_sizes([of_section for of_section, _ in chosen], there, count)
     chosen = chosen[: len(groups)]
-    carried = sum(section.load for section in chosen) or 1.0
+    carried = sum(of_section for of_section, _ in chosen) or 1.0
     rows, neutrals = {bus.name: bus for bus in feeder.buses}, neutrals_of(feeder)
     inverters: list[InverterRow] = []
     microgrid = 0
-    for section, sizes in zip(chosen, groups, strict=True):
-        rating = needed * (section.load / carried if carried > 1.0 else 1.0 / len(chosen))
-        places = possible_places(feeder, known, section.along, LEADER * rating / len(sizes), sum(sizes))
-        places = spread(section.along, set(places), sum(sizes), load)
+    for (of_section, section), sizes in zip(chosen, groups, strict=True):
+        rating = needed * (of_section / carried if carried > 1.0 else 1.0 / len(chosen))
+        places = possible_places(feeder, known, section, LEADER * rating / len(sizes), sum(sizes))
+        places = spread(section, set(places), sum(sizes), load)
         for size in sizes:
             microgrid += 1
             own, places = places[:size], places[size:]
@@ -389,13 +370,4 @@ def _propose(feeder: Feeder, count: int | None) -> Proposal:
         raise TooLargeError(large, most, total, len(inverters))
     total_rated = sum(row.P_rated for row in inverters)
     P_set0 = (1.0 - IMPORTED) * max(total - generation, 0.0) / total_rated
-    return Proposal(switch, tuple(inverters), round(P_set0, 3), total, generation, heaviest)
-
-
-class _Section(NamedTuple):
-    """Buses between switches."""
-
-    load: float
-    """Their load (W)."""
-    along: Sequence[str]
-    """The buses, along the network."""
+    return Proposal(switch, tuple(inverters), round(P_set0, 3), total, heaviest)

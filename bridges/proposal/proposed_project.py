@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,7 +19,6 @@ from gridpeers.plant.build import build_plant
 from gridpeers.plant.equipment import Feeder as Tables
 from gridpeers.plant.equipment.neutrals import returns_in_words
 from gridpeers.plant.feeder.limit_events import LIMITS
-from gridpeers.plant.plant_config import PlantSettings
 from gridpeers.scenario import load
 from gridpeers.scenarios.run_request import BrokenRunError
 from gridpeers.scenarios.schema import ScenarioModel, load_scenario
@@ -29,7 +26,7 @@ from gridpeers.scenarios.schema.check_notes import start_problem
 from gridpeers.scenarios.schema.configs import configs
 from gridpeers.wire.driver.command_line import command_line
 from gridpeers.wire.messages import OFF
-from gridpeers.wire.wording import counted, first_of
+from gridpeers.wire.wording import counted
 
 SETTLE = 1.2
 """Time (s) given to the transient after the last event; the swings after it are judged."""
@@ -39,9 +36,6 @@ WINDOW = 0.4
 
 SWING = 0.02
 """Swing of a frequency (Hz) that is at rest."""
-
-FIRST = 0.1
-"""Time (s) to which the first event is moved: until then nothing happens."""
 
 
 class Unrest(NamedTuple):
@@ -56,39 +50,26 @@ class Unrest(NamedTuple):
 def unsteady(scenario: ScenarioModel, feeder: Tables, case: str) -> Unrest | None:
     """Return what goes on after the last event on droop alone; None if the plant comes to rest."""
     config, _ = configs(scenario, feeder, case)
-    settings = config.settings
-    early = FIRST - min(_times(settings), default=FIRST)
-    events = tuple(msgspec.structs.replace(event, t=round(event.t + early, 9)) for event in settings.events)
-    loads = tuple(msgspec.structs.replace(event, t=round(event.t + early, 9)) for event in settings.loads)
-    settings = msgspec.structs.replace(settings, events=events, loads=loads)
-    plant = build_plant(msgspec.structs.replace(config, settings=settings))
+    plant = build_plant(config)
     forming = [row.name for row in feeder.inverters if row.kind == "GFM"]
-    last = max(_times(settings), default=FIRST)
-    end, window = round((last + SETTLE) / config.T_c), round(WINDOW / config.T_c)
+    settings = config.settings
+    last = max([*(event.t for event in settings.events), *(event.t for event in settings.loads)], default=0.0)
     found: list[list[float]] = []
-    for _ in range(end):
+    for _ in range(round((last + SETTLE) / config.T_c)):
         plant.advance()
         readings = plant.measure()
         found.append([readings[name].f if readings[name].island != OFF else np.nan for name in forming])
     happened = plant.take_events()
     limits = [event.text for event in happened if LIMITS in event.text][:1]
-    trip = next((event.text for event in happened if event.kind == "trip"), "")
-    if trip:
-        return Unrest(", and ".join([*limits, trip]), bool(limits))
-    f = np.array(found)
+    trips = [event.text for event in happened if event.kind == "trip"][:1]
+    if trips:
+        return Unrest(", and ".join([*limits, *trips]), bool(limits))
+    f, window = np.array(found), round(WINDOW / config.T_c)
     before, after = (float(np.ptp(part, axis=0).max()) for part in (f[-2 * window : -window], f[-window:]))
     if after < SWING or after < 0.5 * before:
         return None
     return Unrest(f"its frequencies swing by {after:.2g} Hz, and do not calm down", bool(limits))
 
-
-def _times(settings: PlantSettings) -> list[float]:
-    """Return when (s) switches are operated and loads change."""
-    return [*(event.t for event in settings.events), *(event.t for event in settings.loads)]
-
-
-Project = tuple[ScenarioModel, Tables]
-"""A scenario and its feeder."""
 
 SCENARIO = """\
 # A first islanding of {feeder}, proposed by `gridpeers init`: edit it, and {folder}/inverters.csv.
@@ -142,9 +123,6 @@ beta_GFL = {beta}
 BETAS = 4.0, 16.0, 64.0
 """Weights of var sharing, beside that of the voltage error, to try where vars stay unequal."""
 
-MUCH = 0.5
-"""Part of the load from which on fixed generation is the likely cause."""
-
 GRAPHS = {"ring": "agents in a ring", "clustered": "agents of each microgrid and all leaders"}
 """Graphs of a proposed scenario, and their words."""
 
@@ -155,126 +133,127 @@ MOST_IN_RING = 15
 """Inverters up to which a ring is quick enough: agreement along it takes a time that goes with their square."""
 
 
-def _with_proposal(
-    script: str, switches: list[str], leave_out: list[str], count: int | None
-) -> tuple[Feeder, Proposal]:
-    """Return a feeder and its proposal; one without a switch to island at gets one near the substation."""
-    feeder = read_script(script, switches, leave_out)
-    try:
-        return feeder, propose(feeder, count)
-    except NoSwitchError as error:
-        if not error.lines:
-            raise
-        line = error.lines[0]
-    typer.echo(f"NOTE  no switch cuts half of the load off the substation; {line} is made one")
-    feeder = read_script(script, [*switches, line], leave_out)
-    return feeder, propose(feeder, count)
+class _Project:
+    """The scenario file of a proposal, written anew with each setting that is tried."""
 
+    def __init__(self, folder: Path, feeder: Feeder, proposal: Proposal) -> None:
+        self.feeder_name, self.proposal = feeder.name, proposal
+        self.file, self.tables = folder / "islanding.toml", folder_of(feeder.name)
+        self.graph = "ring" if len(proposal.inverters) <= MOST_IN_RING else "clustered"
+        self.part = 1.0
+        self.settings = ""
 
-def _calmed(project: Project, rewritten: Callable[[str], Project], proposal: Proposal) -> str | None:
-    """Return the settings with which a project comes to rest on droop alone, or None; say what they are."""
-    if not (found := unsteady(*project, "none")):
-        return ""
-    for settings, words in REMEDIES.items():
-        if (found.limited or MORE_CURRENT not in settings) and not unsteady(*rewritten(settings), "none"):
-            typer.echo(f"NOTE  on droop alone, {found.text}: so {words}")
-            return settings
-    rewritten("")
-    typer.echo(f"NOTE  on droop alone, {found.text}; {_remedy(project[1], proposal)}")
-    return None
+    def write(self, part: float | None = None, settings: str = "") -> tuple[ScenarioModel, Tables]:
+        """Write it with this part of the proposed P_set0, as before if None, and settings; return what a run reads."""
+        self.part, self.settings = self.part if part is None else part, settings
+        text = SCENARIO.format(
+            feeder=self.feeder_name,
+            folder=self.tables,
+            switch=json.dumps(self.proposal.switch),  # names of scripts may have quotes
+            P_set0=round(self.part * self.proposal.P_set0, 3),
+            settings=settings,
+            graph=self.graph,
+            agents=GRAPHS[self.graph],
+            title=json.dumps(f"Islanding of {self.feeder_name} at {self.proposal.switch}"),
+        )
+        self.file.write_text(text, encoding="utf-8")
+        return load_scenario(str(self.file))
 
+    def calmed(self) -> bool:
+        """Choose the settings with which the plant comes to rest on droop alone, and say what they are."""
+        if not (found := unsteady(*self.write(), "none")):
+            return True
+        for settings, words in REMEDIES.items():
+            worth_a_try = found.limited or MORE_CURRENT not in settings
+            if worth_a_try and not unsteady(*self.write(settings=settings), "none"):
+                typer.echo(f"NOTE  on droop alone, {found.text}: so {words}")
+                return True
+        self.write()
+        typer.echo(f"NOTE  on droop alone, {found.text}; more --inverters give more leaders, or try another --switch")
+        return False
 
-def _remedy(feeder: Tables, proposal: Proposal) -> str:
-    """Return what may help where no settings do: with much fixed generation, to do without it."""
-    if proposal.generation < MUCH * proposal.load:
-        return "more --inverters give more leaders, or try another --switch"
-    names = list(dict.fromkeys(part.name for part in feeder.load_parts if part.S.real < 0.0))
-    return (
-        f"{proposal.generation / 1e3:.0f} kW of fixed generation beside {proposal.load / 1e3:.0f} kW of load follow no "
-        f"droop: leave out {first_of(names, 3)} (--leave-out), and add inverters at their buses"
-    )
+    def tried_with_agents(self) -> None:
+        """Choose settings with which the agents' case passes its checks, and say which checks fail.
 
-
-def _tried_with_agents(file: Path, case: str, settings: str, rewritten: Callable[[str], Project]) -> None:
-    """Run the agents' case of a project: choose settings that pass its checks, and say which checks fail.
-
-    Where more than var sharing fails and a leader was at its current limit, leaders get more current; where vars stay
-    unequal, var sharing weighs more.
-    """
-
-    def failed() -> tuple[dict[str, str], bool]:
-        result = load(file).run(case)
-        verdicts = [row for row in result.check_verdicts if row.status == "failed"]
-        told = {row.check: row.violations[0].sentence if row.violations else row.reason for row in verdicts}
-        return told, any(LIMITS in text for text in result.events["text"])
-
-    first, limited = failed()
-    if set(first) - {"var_sharing"} and limited and MORE_CURRENT not in settings:
-        rewritten(settings + MORE_CURRENT)
-        found, _ = failed()
-        if set(found) <= {"var_sharing"}:
-            check, sentence = next(iter(first.items()))
-            typer.echo(f"NOTE  case {case} fails its check {check}: {sentence}: so {REMEDIES[MORE_CURRENT]}")
-            first, settings = found, settings + MORE_CURRENT
-    found, beta, betas = first, 1.0, iter(BETAS)
-    while set(found) == {"var_sharing"} and (beta := next(betas, 0.0)):
-        rewritten(settings + BETA.format(beta=beta))
-        found, _ = failed()
-    if first and not found:
-        words = f"so [gains] weighs var sharing more, beta_GFM = beta_GFL = {beta:g}"
-        typer.echo(f"NOTE  case {case}, {first['var_sharing']}: {words}")
-    elif first:
-        rewritten(settings)
+        Where more than var sharing fails and a leader was at its current limit, leaders get more current; where vars
+        stay unequal, var sharing weighs more.
+        """
+        first, limited = self._failed_checks()
+        if set(first) - {"var_sharing"} and limited and MORE_CURRENT not in self.settings:
+            before = self.settings
+            self.write(settings=before + MORE_CURRENT)
+            found, _ = self._failed_checks()
+            if set(found) <= {"var_sharing"}:
+                check, sentence = next(iter(first.items()))
+                words = REMEDIES[MORE_CURRENT]
+                typer.echo(f"NOTE  case {self.graph} fails its check {check}: {sentence}: so {words}")
+                first = found
+            else:
+                self.write(settings=before)
+        before = self.settings
+        if set(first) == {"var_sharing"}:
+            for beta in BETAS:
+                self.write(settings=before + BETA.format(beta=beta))
+                found, _ = self._failed_checks()
+                if not found:
+                    words = f"so [gains] weighs var sharing more, beta_GFM = beta_GFL = {beta:g}"
+                    typer.echo(f"NOTE  case {self.graph}, {first['var_sharing']}: {words}")
+                    return
+                if set(found) != {"var_sharing"}:
+                    break
+            self.write(settings=before)
         for check, sentence in first.items():
-            typer.echo(f"NOTE  case {case} fails its check {check}: {sentence}")
+            typer.echo(f"NOTE  case {self.graph} fails its check {check}: {sentence}")
+
+    def _failed_checks(self) -> tuple[dict[str, str], bool]:
+        """Run the agents' case; return what its failed checks say, and whether a leader was at its current limit."""
+        result = load(self.file).run(self.graph)
+        failed = [row for row in result.check_verdicts if row.status == "failed"]
+        told = {row.check: row.violations[0].sentence if row.violations else row.reason for row in failed}
+        return told, any(LIMITS in text for text in result.events["text"])
 
 
 def propose_project(folder: Path, script: Path, switches: list[str], leave_out: list[str], count: int | None) -> None:
-    """Import a feeder, and write its tables with proposed inverters, and a scenario that islands it."""
+    """Import a feeder, and write its tables with proposed inverters, and a scenario that islands it.
+
+    A feeder without a switch to island at gets one near the substation.
+    """
     try:
-        feeder, proposal = _with_proposal(str(script), switches, leave_out, count)
+        feeder = read_script(str(script), switches, leave_out)
+        try:
+            proposal = propose(feeder, count)
+        except NoSwitchError as error:
+            if not error.lines:
+                raise
+            line = error.lines[0]
+            typer.echo(f"NOTE  no switch cuts half of the load off the substation; {line} is made one")
+            feeder = read_script(str(script), [*switches, line], leave_out)
+            proposal = propose(feeder, count)
     except NoProposalError as error:
         fail([f"{script}: {error}"], BAD_INPUT)
-    name = folder_of(feeder.name)
-    save_readable(msgspec.structs.replace(feeder, inverters=proposal.inverters), folder / name, script.name)
-    file = folder / "islanding.toml"
-    graph = "ring" if len(proposal.inverters) <= MOST_IN_RING else "clustered"
-
-    def written(part: float, settings: str = "") -> Project:
-        text = SCENARIO.format(
-            feeder=feeder.name,
-            folder=name,
-            switch=json.dumps(proposal.switch),  # names of scripts may have quotes
-            P_set0=round(part * proposal.P_set0, 3),
-            settings=settings,
-            graph=graph,
-            agents=GRAPHS[graph],
-            title=json.dumps(f"Islanding of {feeder.name} at {proposal.switch}"),
-        )
-        file.write_text(text, encoding="utf-8")
-        return load_scenario(str(file))
-
-    problem = ""
+    with_inverters = msgspec.structs.replace(feeder, inverters=proposal.inverters)
+    project = _Project(folder, feeder, proposal)
+    save_readable(with_inverters, folder / project.tables, script.name)
+    problems: list[str] = []
     with explained(lambda: typer.echo(TRYING)):
         for part in PARTS:
-            found = start_problem(*(project := written(part)))
-            if not found:
-                rewritten = partial(written, part)
-                settings = _calmed(project, rewritten, proposal)
-                if settings is not None:
-                    try:
-                        _tried_with_agents(file, graph, settings, rewritten)
-                    except BrokenRunError as error:
-                        rewritten(settings)
-                        typer.echo(f"NOTE  case {graph} was not checked, as a run of it broke: {error}")
+            problem = start_problem(*project.write(part))
+            if not problem:
                 break
-            problem = problem or found
-    if found:
-        check = command_line("check", str(file))
-        typer.echo(f"NOTE  it cannot start yet: {problem}; edit the inverters, then: {check}")
+            problems.append(problem)
+        if problem:
+            check = command_line("check", str(project.file))
+            typer.echo(f"NOTE  it cannot start yet: {problems[0]}; edit the inverters, then: {check}")
+        elif project.calmed():
+            settings = project.settings
+            try:
+                project.tried_with_agents()
+            except BrokenRunError as error:
+                project.write(settings=settings)
+                typer.echo(f"NOTE  case {project.graph} was not checked, as a run of it broke: {error}")
     if count is not None and len(proposal.inverters) < count:
         typer.echo(f"NOTE  no bus for more than {len(proposal.inverters)} of the {count} inverters of --inverters")
-    for text in returns_in_words(msgspec.structs.replace(feeder, inverters=proposal.inverters)):
+    for text in returns_in_words(with_inverters):
         typer.echo(f"NOTE  {text}")
     rated = sum(row.P_rated for row in proposal.inverters) / 1e3
     typer.echo(
