@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Mapping
 from math import isfinite
 from typing import Any
 
@@ -13,92 +12,18 @@ from numpy.typing import NDArray
 from gridpeers.bridges.gridlabd.glm import write_glm
 from gridpeers.bridges.gridlabd.gridlabd_process import DeltaModeProcess, GridlabdError
 from gridpeers.plant.dynamics.switch_state import SwitchState
-from gridpeers.plant.equipment.inverter_parameters import GflParameters, InverterParameters
+from gridpeers.plant.equipment.inverter_parameters import GflParameters
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.feeder.circuits import Circuits
 from gridpeers.plant.feeder.islands import Islands
 from gridpeers.plant.feeder.limit_events import SetPointLimits
 from gridpeers.plant.feeder.protection import Relays
 from gridpeers.plant.feeder.switchboard import Switchboard
-from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings, PowerLimit
 from gridpeers.plant.plant_interface import Reading, RecordedPlant
 from gridpeers.plant.tables.read import DATA
 from gridpeers.wire.messages import LoadSetting, PlantEvent
 from gridpeers.wire.timing import time_of
-
-Write = tuple[str, str, Any]
-"""A value for GridLAB-D: object, property, value."""
-
-
-class GridlabdSchedule:
-    """Switches and available power of a run; all inverters are on the network."""
-
-    def __init__(self, network: Network, settings: PlantSettings, parameters: Mapping[str, InverterParameters]) -> None:
-        self._network, self._h, self._parameters = network, settings.h, parameters
-        self._units = {unit.name: unit for unit in network.inverters}
-        self._switches = Switchboard(network, settings.events, settings.h)
-        self._circuits, self._islands = Circuits(network), Islands(network)
-        self._state = self._switch_state()
-        self._limits: dict[int, list[PowerLimit]] = {}
-        for limit in settings.limits:
-            self._limits.setdefault(round(limit.t / settings.h), []).append(limit)
-
-    def start(self) -> list[PlantEvent]:
-        """Return the events of t = 0."""
-        return self._islands.report_dead(0.0, self._switches.closed, self._state)
-
-    def islands(self) -> tuple[list[str], list[bool]]:
-        """Return the island of each inverter, and whether the substation feeds it."""
-        return self._islands.names(self._state)
-
-    def after(self, step: int) -> Iterable[int]:
-        """Return the later steps at which something happens."""
-        return (at for at in (*self._switches.steps, *self._limits) if at > step)
-
-    @property
-    def positions(self) -> dict[str, bool]:
-        return self._switches.positions
-
-    def put(self, step: int, name: str, action: str) -> bool:
-        """Operate a switch ("open" or "close") at a step; return whether it is in that state already."""
-        known = self._network.switch_name(name)
-        self._switches.put(step, known, action)
-        return (known in self._switches.closed) == (action == "close")
-
-    def happen(self, step: int) -> tuple[list[Write], list[PlantEvent]]:
-        """Return what GridLAB-D is given at a step, and its events.
-
-        GridLAB-D loses an island if two switches that part it open in one step: the others wait for the next steps.
-        """
-        t = time_of(step, self._h)
-        writes: list[Write] = []
-        events: list[PlantEvent] = []
-        due = self._switches.due(step)
-        for operation in due[1:]:
-            self._switches.drop(step, operation)
-            self._switches.put(step + 1, operation.switch, operation.action)
-            switch = self._switches.switch(operation.switch)
-            text = f"GridLAB-D operates one switch a step: {switch.full_name} follows {self._h * 1e3:g} ms later"
-            events.append(PlantEvent(t=t, kind="warning", subject=switch.event_name, text=text))
-        if due:
-            writes.append((f"s{due[0].switch}", "status", due[0].action))
-            events += self._switches.operate(step)
-            self._state = self._switch_state()
-            events += self._islands.report(t, self._switches.closed, self._state)
-        for limit in self._limits.pop(step, ()):
-            unit, own = self._units[limit.inverter], self._parameters[limit.inverter]
-            assert isinstance(own, GflParameters), "a scenario limits the power of a GFL alone"
-            writes.append((limit.inverter, "Pref_max", limit.P_max / (unit.P_rated * own.S_max)))
-            text = f"{limit.inverter} has {limit.P_max / 1e3:g} kW available"
-            events.append(PlantEvent(t=round(limit.t, 9), kind="limit", subject=limit.inverter, text=text))
-        return writes, events
-
-    def _switch_state(self) -> SwitchState:
-        circuit = self._circuits.of(self._switches.closed)
-        forming = np.array([unit.kind == "GFM" for unit in self._units.values()])
-        return SwitchState(circuit, np.zeros(forming.size, complex), forming, np.ones(forming.size, bool))
-
 
 REST = 0.5
 """Time (s) that GridLAB-D rests before t = 0, holding the set-points of the start: its own equilibrium, not ours."""
@@ -128,28 +53,27 @@ class GridlabdPlant(RecordedPlant):
         """k: the plant is at k T_c."""
         self._T_c, self._h = T_c, settings.h
         self._steps, self._record = round(T_c / self._h), round((record_step or self._h) / self._h)
-        network = ours.network
+        network = self._network = ours.network
         self._units = {unit.name: unit for unit in network.inverters}
         self._parameters = {
             unit.name: network.feeder.parameters_of(unit, settings.gfm, settings.gfl) for unit in network.inverters
         }
         self._V_nom = np.array([unit.V_nom for unit in network.inverters])
-        self._schedule = GridlabdSchedule(network, settings, self._parameters)
+        self._switchboard = Switchboard(network, settings.events, settings.h)
+        self._circuits, self._islands = Circuits(network), Islands(network)
+        self._state = self._switch_state()
+        self._limits: dict[int, list[PowerLimit]] = {}
+        for limit in settings.limits:
+            self._limits.setdefault(round(limit.t / settings.h), []).append(limit)
         self._set_points = SetPointLimits()
         self._relays = Relays(settings.protection, len(self.inverters), self._h, network.feeder.f_nom)
-        self._events = self._schedule.start()
+        self._events = self._islands.report_dead(0.0, self._switchboard.closed, self._state)
         self._events += [event for event in ours.take_events() if event.kind == "warning"]
-        self._writes: list[Write] = []
-        """Values for GridLAB-D's next step."""
+        self._writes: list[tuple[str, str, Any]] = []
+        """Values for GridLAB-D's next step: object, property, value."""
         start = {name: complex(reading.P, reading.Q) for name, reading in ours.measure().items()}
-        model = write_glm(
-            DATA / settings.feeder,
-            settings.load_set,
-            start,
-            self._parameters,
-            self._h,
-            round(REST + end + 2.0),
-        )
+        seconds = round(REST + end + 2.0)
+        model = write_glm(DATA / settings.feeder, settings.load_set, start, self._parameters, self._h, seconds)
         self.process = DeltaModeProcess(python, deadline)
         """GridLAB-D."""
         try:
@@ -170,7 +94,7 @@ class GridlabdPlant(RecordedPlant):
         self.process.close()
 
     def measure(self) -> dict[str, Reading]:
-        island, fed = self._schedule.islands()
+        island, fed = self._islands.names(self._state)
         readings = {}
         for i, name in enumerate(self.inverters):
             f, P, Q, V, P_set, V_set = self._in_units(name, self._now[i])
@@ -203,20 +127,20 @@ class GridlabdPlant(RecordedPlant):
 
     @property
     def switches(self) -> dict[str, bool]:
-        return self._schedule.positions
+        return self._switchboard.positions
 
     def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
         if synchronised:
             raise ValueError("GridLAB-D as the plant has no synchronism check; close without it")
-        return self._schedule.put(self.tick * self._steps, name, action)
+        known = self._network.switch_name(name)
+        self._switchboard.put(self.tick * self._steps, known, action)
+        return (known in self._switchboard.closed) == (action == "close")
 
     @property
     def loads(self) -> dict[str, complex]:
-        """Return none: they stay as in the model."""
-        return {}
+        return {}  # they stay as in the model
 
     def set_load(self, name: str, setting: LoadSetting) -> str:
-        """Refuse: the loads are those of the model."""
         raise ValueError(f"load {name}: GridLAB-D as the plant keeps the loads of its model; use our own plant")
 
     def connect(self, name: str, on: bool) -> None:
@@ -231,14 +155,13 @@ class GridlabdPlant(RecordedPlant):
         """
         step, last = self.tick * self._steps, (self.tick + 1) * self._steps
         while step < last:
-            writes, events = self._schedule.happen(step)
-            self._writes += writes
-            self._events += events
-            stop = min(last, step + self._relays.quiet, *self._schedule.after(step))
+            self._happen(step)
+            later = (at for at in (*self._switchboard.steps, *self._limits) if at > step)
+            stop = min(last, step + self._relays.quiet, *later)
             try:
                 steps = self._run(stop - step)
             except GridlabdError as error:
-                raise GridlabdError(f"plant after t = {self._time(step):g} s: {error}") from error
+                raise GridlabdError(f"plant after t = {time_of(step, self._h):g} s: {error}") from error
             for k in range(stop - step):
                 if (step + k + 1) % self._record == 0:
                     self._rows.append(self._as_row(step + k + 1, steps[k]))
@@ -247,9 +170,35 @@ class GridlabdPlant(RecordedPlant):
             step = stop
         self.tick += 1
 
-    def _time(self, step: int) -> float:
-        """Return the time of a step (s)."""
-        return time_of(step, self._h)
+    def _happen(self, step: int) -> None:
+        """Operate what is due at a step.
+
+        GridLAB-D loses an island if two switches that part it open in one step: the others wait for the next steps.
+        """
+        t = time_of(step, self._h)
+        due = self._switchboard.due(step)
+        for operation in due[1:]:
+            self._switchboard.drop(step, operation)
+            self._switchboard.put(step + 1, operation.switch, operation.action)
+            switch = self._switchboard.switch(operation.switch)
+            text = f"GridLAB-D operates one switch a step: {switch.full_name} follows {self._h * 1e3:g} ms later"
+            self._events.append(PlantEvent(t=t, kind="warning", subject=switch.event_name, text=text))
+        if due:
+            self._writes.append((f"s{due[0].switch}", "status", due[0].action))
+            self._events += self._switchboard.operate(step)
+            self._state = self._switch_state()
+            self._events += self._islands.report(t, self._switchboard.closed, self._state)
+        for limit in self._limits.pop(step, ()):
+            name, own = limit.inverter, self._parameters[limit.inverter]
+            assert isinstance(own, GflParameters), "a scenario limits the power of a GFL alone"
+            self._writes.append((name, "Pref_max", limit.P_max / (self._units[name].P_rated * own.S_max)))
+            text = f"{name} has {limit.P_max / 1e3:g} kW available"
+            self._events.append(PlantEvent(t=round(limit.t, 9), kind="limit", subject=name, text=text))
+
+    def _switch_state(self) -> SwitchState:
+        circuit = self._circuits.of(self._switchboard.closed)
+        forming = np.array([unit.kind == "GFM" for unit in self._units.values()])
+        return SwitchState(circuit, np.zeros(forming.size, complex), forming, np.ones(forming.size, bool))
 
     def _in_units(self, name: str, reading: NDArray[np.float64]) -> tuple[float, ...]:
         """Convert a reading to Hz, W, var, V, W, V."""
@@ -257,12 +206,8 @@ class GridlabdPlant(RecordedPlant):
         return f, P, Q, V, P_set * (unit.P_rated if unit.kind == "GFM" else 1.0), V_set * unit.V_nom
 
     def _as_row(self, step: int, readings: NDArray[np.float64]) -> tuple[float, ...]:
-        values = [
-            value
-            for name, reading in zip(self.inverters, readings, strict=True)
-            for value in self._in_units(name, reading)
-        ]
-        return (self._time(step), *values)
+        own = (self._in_units(name, reading) for name, reading in zip(self.inverters, readings, strict=True))
+        return (time_of(step, self._h), *(value for values in own for value in values))
 
     def _run(self, steps: int) -> NDArray[np.float64]:
         """Write the pending values, advance, and return the readings after each step: steps x inverters x values."""
@@ -278,10 +223,9 @@ class GridlabdPlant(RecordedPlant):
     def _watch(self, step: int, steps: NDArray[np.float64]) -> None:
         """End the run where protection of ours would trip an inverter, because GridLAB-D's goes on."""
         f, low, high = steps[:, :, 0], steps[:, :, 6] / self._V_nom, steps[:, :, 7] / self._V_nom
-        trips = self._relays.watch(f, low, high, np.ones(len(self.inverters), bool))
-        if trips:
+        if trips := self._relays.watch(f, low, high, np.ones(len(self.inverters), bool)):
             names = "; ".join(f"{self.inverters[trip.inverter]}: {trip}" for trip in trips)
             raise GridlabdError(
-                f"plant at t = {self._time(step):g} s: protection trips {names}. GridLAB-D's inverter has none, so the "
-                'run ends here; write [protection] category = "off", or simulator = "gridpeers"'
+                f"plant at t = {time_of(step, self._h):g} s: protection trips {names}. GridLAB-D's inverter has none, "
+                'so the run ends here; write [protection] category = "off", or simulator = "gridpeers"'
             )

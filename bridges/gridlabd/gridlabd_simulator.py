@@ -6,13 +6,13 @@ import re
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import closing
-from itertools import pairwise
 
 from msgspec.structs import replace
 
 from gridpeers.bridges.gridlabd.glm import node_of
 from gridpeers.bridges.gridlabd.glm_network import F_NOM
 from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment.connectivity import Node
 from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters, InverterParameters
 from gridpeers.plant.plant_config import FeederChanges, PlantConfig
 from gridpeers.plant.plant_interface import LivePlant
@@ -58,8 +58,35 @@ class GridlabdSimulator(Simulator):
 
     def check(self, scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
         """Note what a scenario asks for beyond GridLAB-D's delta mode and our model of it."""
-        _check_network(scenario, feeder, problems)
-        _check_parameters(scenario, feeder, problems)
+        for text in unrepresentable(feeder):
+            path = "plant.feeder" if scenario.plant.f_nom_Hz is None else "plant.f_nom_Hz"
+            problems.add(path, f"{text}; change it, {_OTHERWISE}")
+        steps = 1.0 / scenario.time.h_s if scenario.time.h_s else 0.0
+        if abs(steps - round(steps)) > 1e-6 and not problems.touch("time.h_s"):
+            text = f"GridLAB-D's step must divide 1 s, got {scenario.time.h_s:g} s; choose 0.002 s, {_OTHERWISE}"
+            problems.add("time.h_s", text)
+        for i, event in enumerate(scenario.events):
+            if event.synchronised:
+                problems.add(
+                    f"event[{i}].synchronised",
+                    f'event "{event.label}": GridLAB-D as the plant has no synchronism check; '
+                    f"close at a time that you know to be good, without it, {_OTHERWISE}",
+                )
+        beyond: dict[str, str] = {}
+        for row in feeder.inverters:
+            own = feeder.parameters_of(row, scenario.plant.gfm, scenario.plant.gfl)
+            kind = "gfm" if isinstance(own, GfmParameters) else "gfl"
+            for key, value in beyond_gridlabd(own).items():
+                text = f"GridLAB-D has no such {kind.upper()}, got {value} at {row.name}; leave it out"
+                beyond.setdefault(f"plant.{kind}.{key}", text)
+            if isinstance(own, GflParameters) and own.P_set_lim > own.S_max:
+                beyond.setdefault(
+                    "plant.gfl.P_set_lim_pu",
+                    f"GridLAB-D clips P_set at S_max_pu = {own.S_max:g} pu, got {own.P_set_lim:g} pu at {row.name}; "
+                    "choose at most that",
+                )
+        for path, text in beyond.items():
+            problems.add(path, f"{text}, {_OTHERWISE}")
         _check_supply(scenario, feeder, problems)
 
     def starting(self, table: None) -> str:
@@ -73,49 +100,6 @@ class GridlabdSimulator(Simulator):
 GRIDLABD = GridlabdSimulator()
 
 
-def _check_network(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
-    """Note what the feeder, the step and the events ask for beyond GridLAB-D."""
-    for text in unrepresentable(feeder):
-        path = "plant.feeder" if scenario.plant.f_nom_Hz is None else "plant.f_nom_Hz"
-        problems.add(path, f"{text}; change it, {_OTHERWISE}")
-    steps = 1.0 / scenario.time.h_s if scenario.time.h_s else 0.0
-    if abs(steps - round(steps)) > 1e-6 and not problems.touch("time.h_s"):
-        problems.add(
-            "time.h_s", f"GridLAB-D's step must divide 1 s, got {scenario.time.h_s:g} s; choose 0.002 s, {_OTHERWISE}"
-        )
-    for i, event in enumerate(scenario.events):
-        if event.synchronised:
-            problems.add(
-                f"event[{i}].synchronised",
-                f'event "{event.label}": GridLAB-D as the plant has no synchronism check; '
-                f"close at a time that you know to be good, without it, {_OTHERWISE}",
-            )
-
-
-def _check_parameters(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
-    """Note parameters that GridLAB-D's inverters do not have, or tie to others."""
-    seen: set[str] = set()
-    for row in feeder.inverters:
-        own = feeder.parameters_of(row, scenario.plant.gfm, scenario.plant.gfl)
-        for path, text in _parameters_beyond(row.name, own):
-            if path not in seen:
-                problems.add(path, f"{text}, {_OTHERWISE}")
-                seen.add(path)
-
-
-def _parameters_beyond(name: str, own: InverterParameters) -> Iterator[tuple[str, str]]:
-    """Yield the key and a sentence for every parameter of one inverter that GridLAB-D does not take."""
-    kind = "gfm" if isinstance(own, GfmParameters) else "gfl"
-    for key, value in beyond_gridlabd(own).items():
-        yield f"plant.{kind}.{key}", f"GridLAB-D has no such {kind.upper()}, got {value} at {name}; leave it out"
-    if isinstance(own, GflParameters) and own.P_set_lim > own.S_max:
-        yield (
-            "plant.gfl.P_set_lim_pu",
-            f"GridLAB-D clips P_set at S_max_pu = {own.S_max:g} pu, got {own.P_set_lim:g} pu at {name}; "
-            "choose at most that",
-        )
-
-
 def _check_supply(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
     """Note events that leave an inverter without voltage, or give it back to a part that had none.
 
@@ -123,32 +107,33 @@ def _check_supply(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -
     island stay alive there whose GFM are all single-phase.
     """
     index = {event.label: i for i, event in enumerate(scenario.events)}
+    dead_before: frozenset[Node] | None = None
     for state in supply_states(scenario, feeder):
+        path, event, when = "plant.feeder", "", "at t = 0 the switches leave"
+        if state.event is not None:
+            path, event = f"event[{index[state.event.label]}]", f'event "{state.event.label}"'
+            when = f"{event} leaves"
         for part in state.islands:
             forming = [row for row in feeder.inverters if row.kind == "GFM" and row.node in part]
             if all(len(row.phases) == 1 for row in forming):
-                when, path = "at t = 0 the switches leave", "plant.feeder"
-                if state.event is not None:
-                    when, path = f'event "{state.event.label}" leaves', f"event[{index[state.event.label]}]"
                 names = ", ".join(row.name for row in forming)
                 text = f"{when} an island to {names}, and in GridLAB-D a GFM of three phases must form one"
                 problems.add(path, f"{text}; leave one connected to it, {_OTHERWISE}")
-    for before, state in pairwise(supply_states(scenario, feeder)):
-        assert state.event is not None, "the first state alone has none"
-        path, event = f"event[{index[state.event.label]}]", f'event "{state.event.label}"'
-        if idle := [row.name for row in feeder.inverters if row.node in state.new]:
-            problems.add(
-                path,
-                f"{event} de-energises {', '.join(idle)}, and an inverter of GridLAB-D needs a voltage; "
-                f"leave a GFM connected to it, {_OTHERWISE}",
-            )
-        if again := sorted({bus for bus, _ in before.dead - state.dead}):
-            some = ", ".join(again[:_SHOWN]) + (", ..." if len(again) > _SHOWN else "")
-            problems.add(
-                path,
-                f"{event} energises {len(again)} de-energised buses again ({some}), for which GridLAB-D finds no "
-                f"solution; leave their switch open, {_OTHERWISE}",
-            )
+        if dead_before is not None:
+            if idle := [row.name for row in feeder.inverters if row.node in state.new]:
+                problems.add(
+                    path,
+                    f"{event} de-energises {', '.join(idle)}, and an inverter of GridLAB-D needs a voltage; "
+                    f"leave a GFM connected to it, {_OTHERWISE}",
+                )
+            if again := sorted({bus for bus, _ in dead_before - state.dead}):
+                some = ", ".join(again[:_SHOWN]) + (", ..." if len(again) > _SHOWN else "")
+                problems.add(
+                    path,
+                    f"{event} energises {len(again)} de-energised buses again ({some}), for which GridLAB-D finds no "
+                    f"solution; leave their switch open, {_OTHERWISE}",
+                )
+        dead_before = state.dead
 
 
 GLM_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
@@ -176,7 +161,7 @@ def unrepresentable(feeder: Feeder) -> list[str]:
                 f'bus "{bus}" has {", ".join(there)}; GridLAB-D takes one inverter a bus: give each a bus behind a line'
             )
             problems.append(text)
-    names = list(_names(feeder))
+    names = [(kind, name, in_model.replace("{}", name)) for kind, name, forms in _names(feeder) for in_model in forms]
     taken = Counter(in_model for _, _, in_model in names)
     for kind, name, in_model in names:
         if not GLM_NAME.fullmatch(in_model):
@@ -208,17 +193,18 @@ def beyond_gridlabd(own: InverterParameters) -> dict[str, str]:
     return found
 
 
-def _names(feeder: Feeder) -> Iterator[tuple[str, str, str]]:
-    """Yield what each object is, its name, and its name in the model (`glm_network`, `glm_inverters`)."""
-    yield from (("bus", bus.name, f"n{bus.name}") for bus in feeder.buses)
-    yield from (("line", line.name, f"l{line.name}") for line in feeder.lines)
-    yield from (("kind of line", config.name, f"c{config.name}") for config in feeder.line_configs)
-    yield from (("switch", switch.name, f"{initial}{switch.name}") for switch in feeder.switches for initial in "smz")
-    yield from (("transformer", row.name, f"t{row.name}") for row in feeder.transformers)
-    yield from (("transformer", row.name, f"ct{row.name}") for row in feeder.transformers)
-    for name in dict.fromkeys(row.name for row in feeder.regulators):
-        yield from (("regulator", name, in_model) for in_model in (name, f"c{name}", f"m{name}", f"z{name}"))
-    yield from (("inverter", row.name, row.name) for row in feeder.inverters)
+def _names(feeder: Feeder) -> Iterator[tuple[str, str, list[str]]]:
+    """Yield what each object is, its name, and the forms of its names in the model (`glm`, `glm_network`)."""
+    for kind, rows, forms in (
+        ("bus", feeder.buses, ["n{}"]),
+        ("line", feeder.lines, ["l{}"]),
+        ("kind of line", feeder.line_configs, ["c{}"]),
+        ("switch", feeder.switches, ["s{}", "m{}", "z{}"]),
+        ("transformer", feeder.transformers, ["t{}", "ct{}"]),
+        ("regulator", feeder.regulators, ["{}", "c{}", "m{}", "z{}"]),
+        ("inverter", feeder.inverters, ["{}"]),
+    ):
+        yield from ((kind, name, forms) for name in dict.fromkeys(row.name for row in rows))
     single = [row for row in feeder.inverters if len(row.phases) == 1]
-    yield from (("node of inverter", row.name, node_of(row.bus, row.phases)) for row in single)
-    yield from (("object", name, name) for name in ("islands", "ticker", "minus_switch", "minus_regulator"))
+    yield from (("node of inverter", row.name, [node_of(row.bus, row.phases)]) for row in single)
+    yield from (("object", name, ["{}"]) for name in ("islands", "ticker", "minus_switch", "minus_regulator"))
