@@ -14,8 +14,13 @@ REAL_TIME = ("tests/processes/realtime", "tests/schedules")
 IN_PROCESS = ("tests/unit", "tests/golden", "tests/papers", "tests/fuzz")
 """Folders of tests that start hardly a process. They come last on the other workers, as each is short."""
 
-ONE_RUN = ("tests/golden/catalogue", "tests/papers/singhal2022")
-"""Folders whose tests look at the same runs of the catalogue: one worker has them all, and runs each case once."""
+ONE_RUN = (
+    "tests/golden/catalogue",
+    "tests/papers/singhal2022",
+    "tests/conformance/test_blackout.py",
+    "tests/conformance/test_three_islands.py",
+)
+"""Tests that look at the same runs of the catalogue: one worker has them all, and runs each case once."""
 
 
 class RealTimeApart(LoadFileScheduling):

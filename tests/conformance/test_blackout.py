@@ -2,30 +2,20 @@
 
 import numpy as np
 import pytest
-from msgspec.structs import replace
 
-from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.results.event_windows import as_they_came, windows
-from gridpeers.scenarios.results.history import History, Nameplates
+from gridpeers.scenarios.results.history import History, Nameplates, history_of
 from gridpeers.scenarios.results.metrics import measure
 from gridpeers.scenarios.run_request import Outcome
 from gridpeers.scenarios.schema import load_scenario
-from gridpeers.scenarios.schema.configs import configs
-from gridpeers.scenarios.schema.scenario_writing import to_toml
-from gridpeers.wire.messages import Telemetry
+from tests.golden.catalogue.pins import ran
 
 
 @pytest.fixture(scope="module")
 def blackout() -> tuple[History, Outcome]:
-    """Run the catalogue's scenario once."""
-    scenario, feeder = load_scenario("blackout")
-    rows: list[tuple[float, ...]] = []
-
-    def take(telemetry: Telemetry) -> None:
-        rows.extend(telemetry.rows)
-
-    outcome = run_inprocess(*configs(scenario, feeder, "IV"), take)
-    return History.of(Nameplates.of(feeder.inverters).names, rows), outcome
+    """Case IV of the catalogue's scenario."""
+    recorded, outcome = ran("blackout", "IV")
+    return history_of(recorded), outcome
 
 
 def test_a_blackout_does_not_end_the_run(blackout: tuple[History, Outcome]) -> None:
@@ -74,13 +64,3 @@ def test_metrics_are_finite_where_there_is_power_and_absent_where_there_is_none(
         assert found[label].t_restore_s is None
         assert found[label].t_load_s is None
         assert set(found[label].p.values()) == {0.0}
-
-
-def test_the_copy_of_a_scenario_keeps_its_protection(tmp_path_factory: pytest.TempPathFactory) -> None:
-    """The scenario in a run's folder can be run again: settings are written as they are read."""
-    scenario, _ = load_scenario("blackout")
-    own = replace(scenario, protection=replace(scenario.protection, trips={"UV2": (0.4, 0.2), "OF1": (61.0, 100.0)}))
-    path = tmp_path_factory.mktemp("copy") / "again.toml"
-    path.write_text(to_toml(own, {}), encoding="utf-8")
-
-    assert load_scenario(path)[0].protection == own.protection

@@ -8,12 +8,8 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
-from gridpeers.lab.communication.record_content import read_content
 from gridpeers.lab.replay.replay import replay
-from gridpeers.scenarios.record.decision_entries import inside
 from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
-from gridpeers.viewer.record_view import RecordView
-from tests.record.fake_clock import fake_clock_record
 from tests.record.recorded_runs import recorded_in_chunks
 
 FAULTS = """
@@ -90,56 +86,3 @@ def test_a_replay_ends_at_the_hole_and_says_so(damaged: tuple[RunRecord, RunReco
     counts = {part.name: part.count for part in found.parts}
     all_ = {part.name: part.count for part in replay(whole).parts}
     assert 0 < counts["inv4"] < all_["inv4"]
-
-
-def test_the_page_draws_no_link_of_a_decision_that_is_lost(damaged: tuple[RunRecord, RunRecord]) -> None:
-    """Page, `why` and checks know the same decisions: where one of them says that the record lacks it, all do."""
-    whole, flipped = (RunRecord.open(each.path) for each in damaged)
-    shown, known = RecordView(flipped), RecordView(whole)
-    content = read_content(flipped.path)
-    checked = {state.number for state in content.of_agent("inv4") if not inside(content.holes["inv4"], state.t)}
-    told = {decision.tick: decision for decision in flipped.decisions("inv4")}
-    drawn = []
-    edges = [round(t / 0.02) for hole in flipped.holes("inv4") for t in hole if t < 4.0]
-    ticks = sorted({*range(1, 200, 11), *(edge + k for edge in edges for k in (-1, 0, 1, 2))})
-    for tick in ticks:
-        t = tick * 0.02
-        frame = shown.frame(t)
-        (row,) = (one for one in frame.inverters if one.name == "inv4")
-        if tick in told:
-            links = [(link.src, link.state, link.age) for link in frame.links["inv4"]]
-            assert links == [(link.src, link.state, link.age) for link in known.frame(t).links["inv4"]]
-            assert all(link.rate > 20.0 for link in frame.links["inv4"] if tick > 60)
-            assert row.hears is not None
-            drawn.append(tick)
-        else:
-            assert frame.links["inv4"] == ()
-            assert (row.hears, row.ages) == (None, {})
-            assert row.note == "how it decided is not known: the record is damaged there"
-            with pytest.raises(RecordFileError, match="lacks how inv4 decided"):
-                shown.decision("inv4", t)
-
-    checked &= set(ticks)
-    assert checked >= set(drawn)
-    assert len(checked - set(drawn)) <= 1, "which has no set-points before it; no check needs them"
-    assert 8 < len(drawn) < len(ticks)
-
-
-def test_in_real_time_each_decision_tells_all_and_the_lost_ones_are_missed(tmp_path: Path) -> None:
-    """Page and `why` agree at each period; a decision is in force for one, and not until the next that is there."""
-    whole = fake_clock_record(tmp_path / "case", end=3.0)
-    flipped = with_damage(whole, tmp_path)
-    shown, lacking = RecordView(flipped), 0
-    for k in range(5, 150, 3):
-        t = 0.02 * k
-        frame, decision = shown.frame(t), whole.decision("inv2", t)
-        (row,) = (one for one in frame.inverters if one.name == "inv2")
-        try:
-            assert flipped.decision("inv2", t).tick == decision.tick
-            assert (row.hears, row.note, len(frame.links["inv2"])) == (2, "", 2)
-        except RecordFileError:
-            lacking += 1
-            assert (row.hears, frame.links["inv2"]) == (None, ())
-            assert row.note == "how it decided is not known: the record is damaged there"
-
-    assert 3 < lacking < 40

@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gridpeers.agents.agent_config import Control
 from gridpeers.scenarios.catalogue_files import CATALOGUE
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.results.event_windows import CaseRecord
@@ -15,10 +14,7 @@ from gridpeers.scenarios.results.metrics_file import RunMetrics, metrics_json
 from gridpeers.scenarios.results.record import Recorded, Recorder
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.schema.configs import configs
-from tests.conformance.test_drivers import in_one_process
 from tests.scenario_files import written
-from tests.toy.toy_configs import toy_configs
-from tests.toy.toy_runs import ProcessRun, first_difference
 
 ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8").replace('paper = "islanding"', "")
 
@@ -80,16 +76,3 @@ def test_an_inverter_without_agent_keeps_its_set_points_and_is_left_out_of_the_s
     assert min(p for name, p in steady.p.items() if name != "inv2") > 0.85
     assert steady.MPSI < 0.005
     assert '"without_agent": [\n        "inv2"\n      ]' in metrics_json(ran, found, {"IV": {}})
-
-
-def test_both_drivers_leave_out_who_has_no_agent(tmp_path: Path) -> None:
-    """No process is started for it, nobody waits for it, and its inverter stands in every row."""
-    plant, agents = toy_configs(4, Control(secondary=("inv1", "inv3"), graph="full"))
-    from msgspec.structs import replace
-
-    plant, agents = replace(plant, agents=("inv1", "inv3", "inv4")), tuple(a for a in agents if a.name != "inv2")
-    run = ProcessRun(plant, agents, tmp_path)
-    outcome = run()
-
-    assert not outcome.broke
-    assert first_difference(in_one_process(plant, agents).rows, run.rows) == ""

@@ -13,7 +13,6 @@ from gridpeers.scenarios.drivers.inprocess import InprocessBus, messages_decide,
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.schema.configs import configs
 from gridpeers.wire.messages import PlantEvent, Telemetry
-from gridpeers.wire.plugins.plugin import Plugin
 from tests.toy.toy_configs import toy_configs
 from tests.toy.toy_plant import ToyPlant
 
@@ -79,43 +78,6 @@ def test_a_law_that_fails_makes_its_agent_idle(how: str) -> None:
 
     assert [event.subject for event in events if event.kind == "law"] == ["inv2"]
     assert ticks == 30
-
-
-def test_a_graph_that_fails_leaves_all_agents_idle() -> None:
-    """Each tells the same error as with messages."""
-    rule = Plugin(use=f"{__name__}:no_graph")
-    *_, events, _, _ = both(Control(secondary="all", graph=rule.use, own_graph=rule))
-
-    assert {event.subject for event in events if event.kind == "law"} == {f"inv{i}" for i in range(1, 8)}
-
-
-def no_graph(members: object) -> dict[str, list[str]]:
-    """Fail."""
-    raise RuntimeError("no graph today")
-
-
-def test_a_plant_without_solution_breaks_the_run() -> None:
-    """The last rows and the reason are told all the same."""
-    telemetry, broke, *_ = both(Control(secondary="none", graph="none"), P_set0=1.1)
-
-    assert broke.startswith("no solution")
-    assert telemetry[-1].final
-
-
-def test_a_clock_that_is_off_makes_periods_longer() -> None:
-    """The agent's period is by its own clock, the run's is not."""
-    plant, agents = toy_configs(3, end=0.4)
-    slow = (replace(agents[0], clock_rate=1.5), *agents[1:])
-
-    assert told(plant, slow, messages=False) == told(plant, slow, messages=True) != told(plant, agents, messages=False)
-
-
-def test_a_run_without_agents_has_the_same_rows() -> None:
-    """The plant alone goes to the end."""
-    plant, _ = toy_configs(3)
-    alone = replace(plant, agents=())
-
-    assert told(alone, (), messages=False) == told(alone, (), messages=True)
 
 
 def test_the_feeder_gives_the_same_telemetry() -> None:

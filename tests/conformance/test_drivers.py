@@ -62,16 +62,14 @@ def test_a_run_ends_well(driver: Driver) -> None:
     assert [row[0] for row in ran.rows] == [round(0.02 * k, 9) for k in range(21)]
 
 
-@pytest.mark.parametrize("graph", ["clustered", "ring"])
-def test_every_graph_gives_the_same_rows(driver: Driver, graph: GraphRule) -> None:
+def test_a_graph_gives_the_same_rows(driver: Driver) -> None:
     """Discovery finds the same neighbours as a bus that knows everybody."""
-    plant, agents = toy_configs(6, Control(secondary="all", graph=graph))
+    plant, agents = toy_configs(6, Control(secondary="all", graph="clustered"))
 
     assert first_difference(in_one_process(plant, agents).rows, driver(plant, agents).rows) == ""
 
 
-@pytest.mark.parametrize("graph", ["full", "ring"])
-@pytest.mark.parametrize("processes", [1, 2, 4])
+@pytest.mark.parametrize(("processes", "graph"), [(1, "ring"), (4, "full")])
 def test_agents_that_share_processes_give_the_same_rows(processes: int, graph: GraphRule, tmp_path: Path) -> None:
     """How agents are spread over processes decides nothing."""
     plant, agents = toy_configs(6, Control(secondary="all", graph=graph))
@@ -82,14 +80,6 @@ def test_agents_that_share_processes_give_the_same_rows(processes: int, graph: G
     assert (outcome.broke, outcome.notes) == ("", ())
     assert len(run.pids) == 1 + processes
     assert first_difference(in_one_process(plant, agents).rows, run.rows) == ""
-
-
-def test_listed_links_give_the_same_rows(driver: Driver) -> None:
-    """An agent without any link takes part all the same."""
-    control = Control(secondary="all", graph="links", links=(("inv1", "inv2"), ("inv2", "inv3")))
-    plant, agents = toy_configs(4, control)
-
-    assert first_difference(in_one_process(plant, agents).rows, driver(plant, agents).rows) == ""
 
 
 def test_a_plant_without_solution_breaks_the_run(driver: Driver) -> None:
@@ -144,15 +134,3 @@ def test_plug_n_play_gives_the_same_history_with_processes(tmp_path: Path) -> No
     assert outcome.reproducible
     assert first_difference(expected.rows, run.rows) == ""
     assert outcome.events == expected.outcome.events
-
-
-def test_a_difference_is_shown_where_it_begins() -> None:
-    """The first row, its time, and each column that differs."""
-    a = [(0.0, 60.0, 1.0, 2.0, 3.0, 4.0, 5.0), (0.1, 60.0, 1.0, 2.0, 3.0, 4.0, 5.0)]
-    b = [a[0], (0.1, 59.0, 1.0, 2.0, 3.0, 4.0, 6.0)]
-
-    assert first_difference(a, b) == (
-        "first difference at t = 0.1 s: inv1 f (Hz): 60.0 != 59.0, inv1 V_set (V): 5.0 != 6.0"
-    )
-    assert first_difference(a, a[:1]) == "2 rows, but 1"
-    assert first_difference(a, a) == ""

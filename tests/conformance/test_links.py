@@ -140,13 +140,6 @@ def _clear(counts: dict[tuple[str, str], LinkCounts]) -> int:
     return sum(pair not in counts for pair in pairs)
 
 
-def test_links_without_faults_change_nothing(folder: Path) -> None:
-    """A link that is emulated but does nothing leaves the history as it is without any."""
-    (folder / "idle.toml").write_text(CALM + '[[link]]\non = "* <-> *"\nloss = 0.0\n')
-
-    assert run(folder / "idle.toml", processes=False).rows == run(folder / "calm.toml", processes=False).rows
-
-
 def test_a_cut_elsewhere_changes_no_other_links_fate(folder: Path, storm: Ran) -> None:
     """Each link looks its numbers up by itself: the verdicts of all links but the cut one stay, message by message."""
     (folder / "more.toml").write_text(STORM + '[[link]]\non = "inv1 -> inv4"\nfrom_s = 0.2\nto_s = 0.4\ncut = true\n')

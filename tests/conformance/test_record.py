@@ -62,13 +62,12 @@ def test_emulated_links_and_nodes(tmp_path: Path) -> None:
     [
         ("partition", "halves-expire"),
         ("unheard-switches", "frequency"),
-        ("wind-up", "conditional"),
         ("reduced-communication", "reduced"),
         ("plug-n-play", "IV"),
     ],
 )
 def test_agents_with_a_memory(scenario: str, case: str, tmp_path: Path) -> None:
-    """Ages, islands by frequency, saturation, quiet laws, and an agent that leaves and joins again."""
+    """Ages, islands by frequency, quiet laws, and an agent that leaves and joins again."""
     assert_decisions_are_recorded(recorded_run(scenario, case, tmp_path / case), "inv1", "inv2", "inv5")
 
 

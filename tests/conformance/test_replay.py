@@ -14,11 +14,6 @@ from msgspec.structs import replace
 
 import gridpeers as gp
 from gridpeers.lab.replay.recorded_process import ReplayError
-from gridpeers.lab.replay.replay import replay
-from gridpeers.plant.feeder import Plant
-from gridpeers.plant.network import Network
-from gridpeers.plant.plant_config import PlantConfig
-from gridpeers.plant.tables import read_feeder
 from gridpeers.runs.result import Result
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.results.record import QUANTITIES
@@ -64,29 +59,6 @@ def test_a_replay_gives_the_run(run: Result) -> None:
     assert [part.name for part in done.parts] == ["plant", *(f"inv{k}" for k in range(1, 10))]
     assert done.parts[0].count == len(run.history)
     assert {part.count for part in done.parts[1:]} == {50}
-
-
-def test_messages_without_loss_and_without_a_link(run: Result) -> None:
-    """Nothing is lost by chance; a cut link lets nothing pass from its time on, and all before is as it was."""
-    done = gp.counterfactual(run, without_loss=True, without="inv4 <-> inv7", since=0.5)
-
-    assert done.difference is None
-    assert done.compared == (run.record.t <= 0.5).sum()
-    links = done.would_be.links
-    late = links[links["t"] >= 0.5]
-    cut = late[late["fate"] == "cut"]
-    assert set(zip(cut["src"], cut["dst"], strict=True)) == {("inv4", "inv7"), ("inv7", "inv4")}
-    assert not late["fate"].eq("loss").any()
-    assert links[links["t"] < 0.5]["fate"].eq("loss").sum() == run.links[run.links["t"] < 0.5]["fate"].eq("loss").sum()
-    assert done.would_be.sha256 != run.sha256
-
-
-def test_other_gains_from_the_start(run: Result) -> None:
-    """What would have been under other gains is the run of the scenario with these gains."""
-    done = gp.counterfactual(run, replace={"gains.k_p": 0.002})
-
-    other = gp.load(run.folder.parent / "short.toml").replace({"gains.k_p": 0.002}).run("IV")
-    assert done.would_be.sha256 == other.sha256
 
 
 def test_a_law_that_fails_in_what_would_have_been_fails_it(run: Result, elsewhere: Path) -> None:
@@ -160,18 +132,6 @@ def test_a_change_that_cannot_be_made_is_told(words: tuple[str, ...], told: str,
     assert not list(elsewhere.glob("runs/*/*/metrics.json"))
 
 
-def test_what_is_no_record_is_told(tmp_path: Path) -> None:
-    """A folder without one, another file, and one of which only the beginning is there."""
-    (tmp_path / "empty").mkdir()
-    other = tmp_path / "other.mcap"
-    other.write_bytes(b"none of ours" * 20)
-    for path, told in ((tmp_path / "empty", "there is no run.mcap"), (other, "other.mcap")):
-        code, text = invoke("replay", str(path))
-        assert code == 2
-        assert told in text
-        assert len(text.splitlines()) == 1
-
-
 @pytest.mark.parametrize("level", ["decisions", "physics"])
 def test_a_record_without_arrivals_is_told(level: RecordLevel, tmp_path: Path) -> None:
     """Only what was given to the cores can be given to them again."""
@@ -182,32 +142,6 @@ def test_a_record_without_arrivals_is_told(level: RecordLevel, tmp_path: Path) -
         gp.replay(record)
     with pytest.raises(ReplayError, match="cannot be replayed"):
         gp.counterfactual(record)
-
-
-def test_a_record_that_is_cut_off_is_replayed_up_to_there(run: Result, tmp_path: Path) -> None:
-    """Half of the file has half of the run, and that is the same; the rest is not computed."""
-    whole = (run.folder / "IV" / "run.mcap").read_bytes()
-    (tmp_path / "run.mcap").write_bytes(whole[: len(whole) * 2 // 3])
-    record = RunRecord.open(tmp_path)
-    periods: list[int] = []
-
-    class Counted(Plant):
-        def advance(self) -> None:
-            periods.append(len(periods))
-            super().advance()
-
-    def start(config: PlantConfig) -> Counted:
-        feeder = read_feeder(config.settings.feeder, config.settings.load_set)
-        return Counted(Network(feeder), config.settings, config.T_c, config.record_step)
-
-    done = replay(record, start)
-
-    assert done.difference is None
-    assert 5 < done.parts[0].count < len(run.history)
-    assert len(periods) <= record.t_end / record.info.plant.T_c + 1
-    code, text = invoke("replay", str(tmp_path))
-    assert code == 0, text
-    assert "cut off" in text
 
 
 def test_a_difference_is_named(run: Result, tmp_path: Path) -> None:
@@ -249,29 +183,6 @@ def with_more_power(messages: list[Telemetry], t: float) -> Iterator[Telemetry]:
             (*row[:at], row[at] + 1.0, *row[at + 1 :]) if abs(row[0] - t) < 1e-9 else row for row in message.rows
         )
         yield replace(message, rows=rows)
-
-
-def test_a_change_without_effect_is_told(run: Result, elsewhere: Path) -> None:
-    """A table of zeros has a note below it."""
-    code, text = invoke("replay", str(run.folder), "--set", "link[0].loss=0.2", "--out", "would")
-
-    assert code == 0, text
-    assert "NOTE  the change made no difference: every row up to 1.00 s is as recorded\n" in text
-
-
-def test_a_change_with_an_effect_has_no_such_note(run: Result) -> None:
-    """Rows that differ are difference enough."""
-    assert gp.counterfactual(run, replace={"gains.k_p": 0.002}).notes == ()
-
-
-def test_what_is_missing_in_the_table_is_explained(run: Result) -> None:
-    """A "-" has a line below the table, and a table without one has not."""
-    done = gp.counterfactual(run, replace={"gains.k_p": 0.002})
-
-    assert done.table.isna().any(axis=None)
-    assert str(done).splitlines()[-1].startswith("-: no number")
-    done.table.fillna(0.0, inplace=True)
-    assert "-: no number" not in str(done)
 
 
 def test_the_file_of_what_would_have_been_gives_it_again(run: Result, tmp_path: Path) -> None:

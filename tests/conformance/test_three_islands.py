@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from collections.abc import Sequence
 
 import pytest
 
 from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.schema.configs import configs
+from tests.golden.catalogue.pins import ran
 
 EVENT, END = 4.0, 9.0
 """When the microgrid falls into three islands, and when it is looked at (s)."""
@@ -19,14 +19,9 @@ ISLANDS = slice(0, 3), slice(3, 6), slice(6, 9)
 Row = tuple[float, ...]
 
 
-@lru_cache
-def rows(case: str) -> tuple[Row, ...]:
-    """Records until 9 s of a case of unheard-switches."""
-    scenario, feeder = load_scenario("unheard-switches")
-    found: list[Row] = []
-    outcome = run_inprocess(*configs(scenario, feeder, case), lambda telemetry: found.extend(telemetry.rows))
-    assert outcome.broke == ""
-    return tuple(found)
+def rows(case: str) -> Sequence[Row]:
+    """Records of a case of unheard-switches."""
+    return ran("unheard-switches", case)[0].rows
 
 
 def row_at(case: str, t: float) -> Row:

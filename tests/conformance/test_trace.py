@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 from collections import Counter
 from pathlib import Path
 
@@ -166,14 +165,3 @@ def test_bad_input(arguments: tuple[str, ...], complaint: str, calm: RunRecord) 
     assert code == 2
     assert complaint in printed
     assert printed.count("\n") == 1
-
-
-def test_without_the_package(calm: RunRecord, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where perfetto is not installed, it says what to install, and that the diagram does without."""
-    monkeypatch.setitem(sys.modules, "perfetto", None)
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "perfetto" else object())
-
-    code, printed = invoke("trace", str(calm.path))
-
-    assert code == 2
-    assert "pip install 'gridpeers[trace]'; or give --svg FILE" in printed

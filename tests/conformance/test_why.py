@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import itertools
-import re
-import shutil
-import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from gridpeers.lab.explanation.explanation import Explanation, NeighbourAccount, explain, trail
 from gridpeers.lab.explanation.law_step import LawStep
-from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
+from gridpeers.scenarios.record.record_reader import RunRecord
 from tests.command_line import invoke
 from tests.record.recorded_runs import recorded_run
 
@@ -102,21 +98,6 @@ def test_a_link_cut(faulty: RunRecord) -> None:
     assert "10 states since: 10 cut off by a cut link" in str(explanation)
 
 
-def test_an_outage_that_began_before_the_island_formed(faulty: RunRecord) -> None:
-    """The last state that was heard is from the grid-connected time: the cut link is the cause, not another island."""
-    assert account(explain(faulty, "inv4", 0.5), "inv2").why == (
-        "its last state is from before the own island changed from grid to inv1; "
-        "20 states since: 20 cut off by a cut link"
-    )
-
-
-def test_a_rejected_message(faulty: RunRecord) -> None:
-    """States with a flipped bit arrive and are rejected; the last sound one counts."""
-    why = account(explain(faulty, "inv4", 0.7), "inv8").why
-
-    assert why == "10 states since: 10 damaged on the link, and rejected: its CRC-32 differs"
-
-
 def test_an_agent_that_was_not_there(faulty: RunRecord) -> None:
     """A neighbour that has left is not met, and its last event says why; of itself its last decision is shown."""
     other, own = explain(faulty, "inv4", 0.7), explain(faulty, "inv9", 0.7)
@@ -163,19 +144,6 @@ def test_a_limit_hit(tmp_path: Path) -> None:
     assert "at its upper limit" in str(hit[0])
 
 
-def test_a_state_held_after_a_partition(tmp_path: Path) -> None:
-    """An agent of one half holds the last states of the other one, at their ages, and says what cut them off."""
-    record = run(tmp_path, '[[partition]]\nby = "halves"\nfrom_s = 0.4\nto_s = 0.7\n')
-
-    explanation = explain(record, "inv1", 0.66)
-
-    assert_adds_up(explanation)
-    held = [each for each in explanation.neighbours if each.why]
-    assert {each.name for each in held} == {"inv6", "inv7", "inv8", "inv9"}
-    assert {each.why for each in held} == {"13 states since: 13 cut off by a partition"}
-    assert all(each.used and each.input is not None and each.input.age == pytest.approx(0.28) for each in held)
-
-
 def test_an_island_change(tmp_path: Path) -> None:
     """Once microgrid 1 is an island of its own, the others are left out, with both islands by name."""
     record = run(tmp_path, '[[event]]\nlabel = "event2"\nt_s = 0.5\nopen = ["sw1_2"]\n', end=0.7)
@@ -188,17 +156,6 @@ def test_an_island_change(tmp_path: Path) -> None:
     assert {each.name for each in apart.neighbours if not each.used} == {"inv1", "inv2", "inv3"}
     assert account(apart, "inv2").why == "in another island: inv1, not inv4"
     assert any(event.kind == "island" for event in apart.events)
-
-
-def test_an_agent_that_has_left(tmp_path: Path) -> None:
-    """Its last decision is not in force: it says when the agent left, and that its inverter is off the network."""
-    record = run(tmp_path, '[[event]]\nlabel = "leave"\nt_s = 0.5\nleave = ["inv9"]\n')
-
-    explanation = explain(record, "inv9", 0.7)
-
-    assert explanation.t < 0.51
-    assert explanation.aftermath[0].startswith("it is the last decision before 0.7 s: inv9 leaves at t = 0.5 s")
-    assert explanation.aftermath[1:] == ("at 0.7 s its inverter is off the network",)
 
 
 def test_what_was_not_decided_by_a_law(tmp_path: Path) -> None:
@@ -227,37 +184,6 @@ def test_published_laws(law: str, tmp_path: Path) -> None:
         for t in (0.22, 0.4, 0.58):
             assert_adds_up(explain(record, agent, t))
     assert explain(record, "inv1", 0.1).step is None
-
-
-FORGETFUL = """
-import gridpeers as gp
-
-class Counts(gp.Law):
-    calls = 0
-
-    def step(self, own, neighbours, T):
-        self.calls += 1
-        return gp.SetPoints(own.P_set + self.calls * 1e-4, own.V_set - 0.02)
-"""
-
-
-def test_a_law_without_terms(tmp_path: Path) -> None:
-    """Its step is one term beside the limits; a memory that it has without `start` is found all the same."""
-    (tmp_path / "counting.py").write_text(FORGETFUL, encoding="utf-8")
-    record = run(tmp_path, 'law = "counting:Counts"\n', end=0.6)
-
-    step = assert_adds_up(explain(record, "inv1", 0.5), named=False)
-
-    assert [term.name for term in step.P_set.terms] == ["step"]
-    assert step.P_set.step == pytest.approx(16e-4, abs=1.1e-4)
-    assert step.V_set.terms[0].value == pytest.approx(-0.02)
-    assert step.V_set.limits == pytest.approx(0.02)
-    (tmp_path / "counting.py").unlink()
-    sys.modules.pop("counting", None)
-    unknown = explain(record, "inv1", 0.5)
-    assert unknown.step is not None
-    assert "the law cannot be made here" in unknown.step.problem
-    assert "the law cannot be made here" in str(unknown)
 
 
 @pytest.fixture(scope="module")
@@ -308,47 +234,3 @@ def test_bad_input(arguments: tuple[str, ...], complaint: str, islanded: RunReco
     assert code == 2
     assert complaint in printed
     assert printed.count("\n") == 1
-
-
-def test_a_run_with_several_cases_names_them(islanded: RunRecord, tmp_path: Path) -> None:
-    """Without a case, and with one that is not there, one line says which there are, and how one is chosen."""
-    for case in ("I", "IV"):
-        shutil.copytree(islanded.path.parent, tmp_path / case)
-    arguments = str(tmp_path), "inv4", "0.5"
-
-    several, unknown = invoke("why", *arguments), invoke("why", *arguments, "--case", "V")
-
-    assert several[0] == unknown[0] == 2
-    assert "it has a record of each case, I, IV; choose one with --case I" in several[1]
-    assert 'no record of case "V"; ' in unknown[1]
-    assert "I, IV" in unknown[1]
-    assert invoke("why", *arguments, "--case", "IV")[0] == 0
-    assert invoke("view", str(tmp_path), "--case", "V") == unknown
-
-
-def test_wrong_types_are_one_sentence(islanded: RunRecord) -> None:
-    """From Python too, what is no path, name or time is refused with what would be right."""
-    calls: dict[str, Callable[[], object]] = {
-        'needs the path of a record, as "runs/islanding': lambda: RunRecord.open(4),  # type: ignore[arg-type]
-        "t: needs a run time in s, as 4.3, got '0.5'": lambda: islanded.decision("inv4", "0.5"),  # type: ignore[arg-type]
-        "there was no agent 4; agents are inv1-9": lambda: explain(islanded, 4, 0.5),  # type: ignore[arg-type]
-        "since: needs a run time in s, as 4.3, got None": lambda: islanded.decisions("inv4", since=None),  # type: ignore[arg-type]
-        "no message is a 'state'; did you mean \"State\"": lambda: islanded.messages(kind="state"),
-    }
-    for complaint, call in calls.items():
-        with pytest.raises(RecordFileError, match=re.escape(complaint)) as refused:
-            call()
-        assert "\n" not in str(refused.value)
-
-
-def test_a_record_that_is_cut_off(islanded: RunRecord, tmp_path: Path) -> None:
-    """Up to its end it is explained as before, and a note says that it is cut off."""
-    data = islanded.path.read_bytes()
-    cut = tmp_path / "run.mcap"
-    cut.write_bytes(data[: len(data) - 400])
-
-    explanation = explain(RunRecord.open(cut), "inv4", 0.3)
-
-    assert explanation.step == explain(islanded, "inv4", 0.3).step
-    assert any("cut off" in text for text in explanation.damage)
-    assert "cut off" in str(explanation)

@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from threading import Event, Thread
 from time import monotonic
 
 import pytest
@@ -120,27 +119,3 @@ def test_a_replaced_session_leaves_the_links_of_another_one_alone() -> None:
     finally:
         receiver.close()
         sender.close()
-
-
-def test_a_session_that_another_thread_opens_waits_until_left_links_are_ended(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its own links would look the same."""
-    endpoint, opened = free_endpoint(), Event()
-    sessions: list[Session] = []
-
-    def opening() -> None:
-        sessions.append(Session("b", listen=(endpoint,)))
-        opened.set()
-
-    other, in_time = Thread(target=opening), []
-
-    def clearing() -> None:
-        other.start()
-        in_time.append(opened.wait(0.5))
-
-    monkeypatch.setattr("gridpeers.wire.driver.session.end_left_links", clearing)
-    Session("a", listen=(free_endpoint(),)).close(replaced=True)
-    other.join()
-    for session in sessions:
-        session.close()
-
-    assert (in_time, len(sessions)) == ([False], 1)

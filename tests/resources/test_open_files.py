@@ -41,14 +41,6 @@ def test_a_plant_with_too_few_files_for_its_links_ends_the_run_in_one_line(tmp_p
     assert "Traceback" not in outcome.broke
 
 
-def test_a_plant_needs_a_link_for_each_process_not_for_each_agent(tmp_path: Path) -> None:
-    """Agents that share a process, as the advice for too few files says, have one link together."""
-    run = ProcessRun(*toy_configs(3), tmp_path)
-    outcome = run(plant_command=("-c", LIMITED, str(FEW - 1), toy_plant.__file__), shared=1)
-
-    assert f"plant: may have {FEW - 1} files open at once, and needs {2 + BESIDE_LINKS}: 2 links" in outcome.broke
-
-
 def test_a_limit_is_raised_as_far_as_anybody_may(monkeypatch: pytest.MonkeyPatch) -> None:
     """Up to the hard limit, and to what any run needs; never down."""
     for before, after in (((64, 4096), 4096), ((64, 10**9), MOST_FILES), ((64, 64), None), ((10**6, 10**6), None)):
@@ -59,22 +51,6 @@ def test_a_limit_is_raised_as_far_as_anybody_may(monkeypatch: pytest.MonkeyPatch
 
         assert [limits for _, limits in found] == ([] if after is None else [(after, before[1])])
         assert limit() == before[0]
-
-
-@pytest.mark.parametrize("error", [ValueError("not allowed to raise maximum limit"), OSError(errno.EINVAL, "x")])
-def test_a_system_that_allows_less_than_it_says_keeps_its_limit(
-    monkeypatch: pytest.MonkeyPatch, error: Exception
-) -> None:
-    """No process ends because its limit cannot be raised; whether it suffices is checked where links are needed."""
-
-    def refuse(kind: int, limits: tuple[int, int]) -> None:
-        raise error
-
-    monkeypatch.setattr(resource, "getrlimit", lambda kind: (64, 4096))
-    monkeypatch.setattr(resource, "setrlimit", refuse)
-    raise_limit()
-
-    assert limit() == 64
 
 
 def test_what_to_do_about_open_files_is_said_of_that_error_alone(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import signal
 from itertools import islice
-from pathlib import Path
 from typing import Literal
 
 import pytest
-from typer.testing import CliRunner
 
-from bench.soak import __main__ as command
-from bench.soak.__main__ import StopRequest
 from bench.soak.judging import ProcessSize, growths, judge_checks, judge_growth, judge_late, judge_times
 from bench.soak.soak_actions import DECK, SoakAction, soak_actions
 from bench.soak.soak_monitor import SoakMonitor
 from gridpeers.agents.agent_config import AgentConfig, Control
-from gridpeers.scenarios.checks.check_verdict import SHOWN_VIOLATIONS, CheckVerdict, Violation
+from gridpeers.scenarios.checks.check_verdict import CheckVerdict, Violation
 from gridpeers.wire.messages import AgentStatus, Telemetry
 
 AGENTS = tuple(f"inv{i}" for i in range(1, 10))
@@ -78,18 +73,6 @@ def test_memory_that_grows_by_more_than_a_twentieth_fails(growth: float, verdict
     assert judge_growth("memory", found, 60.0).verdict == "-"
     assert {one.name for one in found} == {"plant", "agents of the same age", "all together"}
     assert judge_growth("files", growths(looks(growth), "files", ["plant"]), HOUR).verdict == "PASS"
-
-
-def test_restarted_agents_are_compared_at_one_age() -> None:
-    """Agents that grow by themselves are as flat as their youngest; those that start larger and larger are not."""
-    grows = [one._replace(memory=40.0 + one.age) for one in looks(0.0)]
-    larger = [one._replace(memory=40.0 + 0.1 * one.pid) for one in looks(0.0)]
-
-    def young(sizes: list[ProcessSize]) -> float:
-        return next(one.part for one in growths(sizes, "memory", []) if one.name == "agents of the same age")
-
-    assert young(grows) == 0.0
-    assert young(larger) > 0.03
 
 
 @pytest.mark.parametrize(("late", "others", "verdict"), [(1, 0.0, "PASS"), (2, 0.0, "FAIL"), (2, 0.3, "-")])
@@ -156,18 +139,6 @@ def test_a_frequency_that_moves_as_agents_find_each_other_again_is_told_and_no_f
     assert judge_checks((verdict(863.59),), (), ()).verdict == "FAIL"
 
 
-def test_every_kill_of_an_hour_counts_not_only_those_that_a_verdict_shows() -> None:
-    """A hundred kills, of which a verdict keeps twenty: one silence of another agent beyond these fails."""
-    kills = [(f"inv{3 + i % 7}", 30.0 * i) for i in range(100)]
-    silences = [Violation(text="sends nothing more", agent=name, t=t + 0.4) for name, t in kills]
-    words = CheckVerdict(check="last_words", status="failed", violations=tuple(silences[:SHOWN_VIOLATIONS]), count=100)
-
-    assert judge_checks((words,), silences, kills).verdict == "PASS"
-    assert judge_checks((words,), silences[:SHOWN_VIOLATIONS], kills).verdict == "FAIL"
-    silences[-1] = Violation(text="sends nothing more", agent="inv1", t=kills[-1][1])
-    assert judge_checks((words,), silences, kills).verdict == "FAIL"
-
-
 def test_a_frequency_is_restored_once_it_holds() -> None:
     """Out of its band at 1 s, in at 2 s for 0.2 s, and for good at 3 s: restored after 2 s; others do not count."""
     monitor = SoakMonitor()
@@ -191,27 +162,3 @@ def test_a_frequency_is_restored_once_it_holds() -> None:
     assert monitor.restorations == pytest.approx([2.0])
     assert monitor.seconds_in_band == pytest.approx(0.5)
     assert monitor.wall_time(4.0) == pytest.approx(9.5)
-
-
-def test_an_impossible_length_or_a_folder_that_exists_is_refused_before_anything_starts(tmp_path: Path) -> None:
-    """One line each, with exit code 2."""
-    for words, told in (
-        (["--hours", "0"], "Invalid value for '--hours'"),
-        (["--keep", str(tmp_path)], "name a folder that does not exist yet"),
-    ):
-        done = CliRunner().invoke(command.app, words, terminal_width=200)
-        assert done.exit_code == 2
-        assert told in " ".join(done.stderr.split())
-
-
-def test_the_first_signal_ends_a_soak_well_and_a_second_one_at_once() -> None:
-    """Before the run is disturbed there is nothing to judge."""
-    before, request = StopRequest(), StopRequest()
-    with pytest.raises(KeyboardInterrupt):
-        before(signal.SIGTERM, None)
-    request.disturbing = True
-    request(signal.SIGTERM, None)
-
-    assert (before.exit_code, request.exit_code) == (143, 143)
-    with pytest.raises(KeyboardInterrupt):
-        request(signal.SIGINT, None)

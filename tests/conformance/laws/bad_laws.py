@@ -31,19 +31,12 @@ class Failing(gp.Law):
                 return None
             case "leaves":
                 sys.exit(3)
-            case "hangs":
-                while True:
-                    pass
             case "hangs in spite of all":
                 while True:
                     with contextlib.suppress(Exception):
                         while True:
                             pass
         raise AssertionError(self.how)
-
-
-class NoStep(gp.Law):
-    """Has no step."""
 
 
 class WrongStep(gp.Law):
@@ -98,9 +91,3 @@ class NamedAsAKey(Held):
     """Has a parameter that no scenario can give."""
 
     folder: str = ""
-
-
-class NamedAsAMethod(Held):
-    """Has a parameter where a method should be."""
-
-    start: float = 0.0  # type: ignore[assignment]

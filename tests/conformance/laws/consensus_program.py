@@ -11,10 +11,7 @@ from gridpeers.agents.laws.law import Neighbour, Own
 
 FAILURES = {
     "rubbish": "hello",
-    "partial": '{"P_set": 0.5}',
-    "nan": '{"P_set": NaN, "V_set": 1.0}',
     "error": '{"error": "no idea"}',
-    "twice": '{"P_set": 0.5, "V_set": 1.0}\n{"P_set": 0.6, "V_set": 1.0}',
 }
 """What is answered instead of a decision."""
 

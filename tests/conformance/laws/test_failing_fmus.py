@@ -9,7 +9,6 @@ import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
-import msgspec
 import pytest
 
 from gridpeers.agents.agent_config import LawChoice
@@ -59,25 +58,6 @@ def test_an_fmu_that_fails_in_a_step_is_told(how: float, said: str, folder: Path
     """It hangs, gives nan, fails, or takes its process with it."""
     with pytest.raises(LawError, match=said):
         steps(folder / NAME, how, time_limit=1.0 if how == 1 else 10.0)
-
-
-AGENT = """
-import os, signal
-from gridpeers.agents.carriers.fmu import FmuLaw
-from gridpeers.agents.agent_config import LawChoice
-from gridpeers.agents.laws.law import Own
-law = FmuLaw(LawChoice(fmu={name!r}, folder={folder!r}, parameters={{"how": 1}}))
-law.start(Own(*{own!r}))
-os.write(law._group.program.stdin.fileno(), {step!r})
-os.kill(os.getpid(), signal.SIGKILL)
-"""
-STEP = {"type": "step", "own": OWN._asdict(), "neighbours": [], "T": 0.02}
-
-
-def test_an_fmu_that_hangs_does_not_outlive_an_agent_that_is_killed(folder: Path, unpacked: Path) -> None:
-    """Its process holds the pipe until it ends, and what was unpacked is removed before."""
-    script = AGENT.format(name=NAME, folder=str(folder), own=tuple(OWN), step=msgspec.json.encode(STEP) + b"\n")
-    subprocess.run([sys.executable, "-c", script], stderr=subprocess.PIPE, timeout=30.0)
 
 
 def test_what_an_fmu_prints_is_no_answer(folder: Path, unpacked: Path) -> None:

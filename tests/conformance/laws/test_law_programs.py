@@ -13,7 +13,7 @@ import pytest
 
 from gridpeers.agents.laws.consensus import Consensus
 from gridpeers.agents.laws.law import Neighbour, Own
-from tests.conformance.laws.law_runs import Driver, islanding, written
+from tests.conformance.laws.law_runs import islanding, written
 from tests.conformance.laws.test_carriers import PATIENT
 
 ROOT = Path(__file__).parents[3]
@@ -56,11 +56,10 @@ def test_the_program_in_python_gives_the_history_of_the_class() -> None:
     assert written({"command": list(PYTHON), "k_p": 0.0007, **PATIENT}).sha256 == islanding(short=True).sha256
 
 
-@pytest.mark.parametrize("driver", ["inprocess", "processes"])
-def test_the_program_in_c_gives_the_history_of_the_class(in_c: tuple[str, ...], driver: Driver) -> None:
-    """To the byte, in one process and in ten."""
+def test_the_program_in_c_gives_the_history_of_the_class(in_c: tuple[str, ...]) -> None:
+    """To the byte, in ten processes."""
     law = {"command": list(in_c), "k_p": 0.0007, **PATIENT}
-    assert written(law, driver=driver).sha256 == islanding(short=True).sha256
+    assert written(law, driver="processes").sha256 == islanding(short=True).sha256
 
 
 def test_the_lines_on_the_page_are_what_is_said(command: tuple[str, ...]) -> None:

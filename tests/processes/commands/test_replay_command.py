@@ -51,7 +51,6 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize(
     ("number", "words", "left"),
     [
-        (signal.SIGTERM, ("--without", "inv4 <-> inv7", "--out", "would"), "what came until then is in would/"),
         (signal.SIGINT, ("--without", "inv4 <-> inv7", "--out", "would"), "what came until then is in would/"),
         (signal.SIGTERM, (), "nothing was written"),
     ],

@@ -12,7 +12,7 @@ import pytest
 from gridpeers.lab.explanation.explanation import explain
 from gridpeers.scenarios.record.record_reader import RunRecord
 from tests.command_line import invoke
-from tests.processes.terminals import Desk, Terminal
+from tests.processes.terminals import Desk
 from tests.record.recorded_runs import recorded_run
 
 if TYPE_CHECKING:
@@ -53,6 +53,17 @@ def desk(tmp_path: Path) -> Iterator[Desk]:
         yield terminals
 
 
+@pytest.fixture(scope="module")
+def records(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder with a run of two cases."""
+    folder = tmp_path_factory.mktemp("records")
+    second = '[case.two]\nsecondary = "all"\ngraph = "full"\n'
+    (folder / "it.toml").write_text(ISLANDED.format(end=1.0) + second, encoding="utf-8")
+    for case in ("one", "two"):
+        recorded_run(folder / "it.toml", case, folder / "run" / case)
+    return folder
+
+
 def page_of(browser: Browser, url: str) -> Page:
     """The page, with a record on it."""
     page = browser.new_page(viewport={"width": 1500, "height": 1200})
@@ -73,17 +84,16 @@ def power(page: Page) -> str:
     return page.locator("tbody tr").first.locator("td").nth(3).inner_text()
 
 
-def test_a_record_is_seen_at_any_time(desk: Desk, browser: Browser, tmp_path: Path) -> None:
+def test_a_record_is_seen_at_any_time(desk: Desk, browser: Browser, records: Path) -> None:
     """Slider, keys and events choose the time; values, links, switches and a decision are those of the record then."""
-    (tmp_path / "it.toml").write_text(ISLANDED.format(end=1.0), encoding="utf-8")
-    record = recorded_run(tmp_path / "it.toml", "one", tmp_path / "run" / "one")
+    record = RunRecord.open(records / "run" / "one")
     history = record.physics()
 
     def expected(t: float) -> str:
         return f"{history.P[[k for k, at in enumerate(history.t) if at <= t + 1e-9][-1], 0] / 1e3:.1f}"
 
-    view = desk.open_bare("view", "run", "--port", "0")
-    url = view.expect(r"record run: open (http://\S+) in a browser; Ctrl-C ends the page")[1]
+    view = desk.open_bare("view", str(records / "run"), "--case", "one", "--port", "0")
+    url = view.expect(r"record \S*run: open (http://\S+) in a browser; Ctrl-C ends the page")[1]
     page = page_of(browser, url)
     errors: list[Any] = []
     page.on("pageerror", lambda error: errors.append(error))
@@ -120,7 +130,7 @@ def test_a_record_is_seen_at_any_time(desk: Desk, browser: Browser, tmp_path: Pa
     page.get_by_label("Show how inv2 decided").click()
     page.locator("#decision-text", has_text="inv2 at t = 0.98 s").wait_for()
     assert page.locator("#decision-text").inner_text().strip() == str(explain(record, "inv2", 1.0)).strip()
-    assert page.locator("#decision-command").inner_text() == "gridpeers why run/one inv2 1"
+    assert page.locator("#decision-command").inner_text() == f"gridpeers why {records}/run/one inv2 1"
     page.keyboard.press("ArrowLeft")
     page.keyboard.press("ArrowLeft")
     page.locator("#decision-text", has_text="inv2 at t = 0.96 s").wait_for()
@@ -137,43 +147,17 @@ def test_a_record_is_seen_at_any_time(desk: Desk, browser: Browser, tmp_path: Pa
     page.wait_for_selector('body[data-live="lost"]')
 
 
-def run_with_page(desk: Desk, browser: Browser, end: float, *words: str) -> tuple[Terminal, Page]:
-    """A run with its page, which is opened at once."""
-    (desk.folder / "it.toml").write_text(ISLANDED.format(end=end), encoding="utf-8")
-    run = desk.open_bare("run", "it.toml", *words, "--view", "--port", "0", "--out", "out")
+def test_a_run_that_has_ended_is_offered_as_a_record(desk: Desk, browser: Browser) -> None:
+    """Its page, opened before its begin, has its slider after its end; Ctrl-C ends the page, and the run ended well."""
+    (desk.folder / "it.toml").write_text(ISLANDED.format(end=2.0), encoding="utf-8")
+    run = desk.open_bare("run", "it.toml", "--clock", "wall", "--view", "--port", "0", "--out", "out")
     url = run.expect(r"open (http://\S+) in a browser; the page follows the run")[1]
     page = browser.new_page(viewport={"width": 1500, "height": 1200})
     page.set_default_timeout(WAIT)
     page.goto(url)
-    return run, page
-
-
-def test_a_run_is_followed(desk: Desk, browser: Browser) -> None:
-    """The page moves on with the run, and stays at a time that was chosen; Ctrl-C ends both."""
-    run, page = run_with_page(desk, browser, 3000.0, "--driver", "inprocess")
-    page.wait_for_selector('body[data-live="recording"]')
-    page.locator("#live", has_text="The run goes on").wait_for()
-    page.wait_for_function("() => gridpeersView.frame?.t > 1.0")
-
-    page.locator("#slider").focus()
-    page.keyboard.press("Home")
-    shows(page, 0.0)
-    end = page.evaluate("() => gridpeersPlayer.end")
-    page.wait_for_function("end => gridpeersPlayer.end > end + 0.5", arg=end)
-    shows(page, 0.0)
-    page.keyboard.press("End")
-    page.wait_for_function("end => gridpeersView.frame.t > end + 0.5", arg=end)
-    run.signal(signal.SIGINT)
-    assert run.end() == 130
-    page.wait_for_selector('body[data-live="lost"]')
-
-
-def test_a_run_that_has_ended_is_offered_as_a_record(desk: Desk, browser: Browser) -> None:
-    """Its page, opened before its begin, has its slider after its end; Ctrl-C ends the page, and the run ended well."""
-    run, page = run_with_page(desk, browser, 1.0, "--clock", "wall")
     run.expect(r"the run has ended; http://\S+ shows its record until Ctrl-C")
     page.wait_for_selector('body[data-live="record"]')
-    shows(page, 1.0)
+    shows(page, 2.0)
     assert page.locator("#run").inner_text() == "islanded, case one"
 
     page.locator("#slider").focus()
@@ -204,14 +188,10 @@ def test_bad_input_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_a_click_leaves_the_keys_with_the_time_and_the_address_keeps_it(
-    desk: Desk, browser: Browser, tmp_path: Path
+    desk: Desk, browser: Browser, records: Path
 ) -> None:
     """One key does one thing; the decision goes with the time and is seen; case and time outlive a reload."""
-    second = '[case.two]\nsecondary = "all"\ngraph = "full"\n'
-    (tmp_path / "it.toml").write_text(ISLANDED.format(end=1.0) + second, encoding="utf-8")
-    for case in ("one", "two"):
-        recorded_run(tmp_path / "it.toml", case, tmp_path / "run" / case)
-    view = desk.open_bare("view", "run", "--port", "0")
+    view = desk.open_bare("view", str(records / "run"), "--port", "0")
     page = page_of(browser, view.expect(r"open (http://\S+) in a browser")[1])
     page.set_viewport_size({"width": 1400, "height": 900})
     shows(page, 1.0)

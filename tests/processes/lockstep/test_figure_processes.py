@@ -42,17 +42,6 @@ def test_they_are_the_figures_of_one_process(tmp_path: Path, monkeypatch: pytest
     assert two == one
 
 
-def test_without_a_server_this_process_draws(tmp_path: Path) -> None:
-    """In real time, where no server takes a core from the run, the figures come all the same."""
-    assert figure_server(start=False) is None
-
-    with drawn_on_all_cores(drawing("IV"), tmp_path / "plots"):
-        pass
-
-    assert (tmp_path / "plots" / "overview.png").is_file()
-    assert figure_server(start=False) is None
-
-
 def test_what_goes_wrong_is_raised_here(tmp_path: Path) -> None:
     """A folder that cannot be written is the error of this process, and no process stays behind."""
     (tmp_path / "plots").write_text("a file")
@@ -64,18 +53,6 @@ def test_what_goes_wrong_is_raised_here(tmp_path: Path) -> None:
         pass
 
     assert children_of(os.getpid()) == before
-
-
-def test_an_error_beside_ends_the_drawing(tmp_path: Path) -> None:
-    """A report that cannot be written is told at once, and no process stays behind."""
-    prepare_figures()
-    before = children_of(os.getpid())
-
-    with pytest.raises(RuntimeError, match="no room"), drawn_on_all_cores(drawing("IV"), tmp_path / "plots"):
-        raise RuntimeError("no room")
-
-    assert children_of(os.getpid()) == before
-    assert not list((tmp_path / "plots").glob(".*"))  # a figure that is being written has a hidden name
 
 
 def test_a_process_that_draws_ends_with_its_command(tmp_path: Path) -> None:

@@ -59,21 +59,6 @@ def test_a_forked_process_is_a_child_like_any_other(tmp_path: Path, monkeypatch:
         pipe.close()
 
 
-def test_a_forked_agent_behind_emulated_links_warns_of_nothing(tmp_path: Path) -> None:
-    """Its log begins with its own words, though the server has imported the module that it runs."""
-    module = "gridpeers.scenarios.emulation.emulated_agent"
-    with (tmp_path / "log").open("wb") as log, ForkServer((module,)) as server:
-        agent = server.fork([module], log, speaks=False)
-        assert agent.stdin is not None
-        agent.stdin.write(b'{"run": 1}\n')
-        agent.stdin.close()
-
-        assert agent.wait() == 2
-    text = (tmp_path / "log").read_text()
-    assert "Expected `str`, got `int` - at `$.run`" in text
-    assert "Warning" not in text
-
-
 def test_a_process_that_cannot_be_forked_is_started_anew(tmp_path: Path) -> None:
     """A server that is gone costs time and nothing else."""
     config = agent_config("inv1")
@@ -98,21 +83,6 @@ def test_a_server_with_threads_forks_nothing(tmp_path: Path, monkeypatch: pytest
         pytest.raises(ForkServerError, match="has 2 threads"),
     ):
         server.fork(["gridpeers.agents"], log, speaks=False)
-
-
-def test_a_server_that_imports_for_too_long_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nobody waits for a minute without a word, and it forks nothing afterwards that nobody knows of."""
-    (tmp_path / "slow_module.py").write_text("import time\ntime.sleep(60)\n")
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    monkeypatch.setattr("gridpeers.scenarios.drivers.forking.PATIENCE", 0.1)
-
-    with (
-        (tmp_path / "log").open("wb") as log,
-        ForkServer(("slow_module",)) as server,
-        pytest.raises(ForkServerError, match="timed out"),
-    ):
-        server.fork(["gridpeers.agents"], log, speaks=False)
-    assert not server.lives
 
 
 def test_a_server_stays_until_its_surroundings_change(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,19 +1,16 @@
 """GridLAB-D's process while it reads a .glm file: it ends with the import, however that ends."""
 
 import os
-import resource
 import select
 import signal
 import subprocess
 import sys
-import tempfile
 from pathlib import Path
 
 import pytest
 
 from gridpeers.bridges.gridlabd.read_glm import read_glm
 from gridpeers.plant.tables.read import FeederError
-from tests.unit.bridges.gridlabd.glm_models import HEAD
 
 WAITING = """import os, signal, sys
 with open(os.environ["TOLD"], "w") as told:
@@ -74,23 +71,4 @@ def test_a_damaged_wheel_is_one_line(model: Path, damage: str, reason: str) -> N
     assert refused.value.problems == (
         f"gridlabd is installed, but cannot be imported ({reason}); the import of .glm files needs it: "
         "pip install --force-reinstall gridlabd",
-    )
-
-
-def test_a_full_disk_is_one_line(tmp_path: Path) -> None:
-    """Where GridLAB-D's answer finds no room, the import says so, and does not read half of it."""
-    pytest.importorskip("gridlabd", reason="the extra gridlabd is not installed")
-    path = tmp_path / "x.glm"
-    path.write_text(HEAD)
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (256, before[1]))
-    try:
-        with pytest.raises(FeederError) as refused:
-            read_glm(path)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
-
-    (problem,) = refused.value.problems
-    assert problem.startswith(
-        f"x.glm: what GridLAB-D has solved cannot be written in {tempfile.gettempdir()} ([Errno 27]"
     )

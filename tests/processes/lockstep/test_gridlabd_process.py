@@ -6,7 +6,6 @@ import os
 import re
 import select
 import signal
-import subprocess
 import sys
 from collections.abc import Iterator
 from importlib.util import find_spec
@@ -16,7 +15,7 @@ import pytest
 from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.bridges.gridlabd.gridlabd_process import KEPT_MEMORY, DeltaModeProcess, GridlabdError
+from gridpeers.bridges.gridlabd.gridlabd_process import DeltaModeProcess, GridlabdError
 from gridpeers.plant.plant_config import PlantConfig, Protection
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.run_request import Outcome
@@ -80,14 +79,6 @@ def gridlabd() -> Iterator[DeltaModeProcess]:
     process.close()
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="reads the environment of a process as Linux shows it")
-def test_gridlabd_keeps_the_memory_of_its_solver(gridlabd: DeltaModeProcess) -> None:
-    """The settings of memory, without which the system takes a quarter of the time, reach the process."""
-    environment = Path(f"/proc/{gridlabd.pid}/environ").read_bytes().split(b"\0")
-
-    assert {f"{name}={value}".encode() for name, value in KEPT_MEMORY.items()} <= set(environment)
-
-
 def test_a_run_names_the_signal_that_killed_gridlabd() -> None:
     """After kill -9 of GridLAB-D the run breaks at once, and says when and how."""
 
@@ -100,17 +91,6 @@ def test_a_run_names_the_signal_that_killed_gridlabd() -> None:
     # the first telemetry, of t = 0, may be handed over before or after the first control period
     assert re.match(r"plant after t = 0(\.02)? s: GridLAB-D's process was killed by SIGKILL", outcome.broke)
     assert all_of(os.getpid()) == []
-
-
-def test_agents_end_when_gridlabd_is_killed(tmp_path: Path) -> None:
-    """With processes the plant tells the reason, and no process is left."""
-    run = ProcessRun(*run_of(), tmp_path)
-    run.at(0.1, lambda: os.kill(gridlabd_of(run.child("plant").pid), signal.SIGKILL))
-
-    outcome = run(plant_command=())
-
-    assert "GridLAB-D's process was killed by SIGKILL" in outcome.broke
-    assert [line for line in outcome.notes if "Traceback" in line] == []
 
 
 def test_gridlabd_ends_with_a_killed_plant(tmp_path: Path) -> None:
@@ -135,31 +115,6 @@ def test_gridlabd_ends_with_a_killed_plant(tmp_path: Path) -> None:
         assert select.select([each], [], [], 60.0)[0] == [each]
         os.close(each)
     assert not folders[0].exists()
-
-
-def test_ctrl_c_ends_gridlabd(tmp_path: Path) -> None:
-    """Ctrl-C of the command is one line and exit code 130, and leaves no GridLAB-D."""
-    (tmp_path / "two.toml").write_text(TWO_CASES.format(end=0.04))
-    words = ["run", "two.toml", "--driver", "inprocess", "--out", "here"]
-    command = [sys.executable, "-c", "from gridpeers.cli.app import main; main()", *words]
-    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as running:
-        assert running.stdout is not None
-        assert any(line.startswith("case one: ") for line in running.stdout)
-        running.send_signal(signal.SIGINT)
-        _, errors = running.communicate(timeout=60)
-
-    assert running.returncode == 130, errors
-    assert errors.endswith("gridpeers: interrupted; what came until then is in here/\n")
-    assert all_of(running.pid) == []
-
-
-def test_a_trip_ends_the_run_by_name() -> None:
-    """GridLAB-D's inverters go on where ours would trip, so the run breaks and says which, when and by what."""
-    outcome = in_one_process(protection=Protection(trips={"UF1": (59.9, 0.02), "UF2": (59.0, 0.02)}))
-
-    assert outcome.broke.startswith("plant at t = 0.0")
-    assert "inv2: underfrequency 59." in outcome.broke
-    assert outcome.broke.endswith('write [protection] category = "off", or simulator = "gridpeers"')
 
 
 def test_a_network_without_solution_ends_the_run_with_gridlabds_words() -> None:

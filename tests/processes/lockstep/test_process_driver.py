@@ -13,17 +13,13 @@ import subprocess
 import sys
 from pathlib import Path
 from time import monotonic
-from typing import Any
 
 import msgspec
 import pytest
 
 from gridpeers.agents.agent_config import Control, LawChoice
-from gridpeers.scenarios.drivers import process_driver
 from gridpeers.scenarios.drivers.free_endpoint import ListenError, free_endpoint
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
-from gridpeers.scenarios.drivers.process_driver import run_processes
-from gridpeers.scenarios.drivers.telemetry_client import TelemetryClient
 from gridpeers.scenarios.results.recorded_events import law_failures
 from gridpeers.wire.codec import decode
 from gridpeers.wire.driver.session import Session
@@ -32,7 +28,7 @@ from gridpeers.wire.messages import Waiting
 from tests.toy import toy_plant
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
-from tests.toy.toy_runs import ProcessRun, Rows, first_difference
+from tests.toy.toy_runs import ProcessRun, Rows
 
 LONG = 2000.0
 """An end (s) that no test waits for."""
@@ -118,16 +114,6 @@ def test_an_agent_that_ends_its_process_fails_a_run_in_real_time(tmp_path: Path)
     assert "\n    no licence\n" in outcome.notes[0]
 
 
-def test_an_agent_that_a_person_ends_is_an_event(tmp_path: Path) -> None:
-    """Its process ends in order, with status 0: that is no crash, and the run goes on."""
-    run = ProcessRun(*toy_configs(4, end=20.0), tmp_path)
-    run.at(0.4, lambda: run.child("inv3").signal(signal.SIGTERM))
-    outcome = run()
-
-    assert (outcome.broke, outcome.notes) == ("", ())
-    assert [event.subject for event in outcome.events if event.kind == "roster"] == ["inv3"]
-
-
 def test_agents_that_link_to_each_other_give_the_same_rows_and_notice_a_death(tmp_path: Path) -> None:
     """Bytes and deaths do not depend on whether the plant relays, as in all other tests, or all have links to all."""
     star, mesh = (ProcessRun(*toy_configs(4, end=2.0), tmp_path / name) for name in ("star", "mesh"))
@@ -140,19 +126,6 @@ def test_agents_that_link_to_each_other_give_the_same_rows_and_notice_a_death(tm
     assert outcome.broke == ""
     assert [event.subject for event in outcome.events if event.kind == "roster"] == ["inv3"]
     assert hurt.rows[-1][0] == 20.0
-
-
-def test_agents_of_a_killed_process_die_together(tmp_path: Path) -> None:
-    """Kill -9 of a process that two agents share: the plant goes on with the others, and names both."""
-    run = ProcessRun(*toy_configs(4, end=20.0), tmp_path)  # long: the plant goes on while telemetry comes here
-    run.at(0.4, lambda: run.child("inv3").signal(signal.SIGKILL))
-    outcome = run(shared=2)
-    deaths = [event for event in outcome.events if event.kind == "roster"]
-
-    assert outcome.broke == ""
-    assert sorted(event.subject for event in deaths) == ["inv3", "inv4"]
-    assert run.rows[-1][0] == 20.0
-    assert len(outcome.notes) == 1
 
 
 def test_a_plant_killed_in_mid_run_ends_it(tmp_path: Path) -> None:
@@ -176,15 +149,6 @@ def test_a_frozen_agent_is_named_by_the_deadline(tmp_path: Path) -> None:
     assert ") from inv2 within 3 s; last heard of inv2: tick " in outcome.broke
     if "inv1" in outcome.broke:  # frozen between two sends, inv2 keeps the others waiting, who are missed as well
         assert ") from inv3 within 3 s" in outcome.broke
-
-
-def test_a_frozen_plant_is_noticed(tmp_path: Path) -> None:
-    """SIGSTOP: a plant that is silent for longer than its own deadline is ended."""
-    run = ProcessRun(*toy_configs(2, end=LONG, deadline=2.0), tmp_path)
-    run.at(0.4, lambda: run.child("plant").signal(signal.SIGSTOP))
-    outcome = run()
-
-    assert outcome.broke.startswith("nothing was heard of the plant for 4 s, so the run was ended: plant still runs")
 
 
 def test_who_cannot_start_ends_the_run_at_once(tmp_path: Path) -> None:
@@ -302,28 +266,6 @@ def test_the_plant_waits_for_a_command_that_stands_still(tmp_path: Path) -> None
     assert last == f"'' True {hashlib.sha256(repr(rows).encode()).hexdigest()}"
 
 
-def test_a_recorder_whose_link_breaks_misses_no_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What was on its way is lost with the link; the plant publishes it again, once the recorder is back."""
-    clients: list[TelemetryClient] = []
-
-    def client(*words: Any) -> TelemetryClient:
-        clients.append(TelemetryClient(*words))
-        return clients[0]
-
-    monkeypatch.setattr(process_driver, "TelemetryClient", client)
-    run = ProcessRun(*toy_configs(4, end=20.0), tmp_path)
-    for t in (0.4, 5.0, 20.0):
-        run.at(t, lambda: clients[0].renew_session())
-    outcome = run()
-    rows: Rows = []
-    run_inprocess(
-        *toy_configs(4, end=20.0), lambda telemetry: rows.extend(telemetry.rows), plant=ToyPlant(toy_configs(4)[0])
-    )
-
-    assert (outcome.broke, outcome.reproducible) == ("", True)
-    assert first_difference(rows, run.rows) == ""
-
-
 @pytest.mark.skipif(not hasattr(os, "pidfd_open"), reason="watches processes that are not its children by pidfd")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_the_end_of_the_parent_is_the_end_of_all(number: signal.Signals, tmp_path: Path) -> None:
@@ -374,21 +316,3 @@ def test_an_agent_alone_gives_up() -> None:
     assert done.returncode == 3
     assert b"inv1: no sign of life from plant within 0.4 s" in done.stderr
     assert b"is the plant of run toy running at tcp/127.0.0.1:9?" in done.stderr
-
-
-def test_an_agent_imports_nothing_heavy() -> None:
-    """Nine agents start in the time of one: neither numpy nor numba are in them."""
-    heavy = ("numpy", "scipy", "numba", "matplotlib", "asyncio")
-    code = "import sys, gridpeers.agents.agent_process, gridpeers.wire.driver.process"
-    code += f"; print([m for m in {heavy} if m in sys.modules])"
-    done = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True, check=True)
-
-    assert done.stdout == "[]\n"
-
-
-def test_start_order_must_name_everybody(tmp_path: Path) -> None:
-    """A start order that forgets somebody is an error of the caller."""
-    plant, agents = toy_configs(2)
-
-    with pytest.raises(ValueError, match="start_order: must name plant and every agent once, got plant, inv1"):
-        run_processes(plant, agents, tmp_path, lambda telemetry: None, start_order=["plant", "inv1"])

@@ -45,12 +45,18 @@ def chromium() -> Iterator[Browser]:
         browser.close()
 
 
-def run_of(desk: Desk) -> Terminal:
-    """A plant, with the agents of inv1, inv2 and inv4 in one terminal."""
-    agents = desk.open("agent", "inv1", "inv2", "inv4")
+def plant_of(desk: Desk) -> Terminal:
+    """A plant that has begun."""
     words = ("--run", "lab", "--listen", desk.options[-1], "--wait", "0", "--speed", SLOW)
     plant = desk.open_bare("plant", "calm.toml", *words)
     plant.expect("t = 0; speed")
+    return plant
+
+
+def run_of(desk: Desk) -> Terminal:
+    """A plant, with the agents of inv1, inv2 and inv4 in one terminal."""
+    agents = desk.open("agent", "inv1", "inv2", "inv4")
+    plant = plant_of(desk)
     agents.expect("inv4: joins at")
     return plant
 

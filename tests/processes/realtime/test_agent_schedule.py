@@ -65,15 +65,6 @@ def test_the_process_ends_and_a_new_one_is_started(tmp_path: Path, clock: str, s
     assert all(len(lives(run, name)) == 1 for name in ("inv1", "inv3", "plant"))
 
 
-def test_who_leaves_for_good_is_not_started_again(tmp_path: Path) -> None:
-    """Without a return the run ends well with one process less."""
-    run, outcome = run_of(tmp_path, AWAY[:1], "simulated")
-
-    assert outcome.broke == ""
-    assert outcome.notes == ()
-    assert len(lives(run, "inv2")) == 1
-
-
 HAS_ALL = Command(sender="visitor", epoch=1, seq=1, t=0.0, verb="telemetry", argument="99", reply_to="visitor")
 
 

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import signal
 from pathlib import Path
 
 import pytest
 
-from tests.processes.terminals import LIMITED, Desk, children_of, wait_for
+from tests.processes.terminals import Desk, children_of, wait_for
 
 SCENARIO = """
 [time]
@@ -68,29 +67,3 @@ def test_a_recorder_that_stood_still_has_every_row(desk: Desk) -> None:
     assert "inv3 is silent" in found["departures"][0]
     measured = metrics["cases"]["IV"]["late"]
     assert (measured["f_error_Hz"] is None) == ("f_error_Hz" in measured.get("reasons", {}))
-
-
-def test_a_live_run_goes_on_without_its_record_and_says_so(desk: Desk) -> None:
-    """At once: from when on and why. What happens is told to the end; then exit status 3, and no process left."""
-    (desk.folder / "late.toml").write_text(
-        '[time]\nend_s = 60.0\n[[event]]\nlabel = "late"\nt_s = 11.0\nopen = ["13-152"]\n'
-        '[case.calm]\nsecondary = "all"\ngraph = "ring"\n'
-    )
-    words = ("up", "late.toml", "--run", "lab", "--listen", desk.options[-1], "--out", "here")
-    up = desk.open_bare(*words, "--speed", "4", "--for", "12", prefix=LIMITED)
-    for _ in range(9):
-        up.expect("inv[1-9] joined")
-    children = children_of(up.pid)
-    stopped = float(up.expect(r"the record ends at (.*) s: File too large; the run goes on without it")[1])
-    up.expect(r"11\.00 s  switch 13-152 opened")
-
-    assert up.end() == 3
-    assert "Traceback" not in up.text
-    assert re.search(r"ended at t = 12\.00 s; \d+ of 600 steps", up.text)
-    assert 0.0 < stopped < 11.0
-    why = up.expect(r"gridpeers: (the record ends at .* s: File too large)")[1]
-    assert (desk.folder / "here" / "status.txt").read_text() == f"broken: {why}\n"
-    assert len(children) == 10
-    for child in children:
-        with pytest.raises(ProcessLookupError):
-            os.kill(child, 0)

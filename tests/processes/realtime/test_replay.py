@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import signal
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from msgspec.structs import replace as replaced
 
 import gridpeers as gp
 from gridpeers.runs.result import Result
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.wire.journal import ProcessEvent
-from tests.command_line import invoke
 from tests.processes.terminals import Desk
-from tests.record.killed_commands import killed
 
 NINE = {f"inv{k}" for k in range(1, 10)}
 
@@ -85,35 +80,6 @@ def test_changes_hold_from_their_time_on(run: Result) -> None:
     assert head[2].startswith("# Not in this file: delays and losses on the wire, and what people did")
 
 
-def test_the_first_difference_is_named(run: Result) -> None:
-    """A record whose scenario says other gains than the agents had is told with agent, time, quantity and values."""
-    code, text = invoke("replay", str(run.folder / "IV"))
-    assert code == 0, text
-    assert "The replay gives what was recorded, within 1e-9." in text
-
-    record = RunRecord.open(run.folder / "IV")
-    agents = [with_gain(agent) if agent.name == "inv4" else agent for agent in record.info.agents]
-    record.info = replaced(record.info, agents=tuple(agents))
-    found = gp.replay(record).difference
-    assert found is not None
-    assert (found.name, found.quantity, found.unit) == ("inv4", "P_set", "W")
-    assert 0.5 <= found.t < 1.0
-    assert str(found).startswith(f"inv4 at t = {found.t:.2f} s: P_set is ")
-
-
-def test_a_record_that_was_cut_off_is_replayed_up_to_there(tmp_path: Path) -> None:
-    """Kill -9 of the command: all that is in the record is the same, and a change from 0.3 s on has its effect."""
-    left = killed(tmp_path / "run", "wall", 2.0)
-
-    done = gp.replay(left.record)
-    changed = gp.counterfactual(left.record, without="inv1 <-> inv4", since=0.3)
-
-    assert done.difference is None
-    assert done.parts[0].t_end > left.record.t_end - 0.5
-    assert changed.difference is None
-    assert changed.compared > 20
-
-
 def test_who_was_stopped_from_outside_leaves_again(desk: Desk) -> None:
     """Ctrl-C of an agent is a call of its node that its journal has: in the replay too, it sends no state after it."""
     plant = desk.open_bare(
@@ -133,9 +99,3 @@ def test_who_was_stopped_from_outside_leaves_again(desk: Desk) -> None:
     done = gp.replay(record)
     assert done.difference is None
     assert {part.name for part in done.parts} == {"plant", *NINE}
-
-
-def with_gain(agent: Any) -> Any:
-    """Return a configuration with another gain."""
-    gains = replaced(agent.control.gains, k_p=2.0 * agent.control.gains.k_p)
-    return replaced(agent, control=replaced(agent.control, gains=gains))

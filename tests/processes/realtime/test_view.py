@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.processes.realtime.browsers import SLOW, WAIT, accessible, page_of, run_of, view_of
+from tests.processes.realtime.browsers import WAIT, accessible, page_of, plant_of, run_of, view_of
 from tests.processes.terminals import Desk, Terminal
 
 if TYPE_CHECKING:
@@ -63,9 +63,12 @@ def sets_a_load(desk: Desk, plant: Terminal, page: Page, other: Page) -> None:
 
 
 def test_a_click_is_a_command_and_stale_numbers_are_not_shown_as_live(desk: Desk, browser: Browser) -> None:
-    """A click does to the run what its command does, on every open page; a killed plant leaves no number as of now."""
+    """A click does to the run what its command does, on every open page.
+
+    A frozen or killed plant leaves no number as of now; those of the plant that comes after it begin anew.
+    """
     plant = run_of(desk)
-    _, url = view_of(desk, "--control")
+    view, url = view_of(desk, "--control")
     page, other = page_of(browser, url), page_of(browser, url)
     foreign: list[str] = []
     page.on("request", lambda request: foreign.append(request.url) if not request.url.startswith(url) else None)
@@ -104,39 +107,16 @@ def test_a_click_is_a_command_and_stale_numbers_are_not_shown_as_live(desk: Desk
 
     sets_a_load(desk, plant, page, other)
 
-    page.evaluate(
-        """() => { window.seen = [];
-        new MutationObserver(() => seen.push([document.body.dataset.live, gridpeersView.frame.live.since]))
-            .observe(document.body, { attributes: true, attributeFilter: ["data-live"] }) }"""
-    )
-    plant.signal(signal.SIGKILL)
-    page.wait_for_selector('body[data-live="gone"]')
-    first = page.evaluate("() => seen[0]")
-    assert first[0] in ("frozen", "gone")
-    assert first[1] is not None, "it says how long ago the plant's last word came"
-    assert page.locator("tbody tr").first.locator("td").all_inner_texts()[1:10] == ["\N{EN DASH}"] * 9
-    assert "the plant is gone" in page.locator("#live").inner_text().lower()
-
-
-def test_a_frozen_plant_and_a_restarted_one_are_told(desk: Desk, browser: Browser) -> None:
-    """Numbers of a frozen plant are not of now; those of the plant that comes after it begin anew."""
-    plant = run_of(desk)
-    view, url = view_of(desk)
-    page = page_of(browser, url)
-
     plant.signal(signal.SIGSTOP)
     page.wait_for_selector('body[data-live="frozen"]')
     assert "silent" in page.locator("#live").inner_text()
     plant.signal(signal.SIGKILL)
     page.wait_for_selector('body[data-live="gone"]')
-    words = ("--run", "lab", "--listen", desk.options[-1], "--wait", "0", "--speed", SLOW)
-    desk.open_bare("plant", "calm.toml", *words)
+    assert page.locator("tbody tr").first.locator("td").all_inner_texts()[1:10] == ["\N{EN DASH}"] * 9
+    assert "the plant is gone" in page.locator("#live").inner_text().lower()
+    plant_of(desk)
     page.wait_for_selector('body[data-live="live"]')
     assert page.evaluate("() => gridpeersView.frame.live.restarts") == 1
-
-    assert page.locator("#control").is_hidden()
-    page.evaluate("""() => gridpeersView.socket.send('{"kind":"open","subject":"13-152"}')""")
-    page.wait_for_selector("#command-list li.bad :text('only looks')", state="attached")
 
     view.signal(signal.SIGSTOP)
     page.wait_for_selector('body[data-live="lost"]')
@@ -252,6 +232,8 @@ def test_views_are_for_those_who_may_see_them_and_only_look(desk: Desk, browser:
     looking.locator('[data-load="48"]').focus()
     looking.keyboard.press("Enter")
     assert not looking.locator("#load-dialog").is_visible()
+    looking.evaluate("""() => gridpeersView.socket.send('{"kind":"open","subject":"60-160"}')""")
+    looking.wait_for_selector("#command-list li.bad :text('only looks')", state="attached")
 
     assert desk.type("down")[0] == 0
     looking.wait_for_selector('body[data-live="ended"]')

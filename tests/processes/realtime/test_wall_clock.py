@@ -8,7 +8,6 @@ from __future__ import annotations
 import signal
 from itertools import pairwise
 from pathlib import Path
-from time import monotonic
 
 import pytest
 from msgspec.structs import replace
@@ -166,20 +165,6 @@ def test_a_plant_that_freezes_or_dies_is_held_out_for_and_has_its_agents_again(t
         settled(town)
 
 
-def test_a_plant_that_waits_for_nobody_has_its_agents_and_a_spare_one_as_they_come(tmp_path: Path) -> None:
-    """It starts alone; an agent nobody has heard of brings its inverter on line, and all share with it."""
-    with Town(4, tmp_path, spares=("inv4",), wait_for_agents=0.0) as town:
-        town.start("plant").until(lambda: town.t > 0.3, "the plant runs")
-        assert "started without the agents of inv1, inv2, inv3" in town.children["plant"].log.read_text()
-        town.start("inv1", "inv2", "inv3").together(("inv1", "inv2", "inv3"))
-        settled_without = [event for event in town.events if event.subject == "inv4"]
-        town.start("inv4").until_event("inv4", "inv4 connected").together(FOUR)
-        settled(town)
-
-        assert settled_without == []
-        assert all(town.children[name].status is None for name in FOUR)
-
-
 def test_two_runs_side_by_side_do_not_meet(tmp_path: Path) -> None:
     """Even where agents of one run are connected to the other's plant: names keep them apart."""
     (tmp_path / "a").mkdir()
@@ -194,39 +179,6 @@ def test_two_runs_side_by_side_do_not_meet(tmp_path: Path) -> None:
 
         b.together(("inv1", "inv2", "inv3"))
         assert [event for event in b.events if "left" in event.text or "died" in event.text] == []
-
-
-def test_a_fleet_runs_in_wall_clock_time_and_a_death_is_only_an_event(tmp_path: Path) -> None:
-    """All rows come, after end / speed, with the percentiles of the pace; who died is in the notes."""
-    plant, agents, began = *toy_configs(4, end=3.0), monotonic()
-    run = ProcessRun(
-        replace(plant, clock="wall", speed=2.0), [replace(a, clock="wall", speed=2.0) for a in agents], tmp_path
-    )
-    run.at(1.0, lambda: run.child("inv3").signal(signal.SIGKILL))
-    outcome = run()
-
-    assert outcome.broke == ""
-    assert not outcome.reproducible
-    assert [row[0] for row in run.rows] == pytest.approx([0.02 * k for k in range(151)])
-    assert outcome.pacing is not None
-    assert monotonic() - began >= 3.0 / 2.0
-    assert outcome.run_s - outcome.pacing.slipped - outcome.pacing.worst < 2.9, "at the speed of time it takes 3 s"
-    assert outcome.pacing.steps == 150
-    assert [event.subject for event in outcome.events if "died" in event.text] == ["inv3"]
-    assert [note.split(" after")[0] for note in outcome.notes] == ["inv3 was killed by SIGKILL"]
-
-
-def test_an_inverter_without_agent_stays_on_droop_while_the_others_share(tmp_path: Path) -> None:
-    """Nobody waits for its agent or misses it; its set-point never moves, and the frequency comes back without it."""
-    plant, agents = toy_configs(4, end=3.0)
-    present = [replace(agent, clock="wall", speed=4.0) for agent in agents if agent.name != "inv2"]
-    run = ProcessRun(replace(plant, clock="wall", speed=4.0, agents=OTHERS), present, tmp_path)
-    outcome = run()
-
-    assert outcome.broke == ""
-    assert {event.subject for event in outcome.events if event.kind == "roster"} == set(OTHERS)
-    assert {P_sets(row)[1] for row in run.rows} == {P_sets(run.rows[0])[1]}
-    assert P_sets(run.rows[-1])[0] > P_sets(run.rows[0])[0]
 
 
 def test_a_strict_run_that_cannot_keep_pace_breaks(tmp_path: Path) -> None:
