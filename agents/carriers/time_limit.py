@@ -7,6 +7,7 @@ import signal
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from time import monotonic, thread_time
 from types import FrameType
 from typing import Any
 
@@ -17,6 +18,9 @@ from gridpeers.wire.plugins.registry import ANYTHING, named
 FIRST = 10.0
 """Times the time limit that a law may take to be made, or for its first answer: it may have to be loaded."""
 
+BLOCKED = 10.0
+"""Times the time limit that a call may last in real time, while it waits and does not compute."""
+
 
 class _OverError(BaseException):
     """The time is over; no Exception, so that a law that suppresses all of these is interrupted all the same."""
@@ -24,19 +28,27 @@ class _OverError(BaseException):
 
 @contextmanager
 def limited(what: str, seconds: float, limit: str) -> Iterator[None]:
-    """Interrupt what is inside when it lasts longer than so many seconds (real time), and raise LawError.
+    """Interrupt what is inside when it takes longer than so many seconds of processor time, and raise LawError.
 
-    It is interrupted by SIGALRM: in the main thread of a process alone, and not while C code does not return. The error
-    names `what` is inside, and the `limit` as a scenario calls it.
+    Of real time it may take `BLOCKED` times as many: what else a machine does must not decide what a run in simulated
+    time gives. It is interrupted by SIGALRM: in the main thread of a process alone, and not while C code does not
+    return. The error names `what` is inside, and the `limit` as a scenario calls it.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    over = False
+    over = ended = False
     interrupted: BaseException | None = None
+    began, last = thread_time(), monotonic() + BLOCKED * seconds
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         nonlocal over
+        if ended:
+            return
+        left = seconds - (thread_time() - began)
+        if left > 0.0 and monotonic() < last:
+            signal.setitimer(signal.ITIMER_REAL, max(left, 1e-3))
+            return
         over = True
         raise _OverError
 
@@ -46,6 +58,7 @@ def limited(what: str, seconds: float, limit: str) -> Iterator[None]:
         try:
             yield
         finally:
+            ended = True
             signal.setitimer(signal.ITIMER_REAL, 0.0)
     except BaseException as error:
         if not over:
@@ -71,7 +84,7 @@ def make_limited(law: type[Law], parameters: Mapping[str, Any], time_limit: floa
 
 
 class TimeLimited(Law):
-    """A law, each call of which may last only so long (s of real time); see `limited`."""
+    """A law, each call of which may take only so long (s of processor time); see `limited`."""
 
     def __init__(self, law: Law, time_limit: float) -> None:
         super().__init__(**{name: getattr(law, name) for name in LIMITS})

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from threading import Event
 from typing import Any
 
 import numpy as np
 import pytest
 
-from gridpeers.agents.carriers.time_limit import TimeLimited
+from gridpeers.agents.carriers.time_limit import TimeLimited, limited
 from gridpeers.agents.laws.call import LawError, decide
 from gridpeers.agents.laws.law import Law, Neighbour, Own, SetPoints
 
@@ -64,3 +65,20 @@ def test_a_step_that_is_no_decision_is_told_in_one_line(answer: Callable[[], Any
     with pytest.raises(LawError, match=f"^step at t = 1.2 s {said}") as told:
         decide(TimeLimited(Answers(), 10.0), OWN, (), 0.02)
     assert "\n" not in str(told.value)
+
+
+def compute_without_end() -> None:
+    while True:
+        pass
+
+
+def test_a_call_is_limited_in_processor_time_and_tenfold_in_real_time() -> None:
+    """A machine that does other things makes no law fail; one that computes or waits without end does."""
+    never = Event()
+    with limited("it", 0.05, "its limit"):
+        never.wait(0.1)
+
+    with pytest.raises(LawError, match="it took longer than its limit"), limited("it", 0.05, "its limit"):
+        never.wait()
+    with pytest.raises(LawError, match="it took longer than its limit"), limited("it", 0.05, "its limit"):
+        compute_without_end()
