@@ -216,17 +216,7 @@ Truth = Mapping[str, tuple[str, tuple[type[Message], ...]]]
 
 
 def hostile(keys: Truth, epochs: Mapping[str, int], rng: random.Random) -> Iterator[tuple[str, bytes]]:
-    """Keys and bytes in any order, some twice: nothing that a key's true sender might say in its epoch is among them.
-
-    Parameters
-    ----------
-    keys : Truth
-        Who may say what, where.
-    epochs : Mapping[str, int]
-        Epoch of everybody that there is.
-    rng : random.Random
-        Draws the order.
-    """
+    """Keys and bytes in any order, some twice: nothing that a key's true sender might say in its epoch."""
     headers: list[dict[str, Any]] = [
         {"sender": sender, "epoch": epoch + life, "seq": seq}
         for sender, epoch in epochs.items()

@@ -13,13 +13,7 @@ class NoHostsError(Exception):
 
 
 class Hosts:
-    """Network namespaces on a bridge. Use it as a context.
-
-    Parameters
-    ----------
-    count : int
-        How many; they are numbered from 1.
-    """
+    """Network namespaces on a bridge. Use it as a context."""
 
     def __init__(self, count: int) -> None:
         self._count = count

@@ -31,17 +31,7 @@ LIMITED = [
 
 
 class Terminal:
-    """One command in a terminal of its own.
-
-    Parameters
-    ----------
-    words : Sequence[str]
-        The command's words, without `gridpeers`.
-    folder : Path
-        Working directory.
-    prefix : Sequence[str], optional
-        What stands before the command, e.g. to run it in a network namespace.
-    """
+    """One command in a terminal of its own."""
 
     def __init__(self, words: Sequence[str], folder: Path, prefix: Sequence[str] = ()) -> None:
         self.words = list(words)
@@ -137,15 +127,7 @@ class Terminal:
 
 
 class Desk:
-    """All terminals of a test; leaving the context ends every one of them.
-
-    Parameters
-    ----------
-    folder : Path
-        Working directory.
-    options : Sequence[str]
-        Options of every command that takes part in the run.
-    """
+    """All terminals of a test; leaving the context ends every one of them."""
 
     def __init__(self, folder: Path, *options: str) -> None:
         self.folder, self.options = folder, options

@@ -79,13 +79,7 @@ def real_town(folder: Path, name: str = "islanding", *, record: str = "physics")
 
 
 class Watch:
-    """A run before, during and after a disturbance.
-
-    Parameters
-    ----------
-    town : Town
-        The run, with all agents in it.
-    """
+    """A run before, during and after a disturbance."""
 
     def __init__(self, town: Town) -> None:
         self.town = town

@@ -37,13 +37,7 @@ class Memory(NamedTuple):
 
 
 class MemoryWatch:
-    """Memory of processes from now on.
-
-    Parameters
-    ----------
-    pids : Mapping[str, int]
-        Processes by name.
-    """
+    """Memory of processes from now on."""
 
     def __init__(self, pids: Mapping[str, int]) -> None:
         self._pids = dict(pids)

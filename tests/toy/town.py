@@ -45,28 +45,8 @@ A plant that ends by itself with an error ends the wait at once.
 class Town:
     """A plant, its agents and an observer. Nothing is started until it is asked for.
 
-    Parameters
-    ----------
-    n : int
-        Inverters.
-    folder : Path
-        For the logs.
-    run : str, optional
-        Name of the run.
-    spares : tuple[str, ...], optional
-        Inverters that are off at the start.
-    also : tuple[str, ...], optional
-        Endpoints that agents connect to beside the plant's.
-    links : dict[str, Any], optional
-        Emulated links, as in the configurations.
-    configs : tuple, optional
-        Configurations of the plant and of all agents, if they are not the toy's.
-    plant_command : Sequence[str], optional
-        How the interpreter is told to run the plant; the toy plant unless said otherwise.
-    keys_folder : Path or None, optional
-        Folder with certificates: links are TLS. The observer has the plant's.
-    changes : Any
-        Fields of the plant's configuration.
+    With `keys_folder`, a folder of certificates, links are TLS, and the observer has the plant's. `also` has endpoints
+    that agents connect to beside the plant's; `changes` are fields of the plant's configuration.
     """
 
     def __init__(

@@ -25,17 +25,7 @@ EndSet = LockstepPlant | LockstepAgent
 
 
 class Links:
-    """Plant and agents, joined by links. Everybody is known by its token.
-
-    Parameters
-    ----------
-    plant_config : PlantConfig
-        The toy plant's.
-    agent_configs : Iterable[AgentConfig]
-        The agents.
-    rng : random.Random
-        Draws the link that delivers next.
-    """
+    """Plant and agents, joined by links. Everybody is known by its token."""
 
     def __init__(self, plant_config: PlantConfig, agent_configs: Iterable[AgentConfig], rng: random.Random) -> None:
         self.plant = LockstepPlant(plant_config, ToyPlant(plant_config))

@@ -23,15 +23,7 @@ COLUMNS = ("f (Hz)", "P (W)", "Q (var)", "V (V)", "P_set (W)", "V_set (V)")
 
 
 class ProcessRun:
-    """One run with processes.
-
-    Parameters
-    ----------
-    plant, agents
-        Configurations.
-    log_dir : Path
-        Folder of the logs.
-    """
+    """One run with processes."""
 
     def __init__(self, plant: PlantConfig, agents: Sequence[AgentConfig], log_dir: Path) -> None:
         self.plant, self.agents, self.log_dir = plant, agents, log_dir
