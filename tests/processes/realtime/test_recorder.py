@@ -13,14 +13,14 @@ from tests.processes.terminals import Desk, children_of, wait_for
 
 SCENARIO = """
 [time]
-end_s = 14.0
+end_s = 8.0
 [[event]]
 label = "early"
 t_s = 0.2
 open = ["60-160"]
 [[event]]
 label = "late"
-t_s = 13.0
+t_s = 7.0
 open = ["13-152"]
 [case.IV]
 secondary = "all"
@@ -38,9 +38,9 @@ def test_a_recorder_that_stood_still_has_every_row(desk: Desk) -> None:
     """
     (desk.folder / "late.toml").write_text(SCENARIO)
     here, log = desk.folder / "here", desk.folder / "here" / "log" / "plant.log"
-    words = ("up", "late.toml", "--for", "60", "--run", "lab", "--speed", "2")
+    words = ("up", "late.toml", "--for", "60", "--run", "lab")
     command = desk.open_bare(*words, "--listen", desk.options[-1], "--out", "here")
-    wait_for(log, "t = 0; speed 2")
+    wait_for(log, "t = 0; speed 1")
     (inv3,) = [pid for pid in children_of(command.pid) if Path(f"/proc/{pid}/cmdline").read_text().endswith("inv3\0")]
 
     os.kill(command.pid, signal.SIGSTOP)
@@ -51,14 +51,14 @@ def test_a_recorder_that_stood_still_has_every_row(desk: Desk) -> None:
     wait_for(log, "is out of reach; what it misses is kept for a while")
     os.kill(command.pid, signal.SIGCONT)
     wait_for(log, "is back")
-    wait_for(here / "IV" / "history.partial.csv", "\n14.")  # the recorder may be back later than the scenario's end
+    wait_for(here / "IV" / "history.partial.csv", "\n8.")  # the recorder may be back later than the scenario's end
     assert desk.type("down")[0] == 0
 
     assert command.end() == 0, command.text
     assert (here / "status.txt").read_text() == "complete\n"
     times = [float(line.split(",")[0]) for line in (here / "IV" / "history.csv").read_text().splitlines()[1:]]
     assert times == pytest.approx([0.01 * k for k in range(len(times))])
-    assert times[-1] >= 14.0
+    assert times[-1] >= 8.0
     command.expect("NOTE  case IV: early.*: not what the scenario means by it, which does not tell of: .* inv3 is sil")
     metrics = json.loads((here / "metrics.json").read_text())
     found = metrics["live"]
