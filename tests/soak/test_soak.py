@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 from itertools import islice
+from math import isinf
+from pathlib import Path
 from typing import Literal
 
 import pytest
@@ -10,8 +13,10 @@ import pytest
 from bench.soak.judging import ProcessSize, growths, judge_checks, judge_growth, judge_late, judge_times
 from bench.soak.soak_actions import DECK, SoakAction, soak_actions
 from bench.soak.soak_monitor import SoakMonitor
+from bench.soak.soak_run import SoakRun
 from gridpeers.agents.agent_config import AgentConfig, Control
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict, Violation
+from gridpeers.scenarios.schema import load_scenario
 from gridpeers.wire.messages import AgentStatus, Telemetry
 
 AGENTS = tuple(f"inv{i}" for i in range(1, 10))
@@ -162,3 +167,24 @@ def test_a_frequency_is_restored_once_it_holds() -> None:
     assert monitor.restorations == pytest.approx([2.0])
     assert monitor.seconds_in_band == pytest.approx(0.5)
     assert monitor.wall_time(4.0) == pytest.approx(9.5)
+
+
+@pytest.mark.timeout(300)
+@pytest.mark.skipif(sys.platform != "linux", reason="sizes of processes are from /proc")
+def test_a_killed_agent_is_told_and_comes_back_and_a_cut_heals(tmp_path: Path) -> None:
+    """Each time is measured, the sizes of plant, command and agents are there, no command fails, and the run ends."""
+    feeder = load_scenario("islanding")[1]
+    microgrids = {row.name: row.microgrid for row in feeder.inverters}
+    with SoakRun(tmp_path, microgrids, "inv10", recorded=False) as run:
+        run.disturb(SoakAction("kill", ("inv3",), 0.3))
+        run.disturb(SoakAction("cut", ("inv4", "inv7"), 0.5))
+        end = run.finish()
+
+    assert {"told", "joined", "heal"} <= {timed.what for timed in run.times}
+    assert [timed for timed in run.times if isinf(timed.seconds)] == []
+    assert [name for name, _ in run.kills] == ["inv3"]
+    assert {"plant", "command", *microgrids} == {size.name for size in run.sizes}
+    last = {size.name: size for size in run.sizes}.values()  # an agent that has just been started is small
+    assert [size for size in last if size.memory <= 5.0 or size.files <= 3] == []
+    assert run.steps > 0
+    assert (run.problems, end.status) == ([], 0)
