@@ -34,8 +34,9 @@ open = ["60-160"]
 secondary = "all"
 graph = "full"
 degraded_communication = { max_age_s = 60.0 }
+without_agent = ["inv4", "inv5", "inv6", "inv7", "inv8", "inv9"]
 """
-"""Two events: the window of the first is over when the second happens, that of the second never is.
+"""Three agents and two events: the window of the first is over when the second happens, that of the second never is.
 
 A busy machine may leave an agent out for longer than the usual greatest age of 0.25 s, which is a departure of the run.
 """
@@ -144,14 +145,13 @@ def test_what_is_not_there_is_told_in_one_line(desk: Desk) -> None:
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds the children in /proc")
 def test_up_stays_until_it_is_ended_and_leaves_no_process(desk: Desk) -> None:
-    """The plant and nine agents at once; SIGTERM, twice as `timeout` sends it, ends them all, with numbers."""
+    """The plant and its agents at once; SIGTERM, twice as `timeout` sends it, ends them all, with numbers."""
     (desk.folder / "events.toml").write_text(EVENTS)
     up = desk.open_bare("up", "events.toml", "--run", "lab", "--listen", desk.options[-1], "--out", "here")
-    for _ in range(9):
-        up.expect("inv[1-9] joined")
+    for _ in range(3):
+        up.expect("inv[1-3] joined")
     children = children_of(up.pid)
-    assert len(children) == 10
-    desk.open("watch").expect(r"inv1 .* inv2-9 ")
+    assert len(children) == 4
     up.expect("0.60 s  switch 60-160 opened")
 
     for _ in range(2):

@@ -25,6 +25,7 @@ open = ["13-152"]
 [case.IV]
 secondary = "all"
 graph = "full"
+without_agent = ["inv4", "inv5", "inv6", "inv7", "inv8", "inv9"]
 """
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds the children in /proc")

@@ -13,23 +13,31 @@ from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.wire.journal import ProcessEvent
 from tests.processes.terminals import Desk
 
-NINE = {f"inv{k}" for k in range(1, 10)}
+AGENTS = {"inv1", "inv2", "inv4", "inv7"}
+OTHERS = ["inv3", "inv5", "inv6", "inv8", "inv9"]
 
 
 @pytest.fixture(scope="module")
 def run() -> Result:
-    """A run of nine processes in which one leaves and returns, and a fifth of the messages is lost."""
+    """A run of four agents in which one leaves and returns, and a fifth of the messages is lost."""
     scenario = gp.Scenario(
         name="plug-n-play",
         seed=7,
-        time={"end_s": 3.2},
+        time={"end_s": 2.6},
         plant={"load_set": "main"},
         event=[
             {"label": "islanding", "t_s": 0.5, "open": ["13-152"]},
             {"label": "leave", "t_s": 0.8, "leave": ["inv2"]},
             {"label": "return", "t_s": 1.2, "join": ["inv2"]},
         ],
-        case={"IV": {"secondary": "all", "graph": "full", "link": [{"on": "* <-> *", "loss": 0.2}]}},
+        case={
+            "IV": {
+                "secondary": "all",
+                "graph": "full",
+                "without_agent": OTHERS,
+                "link": [{"on": "* <-> *", "loss": 0.2}],
+            }
+        },
     )
     return scenario.run("IV", driver="processes", clock="wall")
 
@@ -41,8 +49,8 @@ def test_a_replay_gives_the_set_points_of_the_run(run: Result) -> None:
     assert (done.difference, done.notes) == (None, ())
     plant, *agents = done.parts
     assert plant.count == len(run.history)
-    assert {part.name for part in agents} == NINE
-    assert len(agents) == 10  # a process of its own for who returns
+    assert {part.name for part in agents} == AGENTS
+    assert len(agents) == 5  # a process of its own for who returns
     assert min(part.count for part in agents) > 0
     assert max(part.t_end for part in agents) > run.spec.time.end_s - 0.5
 
@@ -71,9 +79,9 @@ def test_changes_hold_from_their_time_on(run: Result) -> None:
     links = run.links, done.would_be.links
     early, late = ([frame[(frame["t"] < 1.5) == first] for frame in links] for first in (True, False))
     lost = [{tuple(row) for row in it[it["fate"] == "loss"][["src", "dst", "seq"]].to_numpy()} for it in early]
-    assert len(lost[0]) > 100
+    assert len(lost[0]) > 50
     assert lost[0] == lost[1]
-    assert late[0]["fate"].eq("loss").sum() > 100
+    assert late[0]["fate"].eq("loss").sum() > 50
     assert not late[1]["fate"].eq("loss").any()
     head = (done.folder / "scenario.toml").read_text().splitlines()[:3]
     assert head[1].startswith("# Law, gains and graph hold from the start here; in what would have been, from 1.5 s on")
@@ -83,12 +91,13 @@ def test_changes_hold_from_their_time_on(run: Result) -> None:
 def test_who_was_stopped_from_outside_leaves_again(desk: Desk) -> None:
     """Ctrl-C of an agent is a call of its node that its journal has: in the replay too, it sends no state after it."""
     plant = desk.open_bare(
-        "plant", "calm.toml", "--run", "lab", "--listen", desk.options[-1], "--wait", "20", "--out", "out"
+        "plant", "calm.toml", "--run", "lab", "--listen", desk.options[-1], "--wait", "0", "--out", "out"
     )
-    others = desk.open("agent", *(f"inv{k}" for k in range(1, 10) if k != 2))
+    others = desk.open("agent", "inv1", "inv4")
     alone = desk.open("agent", "inv2")
     plant.expect("t = 0; speed")
     alone.expect("joins at")
+    others.expect("inv4: joins at")
     alone.signal(signal.SIGINT)
     plant.expect("inv2 left")
     desk.type("down")
@@ -98,4 +107,4 @@ def test_who_was_stopped_from_outside_leaves_again(desk: Desk) -> None:
     assert "leave" in {entry.kind for entry in record.entries("inv2") if isinstance(entry, ProcessEvent)}
     done = gp.replay(record)
     assert done.difference is None
-    assert {part.name for part in done.parts} == {"plant", *NINE}
+    assert {part.name for part in done.parts} == {"plant", "inv1", "inv2", "inv4"}
