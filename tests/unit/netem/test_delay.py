@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from gridpeers.netem.models.delay import Constant, Lognormal, Normal, Pareto, Trace, Uniform
+from gridpeers.netem.models.delay import Lognormal, Normal, Pareto, Trace, Uniform
 from tests.unit.netem.link_messages import T_C, channel, delays, fates, steady
 
 N = 4000
@@ -48,12 +48,6 @@ def test_the_quantile_is_that_of_the_law(name: str) -> None:
 def test_no_delay_is_negative_or_endless(name: str, u: float) -> None:
     """The delay is finite and not below zero for every drawn number."""
     assert 0.0 <= LAWS[name][0].quantile(u) < math.inf
-
-
-def test_a_constant_delay_is_exact() -> None:
-    """Nothing is added to a constant delay, not even a last digit."""
-    assert set(delays(channel(delay=0.1), 1000)) == {0.1}
-    assert channel(delay=Constant(delay_s=0.3)).judge(17, 17 * T_C, 5).deliveries == ((0.3, None),)
 
 
 @pytest.mark.parametrize("phi", [0.5, 0.95])
@@ -93,15 +87,6 @@ def test_fifo_delays_never_let_a_message_overtake(seed: int, sigma: float) -> No
 
     assert all(one <= other + 1e-12 for one, other in pairwise(arrivals))
     assert all(short <= long + 1e-12 for short, long in zip(free, kept, strict=True))
-
-
-def test_without_fifo_messages_do_overtake() -> None:
-    """Independent delays longer than the distance of the messages reorder them."""
-    arrivals = [
-        seq * T_C + delay for seq, delay in enumerate(delays(channel(delay=Uniform(low_s=0.0, high_s=0.2)), 200))
-    ]
-
-    assert arrivals != sorted(arrivals)
 
 
 def test_a_delay_that_changes_in_time_keeps_the_draws_of_each_message() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from itertools import pairwise
 
 import pytest
@@ -45,14 +44,6 @@ def test_a_holding_cut_lets_everything_go_at_its_end() -> None:
         [(0.5 if 5 <= seq < 25 else seq * T_C) + 0.01 for seq in range(40)]
     )
     assert {fate.held_until for fate in kept[5:25]} == {0.5}
-
-
-def test_a_holding_cut_without_an_end_never_lets_go() -> None:
-    """Messages that such a cut keeps are neither delivered nor dropped."""
-    fate = channel(cut=Cut(hold=True), loss=1.0).judge(0, 1.0, 10)
-
-    assert fate.deliveries == ((math.inf, None),)
-    assert not fate.reason
 
 
 def test_what_a_cut_lets_go_into_another_cut_meets_that_one() -> None:
@@ -105,22 +96,6 @@ def test_a_slow_line_sends_one_byte_after_the_other(gaps: list[tuple[int, int]],
         else:
             free = max(now, free) + size / rate
             assert fate.deliveries[0][0] == pytest.approx((free - now) / 1000, abs=1e-9)
-
-
-def test_a_line_with_too_much_to_send_carries_its_rate_and_no_more() -> None:
-    """Offered twice its rate, a line delivers half, each message as late as the full queue makes it."""
-    judged = fates(channel(rate=Rate(bytes_per_s=3000.0, queue_bytes=1200)), range(4000), size=120)
-    through = [fate.deliveries[0][0] for fate in judged if fate.deliveries]
-
-    assert len(through) == pytest.approx(2000, abs=10)
-    assert max(through) == pytest.approx(1200 / 3000, abs=1e-6)
-
-
-def test_a_lost_message_takes_no_room_in_the_queue() -> None:
-    """Loss comes before the line: with all lost nobody meets a full queue, with half lost half of the load is there."""
-    free = fates(channel(rate=Rate(bytes_per_s=3600.0, queue_bytes=1200), loss=0.5), range(2000), size=120)
-
-    assert {fate.reason for fate in free} == {"", "loss"}
 
 
 def test_everything_at_once_adds_up_in_the_order_told() -> None:

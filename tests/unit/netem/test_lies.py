@@ -54,12 +54,6 @@ def test_each_lie_says_what_its_name_says() -> None:
     assert [(told.P_set, told.V_set) for told in heard(Extreme(side="alternate"))[10:12]] == [(1e11, 1e6), (-1e11, 0.0)]
 
 
-def test_a_lie_from_the_beginning_has_the_first_state_to_go_by() -> None:
-    """A freeze from 0 s and a replay of before the run repeat the first state heard."""
-    assert {told.P_set for told in heard(Freeze(), since=0.0, until=inf)} == {0.0}
-    assert [told.P_set for told in heard(Replay(delay_s=0.2), since=0.0)[:4]] == [0.0, 0.0, 0.0, 1000.0]
-
-
 def test_random_lies_depend_on_seed_and_number_and_only_the_two_faced_on_who_hears() -> None:
     """All neighbours hear the same noise of one seed, unless the liar is two-faced; another seed has other noise."""
     plain, faced = Random(P_set_W=1e3), Random(P_set_W=1e3, two_faced=True)
@@ -70,24 +64,6 @@ def test_random_lies_depend_on_seed_and_number_and_only_the_two_faced_on_who_hea
     assert heard(plain) == heard(plain, "inv2")
     assert heard(plain) != heard(plain, seed=2)
     assert heard(faced) != heard(faced, "inv2")
-
-
-def test_two_liars_in_one_name_draw_on_their_own() -> None:
-    """What inv4 says in the name of inv3 has other noise than what inv3 says itself."""
-    lie = Random(P_set_W=1e3)
-    own, other = (HeardFrom(1, "inv3", "inv1", [LieTime(0.0, inf, liar, lie)]) for liar in ("inv3", "inv4"))
-
-    assert [own.told(state(k), state).P_set for k in range(9)] != [other.told(state(k), state).P_set for k in range(9)]
-
-
-def test_a_new_process_of_the_liar_has_no_past() -> None:
-    """A replay does not reach behind a restart of its sender."""
-    live = LiveHearing(HeardFrom(1, "inv3", "inv1", [LieTime(0.0, inf, "inv3", Replay(delay_s=0.5))]))
-    for k in range(10):
-        live.told(state(k))
-    again = State(sender="inv3", epoch=8, seq=0, t=1.0, P_set=-5.0, V_set=277.0, Q=0.0)
-
-    assert live.told(again).P_set == -5.0
 
 
 def test_a_receiver_keeps_no_more_states_than_its_lies_need() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from itertools import groupby, pairwise, product
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ from scipy import stats
 
 from gridpeers.netem.draws import RESTART, Stream
 from gridpeers.netem.models.loss import Bernoulli, GilbertElliott, LossModel, Markov
-from gridpeers.netem.models.medium import Corrupt, Duplicate, flip
+from gridpeers.netem.models.medium import Corrupt, flip
 from tests.unit.netem.link_messages import channel, fates, steady
 
 N = 20_000
@@ -103,17 +103,6 @@ def probability(model: LossModel, numbers: Sequence[int], lost: Sequence[bool]) 
     return float(state.sum())
 
 
-def test_gilberts_bursts_are_geometric() -> None:
-    """With loss in the bad state only, a burst of l messages has probability r (1 - r)^(l - 1)."""
-    model = CHAINS["gilbert"]
-    bursts = Counter(sum(1 for _ in run) for is_lost, run in groupby(lost(model)) if is_lost)
-    total = bursts.total()
-    observed = [bursts[length] for length in range(1, 10)] + [sum(n for length, n in bursts.items() if length >= 10)]
-    expected = [total * 0.25 * 0.75 ** (length - 1) for length in range(1, 10)] + [total * 0.75**9]
-
-    assert stats.chisquare(observed, expected).pvalue > 0.01
-
-
 @steady
 @given(share, st.floats(0.01, 1.0), share, share)
 def test_gilbert_elliotts_stationary_law_is_left_by_one_step_as_it_was(
@@ -140,11 +129,6 @@ def _assert_stationary(model: LossModel) -> None:
     assert sum(model.stationary) == pytest.approx(1.0)
 
 
-def test_markov_with_a_single_way_is_gilberts_model() -> None:
-    """Without states 2 and 4 the four states are Gilbert's two, message by message."""
-    assert lost(Markov(p13=0.05, p31=0.25), 4000) == lost(GilbertElliott(p=0.05, r=0.25), 4000)
-
-
 @steady
 @given(st.integers(0, 20), st.floats(0.0, 0.9), st.floats(0.0, 0.1))
 def test_a_higher_loss_loses_what_a_lower_one_loses_and_more(seed: int, p: float, more: float) -> None:
@@ -153,14 +137,6 @@ def test_a_higher_loss_loses_what_a_lower_one_loses_and_more(seed: int, p: float
     high = fates(channel(seed, loss=p + more), range(200))
 
     assert {i for i, fate in enumerate(low) if fate.reason} <= {i for i, fate in enumerate(high) if fate.reason}
-
-
-def test_duplicates_are_as_frequent_and_as_late_as_configured() -> None:
-    """Copies come with probability p, a fixed time behind the first."""
-    drawn = fates(channel(duplicate=Duplicate(p=0.1, extra_delay_s=0.5), delay=0.25), range(N))
-
-    assert stats.binomtest(sum(len(fate.deliveries) == 2 for fate in drawn), N, 0.1).pvalue > 0.01
-    assert {tuple(delay for delay, _ in fate.deliveries) for fate in drawn} == {(0.25,), (0.25, 0.75)}
 
 
 def test_corrupted_messages_have_any_bit_flipped_alike() -> None:

@@ -9,15 +9,12 @@ import pytest
 
 from gridpeers.netem.channel import Channel
 from gridpeers.netem.fault_schedule import replayed
-from gridpeers.netem.models.own_fault import FAULTS, LinkFault
 from gridpeers.netem.receiver import Receiver
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.netem.schema.pattern import Link
 from gridpeers.scenarios.emulation.link_data import EmulationConfig, LinkCommand
-from gridpeers.wire.plugins.plugin import Plugin, plugin_problems
-from gridpeers.wire.plugins.registry import PluginError
-from gridpeers.wire.schema.table_reading import read_table
+from gridpeers.wire.plugins.plugin import Plugin
 
 MODULE = '''
 from typing import Annotated
@@ -119,25 +116,6 @@ def test_one_that_fails_does_nothing_from_then_on_and_is_told_once(folder: str, 
     assert receiver.take_failures() == ()
 
 
-def test_every_problem_of_an_entry_is_told_at_its_key(folder: str) -> None:
-    """Parameters with their range, and names that there are not."""
-    tables = {
-        "link": [{"on": "* <-> *", "my_faults:Jam": {"share": 3, "folder": folder}, "my_faults:Jem": True, "jam": 1}]
-    }
-    netem, wrong = read_table(Netem, tables)
-    (entry,) = netem.links
-    placed = msgspec.structs.replace(
-        entry, own=tuple(msgspec.structs.replace(it, folder=folder) for it in reversed(entry.own))
-    )
-    told = {problem.path: problem.text for problem in placed.problems()}
-
-    assert [problem.path for problem in wrong] == ["link[0].jam"]
-    assert told["my_faults:Jam.share"] == "must be from 0 to 1, got 3"
-    assert 'module my_faults has no "Jem"; did you mean "Jam"?' in told["my_faults:Jem"]
-    assert "judge(self, message, draws)" in plugin_problems(FAULTS, Plugin(use="my_faults:Deaf", folder=folder))[0][1]
-    assert read_table(Netem, {"link": [{"on": "* <-> *", "my_faults:Jam": 3}]})[1][0].text.startswith("must be true or")
-
-
 def test_a_run_with_one_can_be_replayed(folder: str) -> None:
     """The file of a live run names it again, with its parameters and its folder."""
     entry = fault(folder, "Jam", parameters=(("share", 0.5),), from_s=1.0)
@@ -154,14 +132,3 @@ def test_nobody_can_have_a_running_run_import_a_module(folder: str) -> None:
     assert EmulationConfig.of_tree(setup.to_tree()) == setup
     with pytest.raises(ValueError, match="a fault of your own is written in the scenario before the run"):
         LinkCommand.of_tree(LinkCommand(fault=entry).to_tree())
-
-
-def test_a_decorator_adds_a_fault_and_takes_over_none_of_ours() -> None:
-    """`delay` stays what it is."""
-    with pytest.raises(PluginError, match='there is a link fault "delay" already'):
-
-        @FAULTS.register("delay")
-        class Mine(LinkFault):
-            def judge(self, message, draws):  # type: ignore[no-untyped-def]
-                """Nothing."""
-                return 0.0

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import gc
-from itertools import pairwise
 from typing import Any
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
@@ -193,20 +191,6 @@ def test_a_link_without_a_fault_is_known_as_such_and_leaves_no_trace() -> None:
     assert to.counts()["inv3"].delivered == 10
 
 
-def test_the_hash_of_the_trace_does_not_depend_on_when_it_is_looked_at() -> None:
-    """Two processes that take their traces at other times, or never, come to one hash; another seed to another."""
-    entries = (Fault(on="* -> inv2", **{kind: KINDS[kind] for kind in ("delay", "loss", "duplicate", "corrupt")}),)
-    often, never, other = receiver(*entries), receiver(*entries), receiver(*entries, seed=2)
-    for k in range(2000):
-        send(often, range(k, k + 1), "inv1", "inv3")
-        if k % 7 == 0:
-            often.take_trace()
-    send(never, range(2000), "inv3", "inv1")
-    send(other, range(2000), "inv1", "inv3")
-
-    assert often.trace_sha256 == never.trace_sha256 != other.trace_sha256
-
-
 def test_a_live_fault_acts_from_its_time_on_and_heals() -> None:
     """Messages sent before the change or after the healing fare as the scenario has it, those between as was said."""
     to = receiver(Fault(on="* -> inv2", delay=0.1))
@@ -240,16 +224,6 @@ def test_healing_a_holding_cut_lets_go_at_once_as_if_it_had_been_planned() -> No
     assert outcomes(live.take_trace()) == outcomes(planned.take_trace())
 
 
-def test_a_link_heard_first_after_a_change_is_changed_as_well() -> None:
-    """A newcomer's link has what was said of it before it came."""
-    to = receiver()
-    to.apply(Fault(on="MG4 -> MG1", cut=True))
-    to.meet("inv10", "MG4")
-    send(to, range(3), "inv10")
-
-    assert to.counts()["inv10"].dropped == {"cut": 3}
-
-
 def test_a_partition_is_felt_by_links_between_groups_and_by_the_plants_only_if_named() -> None:
     """Microgrids apart hear nobody else; the plant's links stay."""
     to = Receiver("inv2", Netem(partitions=(Partition(by="microgrid", from_s=0.0, to_s=1.0),)), MICROGRIDS)
@@ -262,51 +236,22 @@ def test_a_partition_is_felt_by_links_between_groups_and_by_the_plants_only_if_n
     }
 
 
-def test_until_is_when_the_next_message_is_due() -> None:
-    """A wall-clock driver that wakes at `until` gets the next message, and nothing a nanosecond earlier."""
-    to = receiver(Fault(on="* -> inv2", delay=KINDS["delay"]))
-    for k in range(50):
-        to.offer("inv1", k, k * T_C, k * T_C, PAYLOAD)
-    times = []
-    while (until := to.until) is not None:
-        assert to.due(until - 1e-9) == []
-        assert to.due(until)
-        times.append(until)
-
-    assert all(one <= other for one, other in pairwise(times))
-    assert to.counts()["inv1"].delivered == 50
-    assert times[0] == pytest.approx(min(times))
-
-
 def test_faults_that_were_over_long_ago_are_forgotten_and_change_no_fate() -> None:
     """A run of hours has hundreds of commands; a link that had a fault once is still told apart from one without."""
     lossy = Fault(on="inv1 -> inv2", loss=0.3, delay=0.05, from_s=0.0, to_s=1.0)
     ahead = [replace(lossy, from_s=10.0 * k, to_s=10.0 * k + 1.0) for k in range(60)]
-    live, planned, known = receiver(), receiver(*ahead), list[int]()
+    live, planned, known = receiver(), receiver(*ahead), dict[int, int]()
     fates: list[list[Arrival]] = [[], []]
     for k in range(600):
         if k % 10 == 0:
             live.apply(ahead[k // 10])
-            known.append(sum(type(it) is Span for it in gc.get_objects()))
+            if k in (10 * MOST_SPANS, 590):
+                known[k] = sum(type(it) is Span for it in gc.get_objects())
         for to, found in zip((live, planned), fates, strict=True):
             to.offer("inv1", k, float(k), float(k), PAYLOAD)
             found += to.due(k + 0.5)
     assert fates[0] == fates[1]
     assert live.trace_sha256 == planned.trace_sha256
-    assert known[-1] <= known[MOST_SPANS]
+    assert known[590] <= known[10 * MOST_SPANS]
     assert live.was_impaired("inv1", 0.5)
     assert not receiver().was_impaired("inv1", 0.5)
-
-
-def test_faults_are_remembered_while_a_cut_keeps_a_message_of_their_time() -> None:
-    """Its fate is judged when the cut is healed, by what the link was when it was sent."""
-    live = receiver()
-    live.apply(Fault(on="inv1 -> inv2", cut=Cut(hold=True)))
-    live.apply(Fault(on="inv1 -> inv2", duplicate=Duplicate(p=1.0), from_s=0.0, to_s=1.0))
-    live.offer("inv1", 0, 0.5, 0.5, PAYLOAD)
-    for k in range(40):
-        live.apply(Fault(on="inv1 -> inv2", loss=0.1, from_s=10.0 * k, to_s=10.0 * k + 1.0))
-
-    live.apply(Heal(on="inv1 -> inv2", from_s=500.0, kinds=("cut",)))
-
-    assert len(live.due(600.0)) == 2
