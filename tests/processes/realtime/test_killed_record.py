@@ -53,7 +53,7 @@ def test_a_record_without_room_ends_and_the_run_goes_on(tmp_path: Path) -> None:
     """The run is whole; its report and its log say where run.mcap ends and why, and what is in it can be read."""
     (tmp_path / "calm.toml").write_text(CALM)
     done = subprocess.run(
-        [*LIMITED, *command("run", "calm.toml", "--driver", "inprocess", "--out", "here")],
+        [*LIMITED, *command("run", "calm.toml", "--clock", "wall", "--out", "here")],
         cwd=tmp_path,
         capture_output=True,
         text=True,
