@@ -25,24 +25,10 @@ class AgentEvent(NamedTuple):
 
 
 def why_away(name: str, begin_s: float, end_s: float, events: Iterable[AgentEvent], *, at_start: bool) -> str:
-    """Return why an agent is away all the time between two run times, "" if it is there at any.
+    """Return why an agent is away all the time between two run times (s), "" if it is there at any.
 
-    Kills need not be asked for: an agent that is killed has no other fault of its own from then on.
-
-    Parameters
-    ----------
-    begin_s, end_s : float
-        Run times (s); the end may be infinite.
-    events : Iterable[AgentEvent]
-        The scenario's events, in the order of time.
-    at_start : bool
-        Whether the agent is there at t = 0.
-
-    Examples
-    --------
-    >>> events = [AgentEvent(2.0, ["inv2"], []), AgentEvent(3.0, [], ["inv2"])]
-    >>> why_away("inv2", 2.0, 3.0, events, at_start=True), why_away("inv2", 2.0, 3.5, events, at_start=True)
-    ('has left at 2 s', '')
+    The events are in the order of time; the end may be infinite. An agent that is killed has no other fault from then
+    on.
     """
     for begin, end, why in _absences(name, events, at_start=at_start):
         if begin <= begin_s and end_s <= end:
@@ -94,11 +80,8 @@ def security_notes(scenario: ScenarioModel, feeder: Feeder, file: str) -> Iterat
 
 
 def start_problem(scenario: ScenarioModel, feeder: Feeder) -> str:
-    """Return why the plant has no operating point at t = 0, or cannot operate an event's switches; "" if it can.
-
-    All cases start from the same one, GridLAB-D too. A plant elsewhere finds its own.
-    """
-    if SIMULATORS.resolve(scenario.plant.simulator).elsewhere:
+    """Return why the plant has no operating point at t = 0, or cannot operate an event's switches; "" if it can."""
+    if SIMULATORS.resolve(scenario.plant.simulator).elsewhere:  # it finds its own
         return ""
     plant, _ = configs(scenario, feeder, next(iter(scenario.cases)))
     try:

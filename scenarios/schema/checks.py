@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 import unicodedata
-from collections.abc import Mapping
 from itertools import pairwise
 
 from gridpeers.plant.equipment import Feeder, InverterRow
@@ -27,15 +26,13 @@ from gridpeers.wire.schema.table_schema import contradictions
 from gridpeers.wire.wording import suggestion
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,30}")
-"""Names become folders and, two of them joined, a part of a key, which `gridpeers.wire.keys` bounds at 64 letters."""
+"""Names become folders and, two of them joined, a part of a key of at most 64 letters."""
 
 TRIPS = "protection.trips"
 
 LONGEST_CLEARING_TIME = 3600.0
 
 _LIMITS_OF_P = {"GFM": ("P_max", "P_set_lim", "P_min"), "GFL": ("P_max", "S_max", "i_max", "P_set_lim", "P_min")}
-"""Parameters by kind of inverter that limit a set-point of P; the first broken one is noted."""
-
 _RUN_FOLDER = ("log", "plots", "metrics.json", "report.txt", "scenario.toml", "status.txt")
 """Files and folders of a run folder beside the folders of its cases."""
 
@@ -47,7 +44,6 @@ def name_of(stem: str) -> str:
 
 
 def check_names(scenario: ScenarioModel, problems: Problems) -> None:
-    """Note names that cannot become folders, labels that are there twice, and that there is no case."""
     for path, name in [
         ("name", scenario.name),
         *((f"case.{case}", case) for case in scenario.cases),
@@ -68,7 +64,7 @@ def check_names(scenario: ScenarioModel, problems: Problems) -> None:
 
 
 def check_start(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
-    """Note first set-points that an inverter cannot give: the start would be no equilibrium and move by itself."""
+    """Note first set-points that an inverter cannot give: the start would be no equilibrium."""
     plant, P, V = scenario.plant, scenario.plant.P_set0_pu, scenario.plant.V_set0_pu
     if problems.touch("plant.gfm", "plant.gfl"):
         return
@@ -103,7 +99,6 @@ def check_start(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> 
 
 
 def check_cases(scenario: ScenarioModel, inverters: tuple[str, ...], problems: Problems) -> None:
-    """Note listed links that do not join two known inverters, and links listed for another graph than "links"."""
     for name, case in scenario.cases.items():
         if name in _RUN_FOLDER:
             problems.add(f"case.{name}", f"a case's folder stands beside {', '.join(_RUN_FOLDER)}; name it otherwise")
@@ -122,9 +117,8 @@ def check_cases(scenario: ScenarioModel, inverters: tuple[str, ...], problems: P
 
 
 def check_events(scenario: ScenarioModel, problems: Problems) -> None:
-    """Note events that do nothing, and cases that name an event that there is not."""
+    keys = ("open", "close", "leave", "join", "P_max_kW", "load")
     for i, event in enumerate(scenario.events):
-        keys = ("open", "close", "leave", "join", "P_max_kW", "load")
         if not any(getattr(event, key) for key in keys) and not problems.touch(*(f"event[{i}].{key}" for key in keys)):
             problems.add(
                 f"event[{i}]",
@@ -143,15 +137,28 @@ def check_events(scenario: ScenarioModel, problems: Problems) -> None:
 
 def check_limits(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
     """Note limits of available power that are not of a GFL, or beyond its rating."""
-    for i, event in enumerate(scenario.events):
-        _check_limits(f"event[{i}].P_max_kW", event.P_max_kW, scenario, feeder, problems)
-    for name, case in scenario.cases.items():
-        for label, limits in case.P_max_kW.items():
-            _check_limits(f"case.{name}.P_max_kW.{label}", limits, scenario, feeder, problems)
+    rows, plant = {row.name: row for row in inverters_of(scenario, feeder)}, scenario.plant
+    limits = [(f"event[{i}].P_max_kW", event.P_max_kW) for i, event in enumerate(scenario.events)]
+    for case, rule in scenario.cases.items():
+        limits += [(f"case.{case}.P_max_kW.{label}", powers) for label, powers in rule.P_max_kW.items()]
+    for path, name, kW in [(path, name, kW) for path, powers in limits for name, kW in powers.items()]:
+        if problems.unknown(path, "inverter", name, rows):
+            continue
+        row = rows[name]
+        most = row.P_rated * feeder.parameters_of(row, plant.gfm, plant.gfl).P_max / 1e3
+        if row.kind == "GFM":
+            following = ", ".join(other.name for other in rows.values() if other.kind == "GFL")
+            problems.add(
+                path,
+                f"{name} is grid-forming and gives what the network takes; only a grid-following inverter can be "
+                f"limited: {following or 'there is none'}",
+            )
+        elif not math.isfinite(kW) or kW < 0.0 or kW > most * (1.0 + 1e-9):
+            hint = f"; it is in kW: write {kW / 1e3:g}" if kW > most and kW / 1e3 <= most else ""
+            problems.add(path, f"{name} can have from 0 to {most:g} kW available, got {kW:g} kW{hint}")
 
 
 def check_changes(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
-    """Note inverters that there are not, tables that change nothing, and parameters that an inverter cannot have."""
     rows = {row.name: row for row in (*feeder.inverters, *feeder.spares)}
     for name, table in scenario.plant.inverter.items():
         path = f"plant.inverter.{name}"
@@ -174,17 +181,20 @@ def check_changes(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -
 
 
 def check_switches(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
-    """Note switches that there are not, and those that are in the position already into which an event brings them."""
+    """Note unknown switches, and those that are in the position already into which an event brings them."""
     position = {switch.name: switch.closed for switch in feeder.switches}
     canonical = {name: switch.name for switch in feeder.switches for name in switch.names}
     buses = {bus.name for bus in feeder.buses}
+    names_shown = [switch.alias or switch.name for switch in feeder.switches]
     for i, event in enumerate(scenario.events):
         named: set[str] = set()
         for action, closed, names in (("open", False, event.open), ("close", True, event.close)):
             for name in names:
                 path = f"event[{i}].{action}"
                 if name not in canonical:
-                    problems.add(path, _unknown_switch(name, [s.alias or s.name for s in feeder.switches], buses))
+                    strange = [end for end in name.split("-") if end[:1].isdigit() and end not in buses]
+                    why = f" (there is no bus {' and no bus '.join(strange)})" if strange else ""
+                    problems.add(path, f'no switch "{name}"{why}; {suggestion(name, names_shown, "switches")}')
                     continue
                 switch = canonical[name]
                 if switch in named:
@@ -200,7 +210,6 @@ def check_switches(scenario: ScenarioModel, feeder: Feeder, problems: Problems) 
 
 
 def check_protection(scenario: ScenarioModel, f_nom: float, problems: Problems) -> None:
-    """Note settings of unknown functions, on the wrong side of nominal, and second stages within their first."""
     given = scenario.protection.trips
     if problems.touch("protection", TRIPS):
         return
@@ -233,7 +242,6 @@ def check_protection(scenario: ScenarioModel, f_nom: float, problems: Problems) 
 
 
 def _check_own(row: InverterRow, scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
-    """Note parameters of one inverter that contradict each other where its own meet those of its kind."""
     plant, path = scenario.plant, f"plant.inverter.{row.name}"
     own = row.parameters or given(row.own)
     if not own or problems.touch("plant.gfm", "plant.gfl", path, f"{path}.parameters") or problems.below(path):
@@ -256,42 +264,12 @@ def _check_links(path: str, links: tuple[tuple[str, str], ...], inverters: tuple
         seen.add(frozenset(pair))
 
 
-def _unknown_switch(name: str, known: list[str], buses: set[str]) -> str:
-    """Return a sentence on a switch that does not exist, or whose bus does not."""
-    ends = name.split("-")
-    strange = [end for end in ends if end[:1].isdigit() and end not in buses]
-    why = f" (there is no bus {' and no bus '.join(strange)})" if strange else ""
-    return f'no switch "{name}"{why}; {suggestion(name, known, "switches")}'
-
-
-def _check_limits(
-    path: str, limits: Mapping[str, float], scenario: ScenarioModel, feeder: Feeder, problems: Problems
-) -> None:
-    rows = {row.name: row for row in inverters_of(scenario, feeder)}
-    for name, kW in limits.items():
-        if problems.unknown(path, "inverter", name, rows):
-            continue
-        row, plant = rows[name], scenario.plant
-        most = row.P_rated * feeder.parameters_of(row, plant.gfm, plant.gfl).P_max / 1e3
-        if row.kind == "GFM":
-            following = ", ".join(other.name for other in rows.values() if other.kind == "GFL")
-            problems.add(
-                path,
-                f"{name} is grid-forming and gives what the network takes; only a grid-following inverter can be "
-                f"limited: {following or 'there is none'}",
-            )
-        elif not math.isfinite(kW) or kW < 0.0 or kW > most * (1.0 + 1e-9):
-            hint = f"; it is in kW: write {kW / 1e3:g}" if kW > most and kW / 1e3 <= most else ""
-            problems.add(path, f"{name} can have from 0 to {most:g} kW available, got {kW:g} kW{hint}")
-
-
 PART_OF_T = {"first-order": 0.3, "second-order": 1.0}
 """Longest integration step of a method, as a part of the inverters' shortest time constant: at 0.4 of it the first
 rings on microgrid123; the second is stable up to 2 of it."""
 
 
 def check_times(scenario: ScenarioModel, problems: Problems) -> None:
-    """Note times off the grid that they belong to, and events that are not in the order of time."""
     time = scenario.time
     paths = [f"event[{i}].t_s" for i in range(len(scenario.events))]
     read = {path for path in paths if not problems.touch(path)}  # a time off its grid is a time nevertheless
@@ -323,7 +301,6 @@ def check_times(scenario: ScenarioModel, problems: Problems) -> None:
 
 
 def check_step(scenario: ScenarioModel, feeder: Feeder | None, problems: Problems) -> None:
-    """Note an integration step that does not resolve every time constant of the inverters."""
     gfm, gfl = scenario.plant.gfm, scenario.plant.gfl
     of = _time_constants("plant.gfm", gfm) | _time_constants("plant.gfl", gfl)
     if feeder:

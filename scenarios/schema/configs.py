@@ -34,11 +34,9 @@ def configs(
 ) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
     """Return the configurations of the plant and of every agent for one case of a checked scenario, later joiners last.
 
-    `endpoint` is where the plant listens; the in-process driver needs none. With `real_nodes` processes really are
-    killed and paused, as in real time; else that is emulated.
+    `endpoint` is where the plant listens. With `real_nodes` processes really are killed and paused, as in real time.
     """
-    run = f"{scenario.name}-{case}"
-    endpoints = (endpoint,) if endpoint else ()
+    run, endpoints = f"{scenario.name}-{case}", (endpoint,) if endpoint else ()
     time, rule = scenario.time, scenario.cases[case]
     graph, own_graph = graph_of(rule)
     inverters, present = inverters_of(scenario, feeder), with_agent(scenario, feeder, case)
@@ -111,7 +109,7 @@ def configs(
 
 
 def limits_of(scenario: ScenarioModel, case: str) -> tuple[PowerLimit, ...]:
-    """Return the power that inverters have available in one case; a case's own numbers take the place of an event's."""
+    """Return the power that inverters have available in one case, whose own numbers replace an event's."""
     own = scenario.cases[case].P_max_kW
     return tuple(
         PowerLimit(t=event.t_s, inverter=name, P_max=1e3 * kW)

@@ -62,10 +62,7 @@ def find_scenario(name: str) -> Path:
 
 
 def find_file(name: str, folder: Path, what: str) -> Path:
-    """Return the path of a file named as in a catalogue, or given as a path; `what` names its kind in messages.
-
-    ScenarioError if there is neither, or the system does not let one look.
-    """
+    """Return the path of a file named as in a catalogue, or given as a path; `what` names its kind in ScenarioError."""
     names = names_in(folder)
     if name in names:
         return folder / f"{name}.toml"
@@ -85,10 +82,7 @@ def find_file(name: str, folder: Path, what: str) -> Path:
 
 
 def load_scenario(name: str | Path) -> tuple[ScenarioModel, Feeder]:
-    """Read and check a scenario of the catalogue or a file, and its feeder, before anything starts.
-
-    ScenarioError has every problem of both.
-    """
+    """Read and check a scenario of the catalogue or a file, and its feeder; ScenarioError has every problem of both."""
     path = find_scenario(str(name))
     text, data = read_toml(path)
     problems = Problems(path.name, text)
@@ -100,13 +94,16 @@ def load_scenario(name: str | Path) -> tuple[ScenarioModel, Feeder]:
 
 def read_toml(path: Path) -> tuple[str, dict[str, Any]]:
     """Return text and tables of a file; ScenarioError if it cannot be read or is no TOML."""
-    text = _text_of(path)
+    try:
+        text = text_of(path.read_bytes())
+    except TextFileError as error:
+        raise ScenarioError([f"{path.name}: {error}"]) from None
+    except OSError as error:
+        raise ScenarioError([f"{path}: cannot be read: {error.strerror}"]) from None
     try:
         return text, tomllib.loads(text)
-    except ValueError as error:  # no TOML, or a whole number of more digits than Python reads
+    except (ValueError, RecursionError) as error:  # no TOML, a number of thousands of digits, or brackets as deep
         raise ScenarioError([_malformed(path.name, text, str(error))]) from None
-    except RecursionError:
-        raise ScenarioError([f"{path.name}: brackets or names are nested too deeply to be read"]) from None
 
 
 def read_tables(data: Mapping[str, Any], problems: Problems) -> ScenarioModel:
@@ -119,8 +116,7 @@ def check_tables(
 ) -> tuple[ScenarioModel, Feeder | None]:
     """Read the tables of a scenario and note every problem; the scenario is of use only if there is none.
 
-    Relative paths start at the folder of `path`, whose name is that of a scenario without one. Who checks many
-    scenarios gives a `read_feeder` that keeps what it has read.
+    Relative paths start at the folder of `path`, whose name is that of a scenario without one.
     """
     scenario = read_tables(data, problems)
     if not scenario.name:
@@ -154,29 +150,15 @@ def check_tables(
     return scenario, feeder
 
 
-def _text_of(path: Path) -> str:
-    try:
-        return text_of(path.read_bytes())
-    except TextFileError as error:
-        raise ScenarioError([f"{path.name}: {error}"]) from None
-    except OSError as error:
-        raise ScenarioError([f"{path}: cannot be read: {error.strerror}"]) from None
-
-
 def _malformed(file: str, text: str, reason: str) -> str:
     """Problem of a text that is no TOML, with its line, which `tomllib` tells in a parenthesis."""
-    if reason.startswith("Exceeds the limit"):
-        return f"{file}: not valid TOML: a whole number has thousands of digits"
-    match = re.search(r"\(at line (\d+), column (\d+)\)", reason)
-    last = max(len(text.rstrip().splitlines()), 1)
-    line = int(match[1]) if match else last
-    lines = text.splitlines()
-    quoted = lines[line - 1].strip() if 0 < line <= len(lines) else ""
-    return f"{file}:{line}: not valid TOML: {reason.partition(' (at')[0]}: {quoted}"
+    lines = text.rstrip().splitlines() or [""]
+    match = re.search(r"\(at line (\d+)", reason)
+    line = min(int(match[1]), len(lines)) if match else len(lines)
+    return f"{file}:{line}: not valid TOML: {reason.partition(' (at')[0]}: {lines[line - 1].strip()}"
 
 
 def _with_feeder_path(scenario: ScenarioModel, folder: Path) -> ScenarioModel:
-    """Resolve a feeder's path that is relative to the file: processes may start elsewhere."""
     feeder = scenario.plant.feeder
     if feeder not in feeders() and is_folder(folder / feeder):
         plant = msgspec.structs.replace(scenario.plant, feeder=str((folder / feeder).resolve()))
@@ -191,8 +173,13 @@ def _feeder_of(scenario: ScenarioModel, problems: Problems, read_feeder: ReadFee
     try:
         feeder = read_feeder(name, load_set)
     except FeederError as error:
-        keys = [_note(problem, Path(name).name, problems) for problem in error.problems]
-        return _any_load_set(name) if keys == ["plant.load_set"] else None
+        keys = {_note(problem, Path(name).name, problems) for problem in error.problems}
+        if keys != {"plant.load_set"}:
+            return None
+        try:  # with another load set than the one that does not exist, to check the rest of the scenario on
+            return read_feeder(name, "main")
+        except FeederError:
+            return None
     if not feeder.inverters:
         problems.add("plant.feeder", f'feeder "{feeder.name}" has no inverters, so there is nothing to control')
         return None
@@ -207,11 +194,3 @@ def _note(problem: str, feeder: str, problems: Problems) -> str:
     else:
         problems.add_plain(f'feeder "{feeder}": {problem}')
     return key
-
-
-def _any_load_set(feeder: str) -> Feeder | None:
-    """The feeder with another load set than the one that does not exist, to check the rest of the scenario on."""
-    try:
-        return read_feeder(feeder)
-    except FeederError:
-        return None

@@ -23,13 +23,12 @@ from gridpeers.wire.wording import suggestion
 
 
 def inverters_of(scenario: ScenarioModel, feeder: Feeder) -> tuple[InverterRow, ...]:
-    """Return the inverters of a scenario: the feeder's, and those of its spare ones that join, in the table's order."""
+    """Return the feeder's inverters, and those of its spare ones that join."""
     joining = {name for event in scenario.events for name in event.join}
     return (*feeder.inverters, *(row for row in feeder.spares if row.name in joining))
 
 
 def schedule_of(scenario: ScenarioModel) -> tuple[ScheduledAction, ...]:
-    """Return the agents that leave and join, in the order of time."""
     actions = []
     for event in scenario.events:
         actions += [ScheduledAction(t=event.t_s, inverter=name, action="leave") for name in event.leave]
@@ -38,12 +37,11 @@ def schedule_of(scenario: ScenarioModel) -> tuple[ScheduledAction, ...]:
 
 
 def without_agent(scenario: ScenarioModel, case: str) -> frozenset[str]:
-    """Return the names of the inverters without an agent in a case: the scenario's and the case's own."""
     return frozenset((*scenario.without_agent, *scenario.cases[case].without_agent))
 
 
 def with_agent(scenario: ScenarioModel, feeder: Feeder, case: str) -> tuple[InverterRow, ...]:
-    """Return the inverters that have an agent in a case, those that join later last, in the table's order."""
+    """Return the inverters that have an agent in a case, those that join later last."""
     without = without_agent(scenario, case)
     return tuple(row for row in inverters_of(scenario, feeder) if row.name not in without)
 
@@ -51,7 +49,7 @@ def with_agent(scenario: ScenarioModel, feeder: Feeder, case: str) -> tuple[Inve
 def check_schedule(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
     """Note agents that leave while absent or join while present, and times that are no ticks."""
     present = {row.name for row in feeder.inverters}
-    known = (*(row.name for row in feeder.inverters), *(row.name for row in feeder.spares))
+    known = [row.name for row in (*feeder.inverters, *feeder.spares)]
     for i, event in enumerate(scenario.events):
         if event.leave or event.join:
             rule = "the period at which agents leave and join"
@@ -75,7 +73,6 @@ def check_schedule(scenario: ScenarioModel, feeder: Feeder, problems: Problems) 
 
 
 def check_simulator(scenario: ScenarioModel, problems: Problems) -> None:
-    """Note a simulator that is not there, what others than ours lack, and what is wrong with their tables."""
     simulator = scenario.plant.simulator
     if simulator != OURS and simulator not in SIMULATORS.names:
         wrong = f"there is no {shown(simulator)}; {suggestion(simulator, SIMULATORS.names, 'choices')}"
@@ -93,22 +90,17 @@ def check_simulator(scenario: ScenarioModel, problems: Problems) -> None:
             f'"{scenario.time.method}" is a method of plant.simulator = "gridpeers"; "{simulator}" has its own time '
             "stepping; leave time.method out",
         )
+    lacks = {"load": "keeps the loads of its own model"} | dict.fromkeys(
+        ("leave", "join"), "lets no inverter leave or join"
+    )
     for i, event in enumerate(scenario.events):
-        for key in ("leave", "join"):
+        for key, why in lacks.items():
             if getattr(event, key):
-                problems.add(
-                    f"event[{i}].{key}",
-                    f'plant.simulator = "{simulator}" lets no inverter leave or join; use simulator = "gridpeers"',
-                )
-        if event.load:
-            problems.add(
-                f"event[{i}].load",
-                f'plant.simulator = "{simulator}" keeps the loads of its own model; use simulator = "gridpeers"',
-            )
+                what = f'plant.simulator = "{simulator}" {why}; use simulator = "gridpeers"'
+                problems.add(f"event[{i}].{key}", what)
 
 
 def check_agentless(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
-    """Note names that there are not, and events and faults that ask for an agent that there is not."""
     names = tuple(row.name for row in inverters_of(scenario, feeder))
     _check_names("without_agent", scenario.without_agent, names, problems)
     moved = {name: event.label for event in scenario.events for name in (*event.leave, *event.join)}
@@ -130,20 +122,14 @@ def check_agentless(scenario: ScenarioModel, feeder: Feeder, problems: Problems)
         for node in (*scenario.netem.nodes, *rule.netem.nodes):
             if node.name in without:
                 problems.add(where, f"an entry [[node]] is about the agent of {node.name}, so it must have one")
-        _check_secondary(f"{path}.secondary", rule.secondary, names, without, problems)
-
-
-def _check_secondary(
-    path: str, secondary: str | tuple[str, ...], names: Sequence[str], without: frozenset[str], problems: Problems
-) -> None:
-    if isinstance(secondary, str) or problems.touch(path):
-        return
-    if not secondary:
-        problems.add(path, 'names no inverter; write secondary = "none"')
-    _check_names(path, secondary, names, problems)
-    for name in secondary:
-        if name in without:
-            problems.add(path, f"{name} has no agent that could run the law; take it out of without_agent, or of here")
+        where = f"{path}.secondary"
+        if isinstance(rule.secondary, str) or problems.touch(where):
+            continue
+        if not rule.secondary:
+            problems.add(where, 'names no inverter; write secondary = "none"')
+        _check_names(where, rule.secondary, names, problems)
+        for name in (name for name in rule.secondary if name in without):
+            problems.add(where, f"{name} has no agent that could run the law; take it out of without_agent, or of here")
 
 
 def _check_names(path: str, given: Sequence[str], known: Sequence[str], problems: Problems) -> None:
@@ -182,12 +168,11 @@ def deaths_of(netem: Netem) -> tuple[ScheduledAction, ...]:
 def _islands_over_time(scenario: ScenarioModel, feeder: Feeder) -> list[tuple[float, dict[str, str]]]:
     times = [0.0, *(event.t_s for event in scenario.events)]
     operations: list[SwitchOperations] = [((), ()), *((event.open, event.close) for event in scenario.events)]
-    timeline = []
-    for t_s, islands in zip(times, islands_after(feeder, operations), strict=True):
-        rows = (*feeder.inverters, *feeder.spares)
-        of = {row.name: next(f"island{i}" for i, island in enumerate(islands) if row.bus in island) for row in rows}
-        timeline.append((t_s, of))
-    return timeline
+    rows = (*feeder.inverters, *feeder.spares)
+    return [
+        (t_s, {row.name: next(f"island{i}" for i, island in enumerate(islands) if row.bus in island) for row in rows})
+        for t_s, islands in zip(times, islands_after(feeder, operations), strict=True)
+    ]
 
 
 def is_calm(netem: Netem) -> bool:
@@ -210,10 +195,7 @@ def with_delays(scenario: ScenarioModel, folder: Path, problems: Problems) -> Sc
 
 
 def check_netem(scenario: ScenarioModel, feeder: Feeder | None, problems: Problems) -> None:
-    """Note unknown links, groups and agents, values that are not plausible, and entries that contradict each other.
-
-    Without a feeder, which could not be read, no name is known, and the rest is checked.
-    """
+    """Note unknown names, values that are not plausible, and contradictory entries; without a feeder all names pass."""
     rows = inverters_of(scenario, feeder) if feeder else ()
     names = tuple(row.name for row in rows) if feeder else None
     microgrids = {row.name: row.microgrid for row in rows}
@@ -221,13 +203,11 @@ def check_netem(scenario: ScenarioModel, feeder: Feeder | None, problems: Proble
     end_s = inf if problems.touch("time.end_s", "time") else scenario.time.end_s
 
     def wrong_in(netem: Netem, noted: set[str]) -> list[Problem]:
-        nodes = [problem for i, node in enumerate(netem.nodes) for problem in _wrong_node(f"node[{i}]", node, T_c)]
-        if scenario.security == "mtls":
-            nodes += [
-                Problem(f"node[{i}].lies.in_name_of", _KEPT_OUT)
-                for i, node in enumerate(netem.nodes)
-                if node.lies is not None and node.lies.in_name_of
-            ]
+        nodes = []
+        for i, node in enumerate(netem.nodes):
+            nodes += _wrong_node(f"node[{i}]", node, T_c)
+            if scenario.security == "mtls" and node.lies is not None and node.lies.in_name_of:
+                nodes.append(Problem(f"node[{i}].lies.in_name_of", _KEPT_OUT))
         return netem.problems(names, microgrids, end_s, noted) + [it for it in nodes if it.path not in noted]
 
     problems.extend(wrong_in(scenario.netem, _noted("", problems)))
@@ -240,7 +220,6 @@ def check_netem(scenario: ScenarioModel, feeder: Feeder | None, problems: Proble
 
 
 def _wrong_node(path: str, node: NodeFault, T_c: float) -> list[Problem]:
-    """Return where an entry does not suit the ticks and the clock of a run."""
     found = []
     ticks = node.from_s / T_c
     if node.kill and (ticks < 0.5 or abs(ticks - round(ticks)) > 1e-6):

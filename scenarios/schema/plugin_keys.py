@@ -29,11 +29,9 @@ from gridpeers.wire.schema.table_reading import read_table
 from gridpeers.wire.wording import is_no_path
 
 OUR_GRAPHS = get_args(GraphRule)
-"""Rules of gridpeers, which need no module."""
 
 
 def law_of(scenario: ScenarioModel, case: str) -> LawChoice:
-    """Return the law of a case: its own, or the scenario's."""
     table = table_of(scenario.cases[case].law or scenario.law)
     choice, _ = read_table(LawChoice, {key: value for key, value in table.items() if key in KEYS})
     return replace(choice, parameters={key: value for key, value in table.items() if key not in KEYS})
@@ -59,12 +57,12 @@ def claims_of(scenario: ScenarioModel) -> list[Plugin]:
 
 
 def judges_laws(scenario: ScenarioModel) -> bool:
-    """Whether a law that fails, fails the run: a scenario may switch that check off."""
+    """Return False if the scenario has switched off the check that fails a run with a law."""
     return LAW_FAILED not in switched_off(scenario.checks)
 
 
 def with_folders(scenario: ScenarioModel, folder: Path) -> ScenarioModel:
-    """Return the scenario as any process can follow it: with the folder of everything that stands beside its file."""
+    """Return the scenario with the folder of all that stands beside its file, so that any process can find it."""
 
     def change(key: PluginKey, registry: Registry[Any]) -> PluginKey:
         named = _labelled(key, registry) if registry in (METRICS, CHECKS) else key
@@ -74,7 +72,7 @@ def with_folders(scenario: ScenarioModel, folder: Path) -> ScenarioModel:
 
 
 def with_keys(scenario: ScenarioModel, change: Callable[[PluginKey, Registry[Any]], PluginKey]) -> ScenarioModel:
-    """Return the scenario with a change of every key that names something plugged in, given key and registry."""
+    """Return the scenario with every key changed that names something plugged in."""
     cases = {
         name: replace(
             case,
@@ -123,17 +121,12 @@ def _labelled(key: PluginKey, registry: Registry[Any]) -> PluginKey:
 
 
 def check_benchmark(scenario: ScenarioModel, problems: Problems) -> None:
-    """Note a benchmark that is not there.
-
-    One that is known by name is not imported before a run is judged: to read a scenario takes no numpy.
-    """
-    key = scenario.paper
+    key = scenario.paper  # one known by name is not imported before a run is judged: to read a scenario takes no numpy
     if not problems.touch("paper") and key and not (isinstance(key, str) and key in BENCHMARKS.names):
         _check("paper", key, BENCHMARKS, problems)
 
 
 def check_measures(scenario: ScenarioModel, problems: Problems) -> None:
-    """Note metrics, claims and checks that there are not, or cannot be made with their keys, and two of one name."""
     _check_named("metrics", scenario.metrics, METRICS, ALWAYS, problems)
     for i, key in enumerate(scenario.claims):
         _check(f"claims[{i}]", key, CLAIMS, problems)
@@ -143,7 +136,6 @@ def check_measures(scenario: ScenarioModel, problems: Problems) -> None:
 def _check_named(
     field: str, keys: Sequence[PluginKey], registry: Registry[Any], always: Collection[str], problems: Problems
 ) -> None:
-    """Note problems of the entries of a list whose names stand in tables beside those that every run has."""
     names: list[str] = []
     for i, key in enumerate(keys):
         path, table = f"{field}[{i}]", table_of(key)
@@ -170,7 +162,6 @@ def _check_named(
 
 
 def check_laws(scenario: ScenarioModel, problems: Problems) -> None:
-    """Note laws that cannot run, and gains and weights of another law than the case has."""
     _check_law("law", scenario.law, problems)
     for name, case in scenario.cases.items():
         path = f"case.{name}.law"
@@ -188,7 +179,6 @@ def check_laws(scenario: ScenarioModel, problems: Problems) -> None:
 
 
 def check_graphs(scenario: ScenarioModel, feeder: Feeder | None, problems: Problems) -> None:
-    """Note rules that there are not, and that fail on a roster which the scenario will have."""
     for name, case in scenario.cases.items():
         path = f"case.{name}.graph"
         if problems.touch(path):
@@ -205,16 +195,10 @@ def check_graphs(scenario: ScenarioModel, feeder: Feeder | None, problems: Probl
 
 
 def check_portable(scenario: ScenarioModel, *, measures: bool = False) -> list[str]:
-    """Return a sentence for everything in a checked scenario's cases that no other process could import.
-
-    With `measures`, processes measure too, as those of a sweep do; those of a run do not.
-    """
+    """Return a sentence for all that no other process could import; with `measures`, the processes measure too."""
     found = []
     for name, case in scenario.cases.items():
-        used: list[tuple[Registry[Any], str]] = [
-            (LAWS, law_of(scenario, name).use),
-            (GRAPHS, plugin_of(case.graph).use),
-        ]
+        used: list[tuple[Registry[Any], str]] = [(LAWS, law_of(scenario, name).use), (GRAPHS, graph_of(case)[0])]
         used += [(FAULTS, it.use) for fault in (*scenario.netem.links, *case.netem.links) for it in fault.own]
         used += [(METRICS, metric.use) for _, metric in metrics_of(scenario) if measures]
         for registry, use in used:
@@ -234,12 +218,9 @@ def _check_law(path: str, key: PluginKey, problems: Problems) -> None:
 def _check(path: str, key: PluginKey, registry: Registry[Any], problems: Problems) -> Plugin | None:
     """Note the problems of a key and of its plugin; return the plugin if there are none."""
     table = table_of(key)
-    found: list[tuple[str, str]] = []
-    for name in ("use", "folder"):
-        if not isinstance(table.get(name, ""), str):
-            found.append((name, "must be a text in quotes"))
-        elif is_no_path(table.get(name, "")):
-            found.append((name, "can be no name of a module or folder"))
+    names = [(name, table.get(name, "")) for name in ("use", "folder")]
+    found = [(name, "must be a text in quotes") for name, value in names if not isinstance(value, str)]
+    found = found or [(name, "can be no name of a module or folder") for name, value in names if is_no_path(value)]
     if not found and not table.get("use"):
         found.append(("", f'names no {registry.kind}; write e.g. {{ use = "mine:Name" }}'))
     found = found or [(name, text) for name, value in table.items() if (text := scalar_objection(value))]
@@ -251,7 +232,7 @@ def _check(path: str, key: PluginKey, registry: Registry[Any], problems: Problem
 
 
 def _rosters(scenario: ScenarioModel, feeder: Feeder, case: str) -> Iterator[dict[str, InverterRow]]:
-    """Yield the nameplates of those that take part at the start, and after each event at which agents leave or join."""
+    """Yield the nameplates at the start, and after each event at which agents leave or join."""
     rows = with_agent(scenario, feeder, case)
     present = {row.name for row in rows if not row.spare}
     yield {row.name: row for row in rows if row.name in present}

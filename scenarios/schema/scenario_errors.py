@@ -20,11 +20,7 @@ _KEY = re.compile(r"""^\s*([A-Za-z0-9_\-."'\[\] ]+?)\s*=""")
 
 
 class ScenarioError(ValueError):
-    """A scenario that cannot be run.
-
-    `problems` has a sentence each, with file, line, key, value and what would be right; what cannot be printed is spelt
-    out.
-    """
+    """A scenario that cannot be run; `problems` has a sentence each: file, line, key, value and what would be right."""
 
     def __init__(self, problems: Iterable[str]) -> None:
         self.problems = tuple(map(printable, problems))
@@ -32,11 +28,7 @@ class ScenarioError(ValueError):
 
 
 class Problems:
-    """Collect the problems of one file, whose text gives the lines of its keys.
-
-    A problem in or below a key that was `changed` since, in Python, has no line, nor has one in a table around it that
-    the file does not write.
-    """
+    """Collect the problems of one file, whose text gives the lines of its keys, but for keys `changed` in Python."""
 
     def __init__(self, file: str, text: str = "", changed: Collection[str] = ()) -> None:
         self.file = file
@@ -61,12 +53,11 @@ class Problems:
         self._found.append((line, f"{where}: {path}: {text}" if path else f"{where}: {text}"))
 
     def extend(self, found: Iterable[Problem], prefix: str = "") -> None:
-        """Note problems of a table, whose keys stand behind a prefix."""
         for path, text in found:
             self.add(prefix + path, text)
 
     def unknown(self, path: str, kind: str, name: str, known: Collection[str]) -> bool:
-        """Whether there is no inverter, event or other thing of a name, which is noted with the nearest name."""
+        """Return True if there is no inverter, event or other thing of a name; it is noted with the nearest name."""
         if name not in known:
             self.add(path, f'no {kind} "{name}"; {suggestion(name, known, f"{kind}s")}')
         return name not in known
@@ -77,7 +68,7 @@ class Problems:
         self.noted.append(("", text))
 
     def touch(self, *paths: str) -> bool:
-        """Whether a problem was noted at one of these keys, which makes a check that relates them idle."""
+        """Return True if a problem was noted at one of these keys: a check that relates them is idle then."""
         return any(path in self._paths for path in paths)
 
     def below(self, path: str) -> bool:
@@ -88,7 +79,6 @@ class Problems:
         return frozenset(self._paths)
 
     def read(self, struct: type[T], data: Mapping[str, Any]) -> T:
-        """Return a file's tables as a struct, of use only while nothing is noted."""
         table, problems = read_table(struct, data)
         self.extend(problems)
         return table

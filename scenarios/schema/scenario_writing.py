@@ -19,8 +19,7 @@ def to_toml(
 ) -> str:
     """Return every key of a scenario, defaults included, and the table `[as_run]`; if `terse`, what is no default.
 
-    Defaults are written out because they may differ in a later version; the text can be run again as it is. The remarks
-    become comments at its head.
+    Defaults are written out because they may differ in a later version. The remarks become comments at the head.
     """
     return "".join(toml_lines(scenario, as_run, remarks, terse=terse))
 
@@ -48,7 +47,7 @@ def toml_lines(
 def _lines(
     struct: msgspec.Struct, path: str, common: ScenarioModel, *, entry: bool = False, terse: bool = False
 ) -> tuple[list[str], Iterator[str]]:
-    """Return the keys of a table, and the tables below it, as TOML wants them ordered; no case repeats a common table.
+    """Return the keys of a table, and the tables below it; no case repeats a common table.
 
     Tables below an entry of a list are written on its lines.
     """
@@ -102,7 +101,6 @@ def _key(name: str) -> str:
 
 
 def inline(value: Any) -> str:
-    """Write a value that may be a table or a list of them on one line."""
     if isinstance(value, dict):
         return "{ " + ", ".join(f"{_key(key)} = {inline(below)}" for key, below in value.items()) + " }"
     if isinstance(value, tuple | list):

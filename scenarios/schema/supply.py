@@ -35,7 +35,6 @@ def powers_after(scenario: ScenarioModel, feeder: Feeder) -> Iterator[tuple[Even
 
 
 def check_loads(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
-    """Note loads that there are not, that an event names twice, and powers that none of them can have."""
     powers, now = _load_powers(scenario, feeder), dict[str, complex]()
     for i, event in enumerate(scenario.events):
         named: set[str] = set()
@@ -72,10 +71,11 @@ _SHOWN = 6
 
 
 class SupplyState(NamedTuple):
-    """Supply of the feeder from an event on: de-energised nodes, islands, and inverters on the network."""
+    """Supply of the feeder from an event on."""
 
     event: Event | None
     dead: frozenset[Node]
+    """De-energised nodes."""
     new: frozenset[Node]
     """Those of them that were fed until then."""
     islands: tuple[frozenset[Node], ...]
@@ -84,7 +84,6 @@ class SupplyState(NamedTuple):
 
 
 def check_supply(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
-    """Note a problem if at t = 0 nothing feeds a load, or an inverter has no leader."""
     start = next(supply_states(scenario, feeder))
     if what := _what(start.dead, start.inverters, feeder):
         problems.add(
@@ -95,11 +94,7 @@ def check_supply(scenario: ScenarioModel, feeder: Feeder, problems: Problems) ->
 
 
 def supply_notes(scenario: ScenarioModel, feeder: Feeder) -> tuple[str, ...]:
-    """Sentences on what each event of a checked scenario de-energises or overloads; it may be meant, so is no problem.
-
-    Switches, loads, and the leaving and joining of inverters decide. An agent that only dies leaves its inverter where
-    it is.
-    """
+    """Return sentences on what each event of a checked scenario de-energises or overloads: it may be meant."""
     notes, rows = [], inverters_of(scenario, feeder)
     after = (with_powers(feeder, powers) if powers else feeder for _, powers in powers_after(scenario, feeder))
     for state, loaded in zip(supply_states(scenario, feeder), chain([feeder], after), strict=True):
@@ -123,7 +118,6 @@ def supply_notes(scenario: ScenarioModel, feeder: Feeder) -> tuple[str, ...]:
 
 
 def supply_states(scenario: ScenarioModel, feeder: Feeder) -> Iterator[SupplyState]:
-    """Yield the supply of the feeder at t = 0 and after each event."""
     graph = Connectivity(feeder)
     closed = graph.closed_at_start()
     names = {name: switch.name for switch in feeder.switches for name in switch.names}
