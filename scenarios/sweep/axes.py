@@ -22,14 +22,11 @@ Edges = tuple[tuple[int, int], ...]
 """Pairs i < j, sorted."""
 
 TRIES = 200
-"""Draws per graph that is asked for, until it is held that there are no more different ones."""
+"""Draws per graph that is asked for, until no more different ones are expected."""
 
 
 def connected_graphs(n: int, links: int, count: int, seed: int) -> tuple[Edges, ...]:
-    """Return different connected graphs of n nodes, drawn one after the other, each number with its own stream.
-
-    So the first graphs stay the same when more are asked for. There are fewer than `count` where so many do not exist.
-    """
+    """Return different connected graphs of n nodes, each drawn from its own stream; fewer where no more exist."""
     most = 1 if links == n * (n - 1) // 2 else count
     found: dict[Edges, None] = {}
     for i in range(TRIES * count):
@@ -81,12 +78,11 @@ class Setting(NamedTuple):
 
 @dataclass(frozen=True)
 class Axis:
-    """Keys that vary together."""
+    """Keys that vary together; its points are of use only when no problem is noted."""
 
     origin: Mapping[str, str]
     """Key of the sweep file by key of the scenario."""
     settings: Callable[[], Sequence[Setting]]
-    """Makes the points; of use only when no problem is noted."""
 
 
 def samples(settings: Iterable[Sequence[Setting]]) -> Iterator[Setting]:
@@ -113,7 +109,6 @@ def grid_axes(table: Mapping[str, Any], problems: Problems) -> list[Axis]:
 
 
 def zip_axes(table: Mapping[str, Any], problems: Problems) -> list[Axis]:
-    """Return the one axis of the keys of `[zip]`, or none; they have equally many values."""
     values = _values_of(table, "zip", problems)
     counts = {path: len(items) for path, items in values.items()}
     if len(set(counts.values())) > 1 and all(counts.values()):
@@ -125,7 +120,6 @@ def zip_axes(table: Mapping[str, Any], problems: Problems) -> list[Axis]:
 
 
 def graph_axes(axis: GraphAxis, inverters: Sequence[str], cases: Sequence[str], problems: Problems) -> list[Axis]:
-    """Return the one axis of random graphs, or none; each number of links can join the inverters."""
     n = len(inverters)
     low, high = n - 1, n * (n - 1) // 2
     for i, links in enumerate(axis.links):
@@ -139,7 +133,6 @@ def graph_axes(axis: GraphAxis, inverters: Sequence[str], cases: Sequence[str], 
 
 
 def _graphs(axis: GraphAxis, inverters: Sequence[str], cases: Sequence[str]) -> Sequence[Setting]:
-    """Draw the graphs; each is put into every case as its listed links."""
     points = []
     for links in axis.links:
         for number, edges in enumerate(connected_graphs(len(inverters), links, axis.per_count, axis.seed)):
@@ -159,7 +152,6 @@ _RANGE = tuple(field.key for field in fields_of(ValueRange))
 
 
 def _values_of(table: Mapping[str, Any], where: str, problems: Problems) -> dict[str, list[Any]]:
-    """Return the values of each key of `[grid]` or `[zip]`; a key with a problem has none."""
     found: dict[str, list[Any]] = {}
     for path, value in flatten(table, _is_range):
         at, found[path] = f"{where}.{path}", []
@@ -181,13 +173,9 @@ def _values_of(table: Mapping[str, Any], where: str, problems: Problems) -> dict
 
 
 def _twice(items: Sequence[Any]) -> Any:
-    """Return the first item that comes again, or None; items are compared as written, as lists are among them."""
-    seen: set[str] = set()
-    for item in items:
-        if repr(item) in seen:
-            return item
-        seen.add(repr(item))
-    return None
+    """Return the first item that comes again, or None; lists among them are compared as written."""
+    written = list(map(repr, items))
+    return next((item for i, item in enumerate(items) if written[i] in written[:i]), None)
 
 
 def is_number(value: Any) -> bool:
@@ -203,8 +191,6 @@ DISTRIBUTIONS = ("uniform", "loguniform", "choice")
 
 @dataclass(frozen=True)
 class Distribution:
-    """How one key is drawn."""
-
     name: str
     of: Sequence[Any]
     """Bounds, or the choices."""
@@ -217,7 +203,6 @@ class Distribution:
         return float(f"{raw:.12g}")
 
     def problem(self) -> str:
-        """Return the problem of the bounds or the choices; "" if there is none."""
         of = self.of
         if self.name == "choice":
             return "" if isinstance(of, list) and of else f"choice needs a list of values, got {of!r}"
@@ -229,7 +214,6 @@ class Distribution:
 
 
 def random_axes(axis: RandomAxis, problems: Problems) -> list[Axis]:
-    """Return the one axis of the keys of `[random.keys]`, which are drawn together, or none."""
     keys = {path: _distribution(path, value, problems) for path, value in flatten(axis.keys, _is_distribution)}
     if keys and not axis.samples and not problems.touch("random.samples"):
         problems.add("random.samples", "no sample is drawn; write how many, e.g. samples = 100")
@@ -239,7 +223,6 @@ def random_axes(axis: RandomAxis, problems: Problems) -> list[Axis]:
 
 
 def draw(axis: RandomAxis, keys: Mapping[str, Distribution]) -> Sequence[Setting]:
-    """Draw the samples: `scipy.stats.qmc.LatinHypercube`, or independent uniform numbers."""
     if axis.method == "latin-hypercube":
         from scipy.stats import qmc  # takes longer to import than a run takes
 
@@ -254,9 +237,7 @@ def _distribution(path: str, value: Any, problems: Problems) -> Distribution:
     """Return the distribution of a key, of use only when no problem is noted."""
     name, of = next(iter(value.items()), ("", ())) if isinstance(value, Mapping) else ("", ())
     if name not in DISTRIBUTIONS or len(value) != 1:
-        wrong = next((key for key in value if key not in DISTRIBUTIONS), "") if isinstance(value, Mapping) else ""
-        hint = f"the distributions are {', '.join(DISTRIBUTIONS)}"
-        hint = suggestion(wrong, DISTRIBUTIONS, "distributions") if wrong else hint
+        hint = suggestion(name, DISTRIBUTIONS, "distributions")
         text = f"must be one distribution such as {{ uniform = [0.5, 2.0] }}, got {value!r}; {hint}"
     else:
         text = Distribution(name, of).problem()

@@ -24,27 +24,20 @@ class PathError(ValueError):
 
 
 def steps(path: str) -> list[str | int]:
-    """Return the steps of a path through tables (by name) and lists (by number); PathError if it is none."""
     if not _PATH.fullmatch(path):
         raise PathError("is no path of a key; write it as gains.k_p, case.IV.graph or event[0].t_s")
     return [int(number) if number else name for number, name in re.findall(r"\[(\d+)\]|([^.\[\]]+)", path)]
 
 
 def put(tree: Tree, path: str, value: Any) -> None:
-    """Set a key in the tables of a scenario, making a table that is left to its defaults.
-
-    PathError if a list has no such entry, or a table that the user names (a case) is not there and is not given whole.
-    """
+    """Set a key in a scenario; PathError if a list has no such entry, or a new case is not given whole."""
     way = steps(path)
     node, last = _parent(tree, way, whole=isinstance(value, Mapping)), way[-1]
     node[last] = value
 
 
 def remove(tree: Tree, path: str) -> None:
-    """Take a key, a table or an entry out of the tables of a scenario; a key that is not written stays so.
-
-    PathError if a list has no such entry, or a table that the user names (a case) is not there.
-    """
+    """Take a key, a table or an entry out of the tables of a scenario, if it is written; PathError as of `put`."""
     way = steps(path)
     node, last = _parent(tree, way, whole=False), way[-1]
     if isinstance(last, int) or last in node:
@@ -52,21 +45,15 @@ def remove(tree: Tree, path: str) -> None:
 
 
 def _parent(tree: Tree, way: list[str | int], *, whole: bool) -> Any:
-    """Return the table or list that the last step of a way is in, made if it is left to its defaults.
-
-    A table that the user names may be new if it is given as a `whole`.
-    """
+    """Return the table or list that the last step of a way is in, made if it is left to its defaults."""
     node: Any = tree
     for depth, (step, following) in enumerate(zip(way, [*way[1:], None], strict=True)):
         here = _written(way[: depth + 1])
         if isinstance(step, int):
             if not isinstance(node, list) or step >= len(node):
-                count = len(node) if isinstance(node, list) else 0
-                of = here.rpartition("[")[0]
-                there = f"there are {of}[0] to {of}[{count - 1}]" if count > 1 else f"there is {of}[0] alone"
-                raise PathError(
-                    f"there is no {here}; {there if count else f'the scenario writes none: give {of} as a list first'}"
-                )
+                count, of = len(node) if isinstance(node, list) else 0, here.rpartition("[")[0]
+                there = f"{of} has {count} entries, from {of}[0]" if count else f"give {of} as a list first"
+                raise PathError(f"there is no {here}; {there}")
         elif not isinstance(node, dict):
             raise PathError(f"{_written(way[:depth])} is no table, so that it has no key {step}")
         elif depth == 1 and way[0] in _named_tables() and step not in node and not (whole and following is None):
@@ -80,12 +67,8 @@ def _parent(tree: Tree, way: list[str | int], *, whole: bool) -> Any:
     return node
 
 
-def _no_leaf(_: Any) -> bool:
-    return False
-
-
 def flatten(
-    table: Mapping[str, Any], is_leaf: Callable[[Any], bool] = _no_leaf, path: str = ""
+    table: Mapping[str, Any], is_leaf: Callable[[Any], bool] = lambda value: False, path: str = ""
 ) -> Iterator[tuple[str, Any]]:
     """Return keys with their values, whether the path was written in quotes or is nested tables of TOML."""
     for key, value in table.items():
@@ -103,6 +86,6 @@ def _written(way: list[str | int]) -> str:
 
 @cache
 def _named_tables() -> frozenset[str]:
-    """Return the keys of the scenario below which the user names the tables himself; a new name there is a slip."""
+    """Return the keys of the scenario below which the user names the tables; a new name there is a slip."""
     fields = msgspec.structs.fields(ScenarioModel)
     return frozenset(field.encode_name for field in fields if typing.get_origin(field.type) is dict)

@@ -34,15 +34,11 @@ MANIFEST = "sweep.json"
 
 
 def folder_of(out: Path | None, name: str) -> Path:
-    """Return the folder of a sweep: the same every time, so that the same command resumes it."""
     return RUNS / "sweeps" / name if out is None else out
 
 
 class SweepFolder:
-    """The folder of one sweep, locked while it is open: new, empty, or this sweep's from before.
-
-    FolderError, with nothing changed, if it belongs to something else, was begun with other versions, or is in use.
-    """
+    """The folder of one sweep, locked while it is open: new, empty, or this sweep's from before; else FolderError."""
 
     def __init__(self, folder: Path, plan: Plan) -> None:
         self.path, self._size = folder, len(plan.runs)
@@ -78,7 +74,7 @@ class SweepFolder:
 
     @property
     def kept(self) -> int:
-        """Number of finished runs that will be found again; Ctrl-C can come between keeping a run and counting it."""
+        """Number of finished runs that will be found again."""
         return len(self._kept_rows())
 
     def add(self, done: SweepRow) -> None:
@@ -94,13 +90,12 @@ class SweepFolder:
         return rows_in(self.path, SweepRow, self._problem) if journal.exists() else {}
 
     def _problem(self, row: SweepRow) -> str:
-        """Return why a run is none of this sweep; "" if it is one."""
         last = self._size - 1
         return "" if 0 <= row.number <= last else f"this sweep has runs 0 to {last}, none {row.number}; remove the line"
 
 
 def _check(folder: Path, whole: Mapping[str, object]) -> bool:
-    """Return whether the folder is this sweep's from before; FolderError if it is something else's."""
+    """Return True if the folder is this sweep's from before; FolderError if it is something else's."""
     where = f"--out {shown(folder)}"
     if folder.exists() and not folder.is_dir():
         raise FolderError(f"{where}: this is a file; give a folder")
@@ -123,8 +118,9 @@ def _check(folder: Path, whole: Mapping[str, object]) -> bool:
             "give another folder by --out, or remove this one"
         )
     now = _versions()
-    other = [f"{key} {was}, here is {now.get(key, 'none')}" for key, was in made_with.items() if now.get(key) != was]
-    if other:
+    if other := [
+        f"{key} {was}, here is {now.get(key, 'none')}" for key, was in made_with.items() if now.get(key) != was
+    ]:
         raise FolderError(
             f"{where}: was begun with {'; '.join(other)}: rows of both would not compare to the last digit; go on with "
             "the same versions, or begin in another folder by --out"
@@ -133,7 +129,7 @@ def _check(folder: Path, whole: Mapping[str, object]) -> bool:
 
 
 def _versions() -> dict[str, str]:
-    """Return the versions that the numbers depend on; Zenoh has no part in a run in one process."""
+    """Return the versions that the numbers depend on: Zenoh has no part in a run in one process."""
     return {name: version for name, version in versions().items() if name != "eclipse-zenoh"}
 
 
@@ -150,11 +146,7 @@ class Summary:
 
 
 def study(plan: Plan, folder: SweepFolder, tell: Callable[[int], None], *, jobs: int, dask: str = "") -> Summary:
-    """Do the runs of a sweep that are not done yet, and write its results.
-
-    `tell` is called with the number of runs that are done, those from before included. `jobs` processes of this machine
-    do them, or the workers of the Dask scheduler at an address.
-    """
+    """Do the runs of a sweep that are not done yet, and write its results; `tell` hears how many are done by now."""
     before = len(folder.done)
     tell(before)
     left = [(i, run.scenario, run.case) for i, run in enumerate(plan.runs) if i not in folder.done]

@@ -1,8 +1,4 @@
-"""One run of a sweep, in whatever process it is done: from a checked scenario to a row of numbers.
-
-Nothing that a run can do ends the sweep: a plant without solution, and an error of the program too, is a row that
-says why.
-"""
+"""One run of a sweep: from a checked scenario to a row of numbers; an error, too, is a row that says why."""
 
 from __future__ import annotations
 
@@ -34,7 +30,7 @@ from gridpeers.scenarios.schema.plugin_keys import judges_laws
 from gridpeers.wire.wording import utf8
 
 KEPT_PLANTS = 4
-"""Plants at t = 0 that a worker keeps. One is about 1 MB; a sweep that leaves the plant as it is needs but one."""
+"""Plants at t = 0 that a worker keeps; one is about 1 MB."""
 
 
 class _Kept(threading.local):
@@ -53,8 +49,8 @@ class SweepRow(msgspec.Struct, frozen=True, kw_only=True):
     number: int
     """Its place in the plan, from 0."""
     status: Literal["ran", "broke", "law failed"]
-    """Whether it reached its end under its laws. Where one failed there are no measures, which would be droop's; a
-    scenario that switches the check "law_failed" off wants them, and the status is "ran"."""
+    """Where a law failed there are no measures, which would be droop's, unless the scenario has switched the check
+    "law_failed" off: then the status is "ran"."""
     why: str = ""
     history_sha256: str = ""
     """Of the bytes that history.csv would have."""
@@ -67,9 +63,8 @@ class SweepRow(msgspec.Struct, frozen=True, kw_only=True):
     link_warnings: str = ""
     """Accounts of emulated links that do not close, and plugged-in faults that failed; "" if there are none."""
     measures: dict[str, float | None] = {}
-    """Every index of every event's window, e.g. "event1.MPSI", None where it is not a number, or never came to be;
-    "event1.steady", 1 where all of them are steady values, else 0;
-    and over all emulated links how many messages fared how, e.g. "links_dropped"."""
+    """Every index of every event's window, e.g. "event1.MPSI", None where it never came to be; "event1.steady", 1 where
+    all of them are steady values, else 0; and messages over all emulated links, e.g. "links_dropped"."""
 
 
 FATE = ("status", "why", "trips", "link_warnings", "history_sha256", "links_sha256", "metric_warnings")
@@ -144,7 +139,6 @@ def _indexes(found: Findings, case: str, label: str) -> dict[str, Any]:
 
 
 def _accounts(links: LinkRecord) -> dict[str, float | None]:
-    """Return messages over all emulated links together; nothing where there are none."""
     books = links.counts.values()
     if not books:
         return {}
@@ -166,11 +160,7 @@ def flat(label: str, values: dict[str, Any]) -> dict[str, float | None]:
 
 
 def plant_at_start(config: PlantConfig) -> Plant:
-    """Return a plant at t = 0, copied from one that this thread has built before for the same settings.
-
-    To factor the network and find the operating point is a fifth of a run, and does not depend on the agents.
-    A copy gives the same bytes as a new plant: a test holds it to that.
-    """
+    """Return a plant at t = 0, copied from one that this thread has built before: that saves a fifth of a run."""
     plants = _kept.plants
     key = msgspec.json.encode((config.settings, config.T_c, config.record_step))  # tables in it have no hash
     plants[key] = plants.pop(key) if key in plants else build_plant(config)  # the latest is the last

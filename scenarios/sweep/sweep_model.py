@@ -26,7 +26,6 @@ class ValueRange(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     """Whether their differences or their ratios are equal."""
 
     def relations(self) -> list[Problem]:
-        """Return the problems of its values beside each other."""
         if self.low == self.high:
             return [Problem("", f"a range goes from one number to another, got {self.low:g} twice")]
         if self.spacing == "log" and min(self.low, self.high) <= 0:

@@ -1,10 +1,8 @@
 """Plots of a sweep, chosen by the varied parameters.
 
 One parameter: each index against it, median and range over all the rest (seeds, graphs). Two on a grid: a heat map of
-the medians. More, or drawn at random: each parameter by itself, with a point per run. Where the axis is a text, its
-values stand side by side. A case is a colour and a dash of Okabe and Ito's palette; heat maps are in cividis, made for
-colour-blind readers. A time that never came counts as later than all others, and its number is written down;
-other indexes of runs that broke are left out.
+the medians. More, or drawn at random: each parameter by itself, with a point per run. A time that never came counts as
+later than all others, and its number is written down; other indexes of runs that broke are left out.
 """
 
 from __future__ import annotations
@@ -37,7 +35,7 @@ REPEATS = ("sample", "case", "seed", "graph.number", "graph.lambda_2", "graph.ed
 
 
 def is_number(column: pd.Series) -> bool:
-    """Return whether a column holds numbers alone; truth values are none."""
+    """Return True if a column holds numbers alone; truth values are none."""
     return bool(is_numeric_dtype(column) and not is_bool_dtype(column))
 
 
@@ -100,7 +98,6 @@ _NEVER = "#b0b0b0"
 
 
 def draw_all(frame: pd.DataFrame, folder: Path) -> tuple[Path, ...]:
-    """Draw every figure of a sweep into a folder; none when no run reached its end, or nothing but seeds is varied."""
     drawn = []
     with mpl.rc_context(PAGE):
         for window, axes in product(indexes_of(frame), figures_of(frame)):
@@ -139,7 +136,6 @@ def curves(frame: pd.DataFrame, window: str, x: str) -> Figure:
 
 
 def _curve(panel: Axes, spread: pd.DataFrame, case: str, number: int, at: pd.Series, y: pd.Series) -> None:
-    """Draw median and range of one case over a number, with a point per run where the number was drawn."""
     colour, dashes = STYLES[number % len(STYLES)]
     x, median = spread.index.to_numpy(), spread["median"].where(np.isfinite(spread["median"]))
     panel.fill_between(x, spread["low"], spread["high"], color=colour, alpha=0.18, linewidth=0)
@@ -181,7 +177,7 @@ def heat_maps(frame: pd.DataFrame, window: str, x: str, y: str, case: str) -> Fi
 
 
 def _colours(medians: Any, index: str) -> tuple[float, float]:
-    """Return the ends of the scale of colours: those of the values, but so far apart that rounding has one colour."""
+    """Return the ends of the scale of colours, so far apart that rounding has one colour."""
     least = INDEXES[index].least if index in INDEXES else 0.0
     if not medians.count():
         return 0.0, least or 1.0

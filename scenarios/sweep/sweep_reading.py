@@ -65,7 +65,6 @@ class Plan:
 
 
 def fingerprint(runs: Iterable[Run], feeders: Iterable[Feeder]) -> str:
-    """Return the hash of runs and feeders; comments and layout of the files do not change it."""
     whole = hashlib.sha256()
     for run in runs:
         whole.update(msgspec.json.encode((run.sample, run.case, run.scenario, dict(run.shown))))
@@ -96,7 +95,7 @@ def checked_runs(
 ) -> tuple[list[Run], Sequence[Feeder]]:
     """Check every sample, and return its runs and all feeders; both are of use only when no problem is noted.
 
-    Each problem is noted at the key of the sweep file that it comes from: `origin`, by key of the scenario.
+    Each problem is noted at its `origin`, the key of the sweep file by key of the scenario.
     """
     runs: list[Run] = []
     feeders: dict[tuple[str, str], Feeder] = {}
@@ -153,19 +152,12 @@ def sweeps() -> tuple[str, ...]:
 
 
 def sweep_title(name: str) -> str:
-    """Return the title of a sweep of the catalogue, without checking its runs.
-
-    >>> sweep_title("gains")
-    'Gains k_p and k_q of the secondary law'
-    """
+    """Return the title of a sweep of the catalogue, without checking its runs."""
     return str(read_toml(SWEEPS / f"{name}.toml")[1]["title"])
 
 
 def read_sweep(name: str | Path) -> Plan:
-    """Read a sweep and check every sample's scenario before anything is started.
-
-    ScenarioError has every problem of the sweep file, of its scenario and of its samples.
-    """
+    """Read a sweep; ScenarioError has every problem of its file, its scenario and its samples."""
     path = find_file(str(name), SWEEPS, "sweep")
     text, data = read_toml(path)
     problems = Problems(path.name, text)
@@ -182,7 +174,6 @@ def plan_of(sweep: Sweep, base: BaseScenario) -> Plan:
 
 
 def _own_axes(sweep: Sweep, problems: Problems) -> list[Axis]:
-    """Return the axes that need no scenario, the slowest first, and note the file's own problems."""
     for problem in problems_of(sweep):
         problems.add(*problem)
     axes = [*grid_axes(sweep.grid, problems), *zip_axes(sweep.zip, problems), *random_axes(sweep.random, problems)]
@@ -192,7 +183,7 @@ def _own_axes(sweep: Sweep, problems: Problems) -> list[Axis]:
 
 
 def _base(sweep: Sweep, path: Path, problems: Problems) -> BaseScenario:
-    """Return the scenario that is varied; without it nothing more can be checked, and all that was noted is raised."""
+    """Return the scenario that is varied; without it all that was noted is raised."""
     beside = path.parent / sweep.scenario
     try:
         base = beside if sweep.scenario and beside.is_file() else find_scenario(sweep.scenario)

@@ -25,10 +25,7 @@ _SUFFIXES = ("s", "Hz", "pu", "W", "var", "V")
 class IndexAxis(NamedTuple):
     label: str
     least: float
-    """Least length, in the index's unit: smaller differences are rounding, or too small to see.
-
-    Settled indexes have the last digit that the paper prints, times a usual control period.
-    """
+    """Least length, in the index's unit: smaller differences are rounding, or too small to see."""
 
 
 INDEXES = {
@@ -66,10 +63,7 @@ def unit_of(name: str) -> str:
 
 
 def label_of(name: str) -> str:
-    """Return words for an axis, with the unit.
-
-    A key whose field has no `Label` is named by its last part and its table.
-    """
+    """Return words for an axis, with the unit: those of the field's `Label`, or the key's last part and its table."""
     if (index := name.rpartition(".")[2]) in INDEXES:
         return INDEXES[index].label
     key, case = _apart(name)
@@ -82,7 +76,6 @@ def label_of(name: str) -> str:
 
 
 def _apart(name: str) -> tuple[str, str]:
-    """Return the key of a column without its case and its numbers in lists, and the case."""
     case = re.match(r"case\.([^.]+)\.", name)
     return re.sub(r"\[\d+\]", "", name[case.end() :] if case else name), case[1] if case else ""
 
@@ -101,7 +94,6 @@ def _field_at(key: str) -> Field | None:
 
 
 def _struct_in(annotation: Any) -> type[msgspec.Struct] | None:
-    """Return the struct that a field is, or has in a list or as an option."""
     if isinstance(annotation, type) and issubclass(annotation, msgspec.Struct):
         return annotation
     return next((found for part in typing.get_args(annotation) if (found := _struct_in(part))), None)
@@ -132,17 +124,12 @@ def results_frame(plan: Plan, done: Mapping[int, SweepRow]) -> pd.DataFrame:
 
 
 def as_written(frame: pd.DataFrame, plan: Plan) -> pd.DataFrame:
-    """Return the table with parameters that are neither numbers nor texts as JSON."""
     mixed = [name for name in plan.parameters if frame[name].dtype == object]
     return frame.assign(**{name: [json.dumps(value, default=str) for value in frame[name]] for name in mixed})
 
 
 def write_table(frame: pd.DataFrame, plan: Plan, folder: Path) -> Path:
-    """Write a table at once or not at all.
-
-    Each column's metadata has its unit; the file's has the sweep file, the base scenario with all defaults, and the
-    versions.
-    """
+    """Write a table at once or not at all; its metadata has units, sweep file, base scenario and versions."""
     import pyarrow as pa  # of the extra `sweep`; a sweep in Python does without
     import pyarrow.parquet as pq
 

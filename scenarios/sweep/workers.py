@@ -1,7 +1,7 @@
 """Many runs, as of a sweep: in this process, over all cores of this machine, or over a Dask cluster by joblib.
 
-Ctrl-C is for the command alone: workers of this machine are started with SIGINT blocked, and they are ended when the
-command leaves. Workers write nothing to the terminal: a run's error comes as its result.
+Ctrl-C is for the command alone: workers are started with SIGINT blocked, and ended when the command leaves. They write
+nothing to the terminal: a run's error comes as its result.
 """
 
 from __future__ import annotations
@@ -38,18 +38,12 @@ def cores() -> int:
 
 
 def on_workers(runs: Calls, jobs: int, task: Task[T], dask: str = "") -> Generator[T, None, None]:
-    """Do the runs on the Dask cluster of a scheduler, if its address is given, else in `jobs` processes here.
-
-    WorkersError if there is no scheduler at the address, or it has no worker.
-    """
+    """Do the runs on the Dask cluster of a scheduler, if its address is given, else in `jobs` processes here."""
     return on_dask(runs, dask, task) if dask else on_this_machine(runs, jobs, task)
 
 
 def on_this_machine(runs: Calls, jobs: int, task: Task[T]) -> Generator[T, None, None]:
-    """Do the runs in `jobs` processes; each result comes as soon as it is there, in whatever order.
-
-    Close the generator to end the workers early.
-    """
+    """Do the runs in `jobs` processes, in whatever order; close the generator to end the workers early."""
     if jobs == 1:
         for call in runs:
             yield task(*call)

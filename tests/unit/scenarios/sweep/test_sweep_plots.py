@@ -13,17 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gridpeers.scenarios.catalogue_files import CATALOGUE
+from gridpeers.scenarios.record.journal_reader import values_of
+from gridpeers.scenarios.results.plots.run_figures import draw_all, figures_of
 from gridpeers.scenarios.sweep.sweep_case import FATE
-from gridpeers.scenarios.sweep.sweep_plots import (
-    curves,
-    draw_all,
-    figures_of,
-    heat_maps,
-    indexes_of,
-    is_drawn,
-    spread_of,
-    values_of,
-)
+from gridpeers.scenarios.sweep.sweep_plots import curves, heat_maps, indexes_of, is_drawn, spread_of
 from gridpeers.scenarios.sweep.sweep_table import label_of
 
 
