@@ -25,7 +25,7 @@ def terminal(**options: Any) -> Console:
 
 
 def text_of(print_on: Callable[[Console], None]) -> str:
-    r"""Return what a function prints on a console, without colours, and without blanks at the ends of lines."""
+    """Return the text that a function prints on a console, without blanks at the ends of lines."""
     text = StringIO()
     print_on(terminal(file=text, width=_WIDE, color_system=None, force_terminal=False))
     return "\n".join(line.rstrip() for line in text.getvalue().split("\n"))

@@ -57,7 +57,7 @@ class FieldDoc(NamedTuple):
 
 
 def field_docs(cls: type) -> tuple[FieldDoc, ...]:
-    """Return the fields of a class with their docstrings, those of its base classes first; none without source."""
+    """Return the fields of a class with their docstrings, those of its base classes first."""
     written: dict[str, FieldDoc] = {}
     for base in reversed(cls.__mro__):
         if base not in (object, msgspec.Struct):
@@ -67,7 +67,6 @@ def field_docs(cls: type) -> tuple[FieldDoc, ...]:
 
 
 def field_table(cls: type, *, left_out: Iterable[str] = ()) -> Iterator[str]:
-    """Yield a table of the fields of a class: key, type, unit, range, default and meaning; none without fields."""
     skipped, docs = set(left_out), {doc.name: doc.text for doc in field_docs(cls)}
     rows = []
     for field in fields_of(cls):
@@ -97,10 +96,6 @@ def alias_docs(module: ModuleType) -> tuple[tuple[str, str], ...]:
     )
 
 
-def class_doc(cls: type) -> str:
-    return _one_line(inspect.getdoc(cls) or "")
-
-
 def _written_in(cls: type) -> dict[str, FieldDoc]:
     try:
         definition = ast.parse(textwrap.dedent(inspect.getsource(cls))).body[0]
@@ -117,11 +112,10 @@ def _written_in(cls: type) -> dict[str, FieldDoc]:
 
 
 def _one_line(text: object) -> str:
-    return " ".join(str(text).split())
+    return " ".join(str(text or "").split())
 
 
 def _type(field: Field) -> str:
-    """Return the type in words; the keys of a table stand in a section of its own."""
     kinds = (
         dict if isinstance(kind, type) and issubclass(kind, msgspec.Struct) else kind for kind in kinds_of(field.type)
     )
@@ -210,7 +204,10 @@ def _messages() -> Iterator[str]:
     yield from _section("Fields of every message", messages.Message, "")
     for kind in (*typing.get_args(messages.AnyMessage), messages.PlantEvent):
         yield from _section(
-            kind.__name__, kind, class_doc(kind), leave_out=common if kind != messages.PlantEvent else set()
+            kind.__name__,
+            kind,
+            _one_line(inspect.getdoc(kind)),
+            leave_out=common if kind != messages.PlantEvent else set(),
         )
     yield from ("", "## Types, and their bounds", "")
     yield from markdown_table(("type", "meaning"), ((f"`{name}`", text) for name, text in alias_docs(bounds)))
@@ -226,7 +223,7 @@ def _scenario() -> Iterator[str]:
     own = [(f"[plant.{name}]", table) for name, table in simulators.tables().items()]
     after = 1 + [title for title, _ in _SCENARIO_TABLES].index("[plant.sync_check]")
     for title, cls in (*_SCENARIO_TABLES[:after], *own, *_SCENARIO_TABLES[after:]):
-        yield from ("", f"## {title}", "", class_doc(cls), "")
+        yield from ("", f"## {title}", "", _one_line(inspect.getdoc(cls)), "")
         elsewhere = [field.name for field in fields_of(cls) if _has_section(field.type)] if cls is not Case else []
         yield from field_table(cls, left_out=elsewhere)
 
@@ -237,7 +234,7 @@ def _feeder() -> Iterator[str]:
     yield "columns are free. `plant/data/README.md` says which files a feeder needs."
     tables: list[type[msgspec.Struct]] = [*TABLES.values(), LoadColumns, Manifest]
     for cls in tables:
-        file, _, text = class_doc(cls).removesuffix(".").partition(": ")
+        file, _, text = _one_line(inspect.getdoc(cls)).removesuffix(".").partition(": ")
         yield from ("", f"## {file}", "")
         if text:
             yield from (f"{text[0].upper()}{text[1:]}.", "")
@@ -255,13 +252,12 @@ def _section(title: str, cls: type[msgspec.Struct], text: str, leave_out: Iterab
 
 
 def _has_section(kind: Any) -> bool:
-    """Return whether a field is a table, or a list of tables, with a section of its own."""
+    """Return True if a field is a table, or a list of tables, with a section of its own."""
     tables = {cls for _, cls in _SCENARIO_TABLES}
     return kind in tables or any(_has_section(part) for part in typing.get_args(kind))
 
 
 def _registry(topic: str) -> Iterator[str]:
-    """Yield the page of one registry: how an entry is written and named, and the entries that there are."""
     registry, how, key = _REGISTRIES[topic]
     title, _, rest = how.strip().partition("\n")
     yield from (f"# {registry.plural[:1].upper()}{registry.plural[1:]}", "", title, *rest.rstrip().split("\n"), "")

@@ -36,11 +36,7 @@ if TYPE_CHECKING:
 
 
 def run(request: Request, progress: Progress) -> RunReport:
-    """Run all cases and write the whole folder.
-
-    BrokenRunError if a case broke. What came until then stays in the folder, and `status.txt` tells that it is not
-    whole.
-    """
+    """Run all cases and write the whole folder; BrokenRunError if a case broke, as `status.txt` says then."""
     request = dataclasses.replace(request, folder=request.folder.absolute())  # a law or metric may go elsewhere
     with broken_if_ended(request.folder):
         try:
@@ -50,7 +46,7 @@ def run(request: Request, progress: Progress) -> RunReport:
 
 
 def _logged(request: Request, progress: Progress) -> RunReport:
-    """Run all cases; what breaks them is in the log, an error of the program with its traceback."""
+    """Run all cases; what breaks them is in the log."""
     file = request.folder / "log" / "run.log"
     file.parent.mkdir()
     with file.open("w", encoding="utf-8", errors="backslashreplace") as log:
@@ -154,7 +150,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
 
 
 def _compared(request: Request, recorded: Mapping[str, Recorded]) -> dict[str, Departures]:
-    """Each case of a run in wall-clock time beside its scenario: what else happened, and which windows it disturbs."""
+    """Compare each case of a run in wall-clock time with its scenario."""
     if request.clock == "simulated":
         return {}
     from gridpeers.scenarios.live.departures import compare

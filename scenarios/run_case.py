@@ -9,7 +9,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import msgspec
+from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.plant.plant_config import PlantConfig
@@ -32,8 +32,7 @@ _AFTER_RUN = (
     *("results.event_windows", "results.findings", "results.claims", "results.report"),
     *("results.plots.drawing", "checks.judging"),
 )
-"""Modules of `gridpeers.scenarios` that are used after a run, with numpy and scipy, and imported while it goes on, as
-the checks are: this process has little to do then."""
+"""Modules that are used after a run, and imported while it goes on: this process has little to do then."""
 
 
 def run_case(
@@ -43,9 +42,9 @@ def run_case(
     progress: Progress,
     plant_at_rest: Callable[[PlantConfig], PlantLike] | None = None,
 ) -> tuple[Recorded, Outcome]:
-    """Run one case by the driver asked for, and record it, with the scenario as run (TOML).
+    """Run one case by the driver asked for, and record it, with the scenario as run (TOML); or BrokenRunError.
 
-    In one process `plant_at_rest` gives the plant at t = 0 instead of building it. BrokenRunError if the case broke.
+    In one process `plant_at_rest` gives the plant at t = 0 instead of building it.
     """
     time = request.scenario.time
     plant, agents = _configs(request, case)
@@ -110,28 +109,26 @@ def _record_info(
 
 
 def _configs(request: Request, case: str) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
-    """Configurations of a case in the kind of time asked for."""
     listen = local_endpoint(request.scenario.processes.port) if request.driver == "processes" else ""
     real = request.clock == "wall"
     plant, agents = configs(request.scenario, request.feeder, case, listen, real_nodes=real)
-    plant = msgspec.structs.replace(plant, record=request.scenario.record)
-    agents = tuple(msgspec.structs.replace(agent, record=request.scenario.record) for agent in agents)
+    plant = replace(plant, record=request.scenario.record)
+    agents = tuple(replace(agent, record=request.scenario.record) for agent in agents)
     if request.bridge:
-        plant = msgspec.structs.replace(
-            plant, bridged=request.bridge, agents=tuple(name for name in plant.agents if name not in request.outside)
-        )
+        own = tuple(name for name in plant.agents if name not in request.outside)
+        plant = replace(plant, bridged=request.bridge, agents=own)
         agents = tuple(agent for agent in agents if agent.name not in request.outside)
     if request.keys is not None:
         from gridpeers.scenarios.drivers.secured import secured
 
         inverters = tuple(row.name for row in inverters_of(request.scenario, request.feeder))
         started = {agent.name for agent in agents}
-        plant = msgspec.structs.replace(plant, listen=tuple(text.replace("tcp/", "tls/", 1) for text in plant.listen))
+        plant = replace(plant, listen=tuple(text.replace("tcp/", "tls/", 1) for text in plant.listen))
         plant, agents, _ = secured(plant, agents, Path(request.keys), started=started, inverters=inverters)
     if request.clock == "simulated":
         return plant, agents
     if request.driver != "processes":
         raise BrokenRunError("wall-clock time needs one process per agent: use the driver processes")
-    replace, clock, speed = msgspec.structs.replace, request.clock, request.speed
+    clock, speed = request.clock, request.speed
     plant = replace(plant, clock=clock, speed=speed, strict=request.strict)
     return plant, tuple(replace(agent, clock=clock, speed=speed) for agent in agents)

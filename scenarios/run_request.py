@@ -60,10 +60,10 @@ class Request(RunMetrics):
     processes: int = 0
     """Number of processes that agents share; 0 gives each agent its own. It decides no number."""
     strict: bool = False
-    """Wall-clock: whether the run breaks when the plant cannot keep pace."""
+    """Wall-clock: the run breaks when the plant cannot keep pace."""
     bridge: str = ""
     """Simulator by which programs outside control inverters, e.g. "helics"; "" for none."""
     outside: tuple[str, ...] = ()
     """Inverters that they control instead of our agents."""
     lasting: bool = True
-    """Whether the folder stays: one that goes with the results of a notebook has no figures, and is not named."""
+    """The folder stays; one that goes with the results of a notebook has no figures, and is not named."""

@@ -16,7 +16,7 @@ from gridpeers.netem.models import INSTANT
 from gridpeers.netem.models.lie import lie_in_words
 from gridpeers.netem.receiver import Receiver
 from gridpeers.netem.schema.netem import NodeFault
-from gridpeers.netem.schema.pattern import Link, links_among, parse
+from gridpeers.netem.schema.pattern import links_among, parse
 from gridpeers.scenarios.emulation.link_data import (
     EmulationConfig,
     LinkCommand,
@@ -30,7 +30,7 @@ from gridpeers.wire.messages import PLANT, Measurement, State
 
 
 class _Interval(NamedTuple):
-    """A time in which an agent does not work, or works slowly (s of run time)."""
+    """A time (s of run time) in which an agent does not work, or works slowly."""
 
     since: float
     until: float
@@ -50,17 +50,14 @@ class EmulatedLinks:
         self.clear: set[str] = set()
         """Senders whose messages `offer` is known not to take."""
         self._dropped_before = 0
-        self._liars: dict[str, LiveHearing] = {}
-        """Senders about whom lies are told here at some time."""
         self._lies: Counter[str] = Counter()
         """States that say something else here than their sender has decided, by sender."""
-        self._node_events: list[tuple[float, str, str]] = []
-        """Beginnings and ends of lies that are to come: run time (s), agent, sentence."""
         self._begin()
         self._intervals: dict[str, list[_Interval]] = {}
         for node in config.netem.nodes:
             if node.slow_s or (node.pause and not config.real_nodes):
-                self._intervals.setdefault(node.name, []).append(_interval(node))
+                end, slow = math.inf if node.to_s is None else node.to_s, math.inf if node.pause else node.slow_s
+                self._intervals.setdefault(node.name, []).append(_Interval(node.from_s, end, slow))
         self._pauses = tuple(at for at in self._intervals.get(name, ()) if math.isinf(at.slow))
         """When the receiver itself is paused."""
 
@@ -86,7 +83,7 @@ class EmulatedLinks:
 
     @property
     def dropped(self) -> int:
-        """Number of messages lost here since the process began: a restart does not bring them back."""
+        """Number of messages lost here since the process began, restarts included."""
         return self._dropped_before + self._receiver.dropped
 
     def due(self, now: float) -> Sequence[Arrival]:
@@ -97,15 +94,15 @@ class EmulatedLinks:
         return bool(self._pauses) and any(at.holds(t) for at in self._pauses)
 
     def command(self, tree: Mapping[str, Any], t: float) -> CommandEffect:
-        """Change what the links do to messages sent at t (s of run time) or later.
-
-        ValueError, with nothing changed, if the tree is no command to links, or its values are wrong.
-        """
+        """Change what the links do to messages sent from t (s of run time) on; ValueError if the command is wrong."""
         command = LinkCommand.of_tree(tree)
         problems = command.problems(self._microgrids)
         if problems:
             raise ValueError("; ".join(f"{path}: {what}" for path, what in problems))
-        links, change = self._concerned(command, t), command.at(t)
+        pattern, change = parse(command.on), command.at(t)
+        links = [link for link in links_among(self._microgrids) if pattern.matches(*link, self._microgrids)]
+        if command.fault is None:  # a heal changes the links that have a fault
+            links = [link for link in links if self._schedules.of(link).at(t).active]
         senders = [link.src for link in links if link.dst == self._name]
         self._receiver.apply(change)
         self._schedules.apply(change)
@@ -116,14 +113,6 @@ class EmulatedLinks:
             receivers=tuple(dict.fromkeys(link.dst for link in links)),
             changed=f"{', '.join(senders)} -> {self._name}" if senders else "",
         )
-
-    def _concerned(self, command: LinkCommand, t: float) -> list[Link]:
-        """Return the links of the whole run that a command changes at t (s); a heal changes those that have a fault."""
-        pattern = parse(command.on)
-        links = [link for link in links_among(self._microgrids) if pattern.matches(*link, self._microgrids)]
-        if command.fault is not None:
-            return links
-        return [link for link in links if self._schedules.of(link).at(t).active]
 
     def impaired(self, t: float) -> tuple[str, ...]:
         return tuple(src for src in self._senders if self._receiver.holding(src, t))
@@ -152,7 +141,7 @@ class EmulatedLinks:
         self._receiver = Receiver(self._name, config.netem, config.microgrids, keep_trace=config.keep_trace)
         self._schedules = LinkSchedules(config.netem, config.microgrids)
         self._lies.clear()
-        self._liars = {
+        self._liars = {  # senders about whom lies are told here at some time
             src: LiveHearing(HeardFrom(config.netem.seed, src, self._name, lies))
             for src in self._senders
             if (lies := lies_about(config.netem, src, self._name))
@@ -173,12 +162,8 @@ class EmulatedLinks:
         return report_data(receiver.take_trace(), counts, receiver.trace_sha256, receiver.take_failures())
 
 
-def _interval(node: NodeFault) -> _Interval:
-    return _Interval(node.from_s, math.inf if node.to_s is None else node.to_s, math.inf if node.pause else node.slow_s)
-
-
 def _events_of(nodes: Sequence[NodeFault]) -> list[tuple[float, str, str]]:
-    """Return time (s), liar and sentence of each lie's beginning and end, as configured: links know of no roster."""
+    """Return time (s), liar and sentence of each lie's beginning and end."""
     found = []
     for node in nodes:
         if node.lies is not None:

@@ -32,18 +32,17 @@ class EmulationConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
     microgrids: dict[str, str]
     """Microgrid of every inverter, spare ones too, in the order of their table."""
     real_nodes: bool = False
-    """Whether processes are really killed and paused, as in wall-clock time; else that is emulated."""
+    """Processes are really killed and paused, as in wall-clock time; else that is emulated."""
     keep_trace: bool = True
-    """Whether every verdict is reported, not only their counts and their hash."""
+    """Every verdict is reported, not only their counts and their hash."""
 
     def to_tree(self) -> dict[str, Any]:
-        """Return it as the tree `links` of `AgentConfig` and `PlantConfig`, whose packages know no netem."""
+        """Return it as the tree `links` of `AgentConfig` and `PlantConfig`, which know no netem."""
         tree: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(self))
         return tree
 
     @classmethod
     def of_tree(cls, tree: Mapping[str, Any]) -> EmulationConfig:
-        """Return the configuration in a tree; raise msgspec.ValidationError if the tree is none."""
         return msgspec.convert(tree, type=cls)
 
 
@@ -73,7 +72,6 @@ _statuses = msgspec.msgpack.Decoder(dict[Name, LinkStatus])
 
 
 def decode_statuses(data: bytes) -> dict[str, LinkStatus]:
-    """Decode them; raise msgspec.DecodeError if the bytes are something else."""
     return decode_foreign(_statuses.decode, data)
 
 
@@ -83,7 +81,7 @@ _reports = msgspec.msgpack.Decoder(LinkReportData)
 
 
 def data_of(report: LinkReport) -> LinkReportData:
-    """Return the data of a report; raise msgspec.DecodeError if they are not its sender's links."""
+    """Return the data of a report; msgspec.DecodeError if they are not its sender's links."""
     data = decode_foreign(_reports.decode, report.data)
     strangers = {trace.dst for trace in data.traces} - {report.sender}
     if strangers:
@@ -92,8 +90,7 @@ def data_of(report: LinkReport) -> LinkReportData:
 
 
 AT_ONCE = 100
-"""Verdicts in one report. Decoded, each has some 350 bytes, and a process of hours keeps the memory that it once needed
-for the largest report."""
+"""Verdicts in one report: a process keeps the memory that it once needed for the largest one."""
 
 
 def report_data(
@@ -118,11 +115,7 @@ def report_data(
 
 
 def words(kind: str, model: Any) -> str:
-    """Return a fault in words: plain if it has one or two numbers, else the profile that has it, or its keys.
-
-    The kind is one of `gridpeers.netem.schema.fault.KINDS`, or "partition"; the model a struct of
-    `gridpeers.netem.models`.
-    """
+    """Return a fault in words: plain if it has one or two numbers, else the profile that has it, or its keys."""
     match model:
         case Plugin(parameters=parameters):
             keys = [f"{name} {_shown(value)}" for name, value in parameters]
@@ -158,9 +151,12 @@ def _shown(value: Any) -> str:
 EVERYTHING = "{*, plant} <-> {*, plant}"
 """Pattern of all links there are."""
 
+MOST_NAMED = 8
+"""Links that are named at most; a partition of nine inverters affects 36."""
+
 
 class LinkCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
-    """Either a fault or its end. The time from which it holds is sent beside it; times in it do not count."""
+    """Either a fault or its end; the time from which it holds is sent beside it."""
 
     fault: Fault | None = None
     heal: Heal | None = None
@@ -184,12 +180,10 @@ class LinkCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         return msgspec.structs.replace(self._change, **times)
 
     def problems(self, microgrids: Mapping[str, str]) -> list[Problem]:
-        """Return all its errors in a run of these inverters."""
         links = [Problem("on", text) for text in objections(self.on, tuple(microgrids), microgrids)]
         return links + self.wrong_values()
 
     def wrong_values(self) -> list[Problem]:
-        """Return the errors of its values, which are errors in every run."""
         problems: list[Problem] = []
         if self.fault is not None:
             problems += msgspec.structs.replace(self.fault, from_s=0.0, to_s=None).problems()
@@ -212,7 +206,13 @@ class LinkCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
             return str(self)
         if not impaired:
             return f"{'all links' if self.on == EVERYTHING else self.on}: no link has a fault, nothing to heal"
-        return f"{_listed(impaired)}: healed"
+        both = [link for link in impaired if link[::-1] in impaired]  # a fault both ways is named once
+        named = [
+            f"{src} {'<->' if (src, dst) in both else '->'} {dst}"
+            for i, (src, dst) in enumerate(impaired)
+            if (dst, src) not in impaired[:i]
+        ]
+        return f"{first_of(named, MOST_NAMED)}: healed"
 
     def to_tree(self) -> dict[str, Any]:
         tree: dict[str, Any] = msgspec.to_builtins(self)
@@ -229,15 +229,3 @@ class LinkCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
             raise ValueError("no command to links: a fault of your own is written in the scenario before the run")
         command.on  # noqa: B018  checks that it is one of the two
         return command
-
-
-MOST_NAMED = 8
-"""Links that are named at most; a partition of nine inverters affects 36."""
-
-
-def _listed(links: Sequence[Link]) -> str:
-    """Return links in words; those that have a fault both ways as one."""
-    both = {link for link in links if Link(link.dst, link.src) in links}
-    first = [link for link in links if link not in both or links.index(link) < links.index(Link(link.dst, link.src))]
-    named = [f"{link.src} {'<->' if link in both else '->'} {link.dst}" for link in first]
-    return first_of(named, MOST_NAMED)
