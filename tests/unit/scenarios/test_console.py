@@ -6,24 +6,13 @@ import re
 from pathlib import Path
 
 import pytest
-from rich.table import Table
 
 from gridpeers.cli.progress import progress
-from gridpeers.scenarios.console import terminal, text_of
+from gridpeers.scenarios.console import terminal
 from gridpeers.scenarios.short_texts import duration, short
 
 ROOT = Path(__file__).parents[3]
 USERS = "law boom:Boom: [red]of[/red] [bus 7] C:\\feeders\\[a]"
-
-
-def test_a_text_in_a_string_keeps_its_brackets_and_colons() -> None:
-    """As a line, and as the cell of a table."""
-    table = Table(box=None)
-    table.add_column("name")
-    table.add_row(USERS)
-
-    assert text_of(lambda console: console.print(USERS)) == f"{USERS}\n"
-    assert USERS in text_of(lambda console: console.print(table))
 
 
 def test_a_text_on_a_terminal_keeps_them_too(

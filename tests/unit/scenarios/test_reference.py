@@ -76,8 +76,10 @@ def test_every_key_of_a_scenario_is_on_its_page() -> None:
 
 def test_every_message_and_every_key_is_on_its_page() -> None:
     """The reference lists the messages that can be sent, and their keys."""
-    assert all(f"## {kind.__name__}" in page("messages") for kind in typing.get_args(messages.AnyMessage))
-    assert all(f"`{spec.expression}`" in page("keys") for spec in keys.KEY_SPECS)
+    of_messages, of_keys = page("messages"), page("keys")
+
+    assert all(f"## {kind.__name__}" in of_messages for kind in typing.get_args(messages.AnyMessage))
+    assert all(f"`{spec.expression}`" in of_keys for spec in keys.KEY_SPECS)
 
 
 @pytest.mark.parametrize("topic", TOPICS)

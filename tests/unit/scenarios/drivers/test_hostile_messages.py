@@ -35,10 +35,10 @@ TOKENS = tuple(
 
 
 def flood(side: Node, rng: random.Random) -> list[tuple[str, bytes]]:
-    """An eighth of all that is hostile to a core, in some order."""
+    """A sixteenth of all that is hostile to a core, in some order."""
     truth = {key: (route.sender, route.types) for key, route in side.routes.items()}
     truth |= {KEYS.state("inv9"): ("inv9", ()), KEYS.telemetry: ("plant", ())}
-    return list(hostile(truth, dict.fromkeys(("plant", *NAMES), EPOCH), rng))[::8]
+    return list(hostile(truth, dict.fromkeys(("plant", *NAMES), EPOCH), rng))[::16]
 
 
 @pytest.mark.parametrize("make", [RealtimeAgentScene, AgentScene, RealtimePlantScene, PlantScene])
@@ -47,7 +47,7 @@ def test_nothing_raises_and_nothing_false_is_believed(make: Callable[[], Scene])
     rng = random.Random(1)
     flooded, calm = make(), make()
     sent = 0
-    for k, chunk in enumerate(_chunks(flood(flooded.side, rng), 60)):
+    for k, chunk in enumerate(_chunks(flood(flooded.side, rng), 30)):
         for key, payload in chunk:
             flooded.side.received(key, payload, flooded.now)
             sent += 1
@@ -56,7 +56,7 @@ def test_nothing_raises_and_nothing_false_is_believed(make: Callable[[], Scene])
     counts = flooded.side.rejects.counts
     lines = flooded.side.rejects.take_lines()
 
-    assert sent > 6_000
+    assert sent > 3_000
     assert not flooded.side.finished
     assert len(calm.done) > 100
     assert flooded.done == calm.done

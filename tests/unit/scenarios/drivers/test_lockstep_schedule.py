@@ -19,7 +19,7 @@ from gridpeers.wire.messages import Stop
 from gridpeers.wire.node import Publish
 from tests.toy.toy_configs import Schedule, toy_configs
 from tests.toy.toy_links import Links
-from tests.toy.toy_plant import M_P, ToyPlant
+from tests.toy.toy_plant import ToyPlant
 
 SEEDS = st.integers(0, 2**32 - 1)
 AWAY: Schedule = ((0.2, "inv2", "leave"), (0.3, "inv2", "join"))
@@ -56,61 +56,6 @@ def test_who_is_faster_changes_nothing(seed: int, graph: GraphRule) -> None:
     assert not any(agent.rejects.counts for agent in run.agents)
 
 
-def test_the_events_tell_what_happened() -> None:
-    """Leaving, being off, joining and being on again are events at their times, and the run is reproducible."""
-    outcome, rows = in_one_process()
-
-    assert [(event.t, event.kind, event.subject) for event in outcome.events if event.subject == "inv2"] == [
-        (0.2, "roster", "inv2"),
-        (0.2, "inverter", "inv2"),
-        (0.3, "roster", "inv2"),
-        (0.3, "inverter", "inv2"),
-    ]
-    assert outcome.reproducible
-    assert outcome.notes == ()
-    assert [row[0] for row in rows] == [round(0.02 * k, 9) for k in range(21)]
-
-
-def test_who_is_away_gives_nothing_and_the_others_take_over() -> None:
-    """From the tick after it left inv2 has no power; the others carry its load, and f comes back."""
-    _, rows = in_one_process(n=6, end=4.0, schedule=((2.0, "inv2", "leave"),))
-    after = rows[101]
-
-    assert after[8] == 0.0
-    assert sum(after[2::6]) == pytest.approx(sum(rows[100][2::6]))
-    assert rows[-1][1] == pytest.approx(60.0, abs=0.01)
-    assert rows[-1][11] == rows[101][11]
-
-
-def test_a_returning_agent_starts_from_what_its_measurement_shows() -> None:
-    """No set-point jumps by more than the law allows in a period, that of the returned inverter included."""
-    _, rows = in_one_process(end=3.0, schedule=((1.0, "inv2", "leave"), (2.0, "inv2", "join")))
-    k = 100
-    steps = [abs(b - a) for a, b in zip(rows[k][5::6], rows[k + 1][5::6], strict=True)]
-
-    assert max(steps) < 0.35 * 100e3 * 0.02 / 0.0007 * M_P
-
-
-def test_a_spare_joins_for_the_first_time() -> None:
-    """A spare's agent is not awaited at the start, and shares the load after it has joined."""
-    outcome, rows = in_one_process(end=6.0, schedule=((2.0, "inv4", "join"),), spares=("inv4",))
-
-    assert outcome.broke == ""
-    assert outcome.reproducible
-    assert rows[100][20] == 0.0
-    assert rows[-1][20] == pytest.approx(rows[-1][2], rel=0.01)
-
-
-def test_everybody_may_leave_and_return_at_once() -> None:
-    """A run without any agent in between goes on, and all come back."""
-    names = ("inv1", "inv2", "inv3")
-    schedule = (*((0.1, name, "leave") for name in names), *((0.2, name, "join") for name in reversed(names)))
-    outcome, rows = in_one_process(schedule, n=3)
-
-    assert outcome.broke == ""
-    assert rows[-1][0] == 0.4
-
-
 @settings(max_examples=5)
 @given(SEEDS, st.integers(0, 40))
 def test_a_death_around_a_move_does_not_stall_the_run(seed: int, steps: int) -> None:
@@ -139,15 +84,6 @@ def test_a_newcomer_that_does_not_come_is_named_by_the_deadline() -> None:
 
     assert "token" in run.plant.outcome
     assert "inv2" in run.plant.outcome
-
-
-def test_who_joins_is_awaited_once_by_telemetry() -> None:
-    """Drivers are told at the tick itself, not ten ticks later."""
-    plant, agents = configured()
-    run = Links(plant, agents, random.Random(4))
-    run.run()
-
-    assert [(message.t, message.awaited) for message in run.telemetry if message.awaited] == [(0.3, ("inv2",))]
 
 
 @pytest.mark.parametrize(

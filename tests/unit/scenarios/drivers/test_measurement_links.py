@@ -41,7 +41,7 @@ def P_set(rows: Rows, number: int, since: float, until: float) -> set[float]:
     return {row[5 + 6 * (number - 1)] for row in rows if since <= row[0] < until}
 
 
-@pytest.mark.parametrize("fault", [{"cut": True}, {"loss": 1.0}, {"delay": 5.0}, {"cut": {"hold": True}}])
+@pytest.mark.parametrize("fault", [{"cut": True}, {"delay": 5.0}])
 def test_an_agent_that_never_gets_a_measurement_stands_still(fault: dict[str, Any]) -> None:
     """Its inverter keeps its first set-points from the beginning to the end, and the others go on without it."""
     rows = rows_of(fault)
@@ -49,22 +49,6 @@ def test_an_agent_that_never_gets_a_measurement_stands_still(fault: dict[str, An
     assert P_set(rows, 2, 0.0, 9.0) == {50e3}
     assert len(P_set(rows, 1, 0.2, 2.0)) > 50
     assert rows[-1][1] == pytest.approx(60.0, abs=0.02)
-
-
-def test_it_begins_with_the_first_measurement_that_comes_through() -> None:
-    """With 0.3 s of delay it stands for 0.3 s, then moves."""
-    rows = rows_of({"delay": 0.3})
-
-    assert P_set(rows, 2, 0.0, 0.3) == {50e3}
-    assert len(P_set(rows, 2, 0.5, 2.0)) > 30
-
-
-def test_it_stands_still_again_once_none_has_come_for_a_while() -> None:
-    """A link that is cut in the middle: 0.25 s later the agent ceases to act on the last error it knew of."""
-    rows = rows_of({"cut": True, "from_s": 0.2})
-
-    assert len(P_set(rows, 2, 0.2, 0.44)) > 10
-    assert len(P_set(rows, 2, 0.5, 9.0)) == 1
 
 
 def test_a_newcomer_stands_still_too_until_it_measures() -> None:

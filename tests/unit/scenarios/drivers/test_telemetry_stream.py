@@ -83,22 +83,6 @@ def test_only_the_answer_to_the_last_question_counts() -> None:
     assert it.core.rejects.counts == {"unexpected": 1}
 
 
-def test_a_late_answer_of_a_busy_plant_is_neither_used_nor_told() -> None:
-    """Each question that waits for a second is asked again; the plant answers all of them, and that is no fault."""
-    it = recorder(TelemetryStream())
-    it.core.appeared(KEYS.alive_plant(7))
-    it.hear(telemetry(0))
-    asked = [it.core.question(now=QUIET + 1.0 + seconds) for seconds in (0.0, 1.5, 3.0)]
-    for seq, first in ((1, "9"), (2, "9"), (3, "1")):
-        it.hear(Answer(sender="plant", epoch=7, seq=seq, t=0.0, ok=True, text=first), KEYS.answer("fleet"))
-    it.hear(telemetry(1))
-
-    assert None not in asked
-    assert it.taken == [telemetry(0), telemetry(1)]
-    assert not it.core.rejects.counts
-    assert it.core.rejects.take_lines() == ()
-
-
 def test_plants_that_have_gone_keep_no_place() -> None:
     """Somebody who holds the tokens of many plants for a moment keeps no recorder from the plant that comes then."""
     it = recorder()
@@ -114,16 +98,3 @@ def test_plants_that_have_gone_keep_no_place() -> None:
     assert it.core.rejects.counts == {"excess": 1}
     assert not any(noted)
     assert it.taken == [telemetry(0)]
-
-
-def test_the_plant_that_it_follows_is_followed_while_a_link_is_broken() -> None:
-    """The link takes the token away, and the messages that come on the next one are of the same plant."""
-    it = recorder()
-    it.core.appeared(KEYS.alive_plant(7))
-    it.hear(telemetry(0))
-    it.core.vanished(KEYS.alive_plant(7))
-    it.core.appeared(KEYS.alive_plant(8))
-    it.hear(telemetry(0, epoch=8))
-    it.hear(telemetry(1))
-
-    assert it.taken == [telemetry(0), telemetry(1)]

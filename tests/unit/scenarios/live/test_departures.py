@@ -12,7 +12,6 @@ import pytest
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem, NodeFault
 from gridpeers.plant.equipment import Feeder
-from gridpeers.plant.equipment.imported_equipment import LoadPart
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.live.departures import compare
 from gridpeers.scenarios.live.live_report import live_drawing, write_report
@@ -86,21 +85,6 @@ def test_what_the_scenario_does_not_tell_is_found(
     assert all(words in line for words, line in zip(said, lines, strict=True))
 
 
-@pytest.mark.parametrize("planned", ["632-671", "632~a-632", "632-632~a"])
-def test_a_planned_switch_is_recognised_by_each_of_its_names(planned: str) -> None:
-    """The plant's events have the alias of an imported switch; the scenario may name its buses in either order."""
-    scenario, feeder = one_case("islanding")
-    row = next(each for each in feeder.switches if each.name == "13-152")
-    imported = msgspec.structs.replace(row, name="632-632~a", alias="632-671", from_bus="632", to_bus="632~a")
-    feeder = msgspec.structs.replace(feeder, switches=(imported,))
-    scenario = msgspec.structs.replace(scenario, events=(Event(label="islanding", t_s=1.0, open=(planned,)),))
-    event = told("switch", 1.0, imported.event_name, f"switch {imported.full_name} opened")
-    later = msgspec.structs.replace(event, t=2.0)
-
-    assert compare(scenario, feeder, [event], 9.0).events == ()
-    assert compare(scenario, feeder, [event, later], 9.0).events == (later,)
-
-
 def test_a_planned_switch_may_wait_for_synchronism() -> None:
     """It closes late, up to its timeout; an opening meanwhile, or a later closing, is of people."""
     scenario, feeder = one_case("ieee34-islanding")
@@ -123,18 +107,6 @@ def test_a_load_that_the_scenario_sets_is_none_of_the_people() -> None:
 
     assert compare(planned, feeder, [mine], 9.0).events == ()
     assert compare(planned, feeder, [mine, other, later], 9.0).events == (other, later)
-
-
-@pytest.mark.parametrize("planned", ["l1", "load.l1", "Load.l1"])
-def test_a_planned_load_of_an_imported_feeder_is_recognised_with_and_without_its_class(planned: str) -> None:
-    """The plant's events have OpenDSS's name; the scenario may leave "load." out."""
-    scenario, feeder = one_case("islanding")
-    part = LoadPart(name="load.l1", bus="48", ends=("A", ""), S=1e4 + 0j, V_nom=2400.0, exponents=(2.0, 2.0))
-    event = Event(label="load", t_s=5.0, load={planned: LoadChange(factor=1.5)})
-    mine = told("load", 5.0, "load.l1", "load load.l1 set to 15 kW")
-    scenario = msgspec.structs.replace(scenario, events=(*scenario.events, event))
-
-    assert compare(scenario, msgspec.structs.replace(feeder, load_parts=(part,)), [mine], 9.0).events == ()
 
 
 def test_a_death_that_the_scenario_tells_of_is_none_of_the_people() -> None:
@@ -170,16 +142,6 @@ def test_a_silence_disturbs_its_window_unless_the_scenario_brings_it_about(
 
     assert tuple(window.label for window in compared.disturbed) == disturbed
     assert [event.text for event in compared.events] == ([text] if disturbed else [])
-
-
-@pytest.mark.parametrize(("ended", "whole"), [(0.5, 0), (3.99, 0), (4.0, 1), (6.99, 1), (7.0, 2), (60.0, 2)])
-def test_windows_count_once_they_are_reached_to_their_end(ended: float, whole: int) -> None:
-    """Metrics of a scenario end with its last whole window, wherever the run does; the others are named."""
-    scenario, feeder = one_case("islanding")
-    compared = compare(scenario, feeder, [], ended)
-
-    assert [window.label for window in compared.windows.measured] == ["event1", "event2"][:whole]
-    assert [window.label for window in compared.windows.not_reached] == ["event1", "event2"][whole:]
 
 
 def switch(t: float, what: str = "opened", name: str = "sw1_2 (67s-67)") -> PlantEvent:
@@ -229,30 +191,6 @@ def test_a_live_switch_opens_a_window_as_the_scenarios_events_do(
     assert ", ".join(f"{one.label} {one.start:g}-{one.end:g}" for one in opened.measured) == measured
     assert ", ".join(one.label for one in opened.too_short) == too_short
     assert ", ".join(one.label for one in opened.not_reached) == not_reached
-
-
-def test_each_live_event_says_what_people_did() -> None:
-    """Switches that people operate at one time are one event, with a label of its own."""
-    compared = compare(
-        *one_case("islanding"), [switch(2.5), switch(2.5, name="sw9 (18-135)"), switch(5, "closed")], 7.0
-    )
-
-    assert compared.live == {
-        "live at 2.5 s": "switch sw1_2 (67s-67) opened; switch sw9 (18-135) opened",
-        "live at 5 s": "switch sw1_2 (67s-67) closed",
-    }
-
-
-def test_a_late_agent_and_a_live_switch_do_not_meet() -> None:
-    """A window begins when its last agent has moved, though somebody operated a switch between that and its time."""
-    left = told("roster", 2.56, "inv2", "inv2 left; its inverter is off the network, at t = 2.56 s")
-    off = told("inverter", 2.56, "inv2", "inv2 disconnected")
-    opened = compare(*one_case("plug-n-play"), [switch(2.3), left, off, BACK], 5.0).windows
-
-    assert [(one.label, one.start, one.end) for one in opened.measured][1:3] == [
-        ("live at 2.3 s", 2.3, 2.56),
-        ("leave", 2.56, 3.0),
-    ]
 
 
 @pytest.fixture(scope="module")

@@ -34,7 +34,6 @@ from gridpeers.scenarios.schema import ScenarioModel, find_scenario, load_scenar
 from gridpeers.scenarios.schema.participants import netem_of, setup_of
 from gridpeers.scenarios.schema.scenario_model import LONGEST_RUN
 from gridpeers.wire.messages import PLANT, LinkRequest
-from gridpeers.wire.timing import rounded_up
 
 
 def islanding(**case: Any) -> ScenarioModel:
@@ -81,11 +80,6 @@ def test_a_live_run_of_hours_is_cut_to_the_longest_scenario() -> None:
     assert scenario.time.end_s == LONGEST_RUN
     assert any("It lasted 7200.00 s." in remark for remark in remarks)
     assert "No scenario may be longer than 3600 s." in remarks
-
-
-def test_a_scenario_has_at_least_one_control_period() -> None:
-    """A run that ended before its first one still gives a scenario."""
-    assert rounded_up(0.0, 0.02) == 0.02
 
 
 def test_a_run_that_is_interrupted_while_it_is_judged_has_its_length_in_its_scenario(

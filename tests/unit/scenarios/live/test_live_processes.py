@@ -22,7 +22,6 @@ from gridpeers.scenarios.live.run_requests import own_code
 from gridpeers.wire.driver.drive import StoppedError
 from gridpeers.wire.driver.ending import SAME_REQUEST_TIME, StopSignal
 from gridpeers.wire.plugins.plugin import Plugin
-from gridpeers.wire.timing import BURST, RateLimit
 from tests.toy.toy_configs import agent_config, toy_configs
 
 
@@ -38,23 +37,6 @@ def test_a_refused_handshake_is_told_without_the_words_of_zenoh() -> None:
     assert meaning(line, config) == "a link was refused: peer sent no certificates"
     assert meaning(LISTENING, config) == ""
     assert "is being built" in meaning(COMPILING, config)
-
-
-def test_an_agent_with_an_expired_certificate_does_not_flood_the_terminal() -> None:
-    """It tries again for ever, some times a second: after the first refusals, one in ten seconds is told."""
-    config, _ = toy_configs(2)
-    limit = RateLimit()
-    line = (
-        "WARN app-0 zenoh_link_tls::unicast: invalid peer certificate: certificate expired: verification time {} (UNIX)"
-    )
-
-    told = [limit.admit(meaning(line.format(1795480184 + k), config), 0.5 * k) for k in range(7200)]
-
-    assert (
-        told[0]
-        == "a link was refused: invalid peer certificate: certificate expired: verification time 1795480184 (UNIX)"
-    )
-    assert len([text for text in told if text]) <= BURST + 360
 
 
 SETUP = EmulationConfig(

@@ -16,9 +16,6 @@ from gridpeers.scenarios.live.run_address import (
     UsageError,
     accepting,
     address_of,
-    check_endpoint,
-    far_hosts,
-    is_loopback_host,
     loopback_of,
     next_port,
     return_path,
@@ -28,13 +25,6 @@ from gridpeers.scenarios.live.run_client import NobodyError, RunClient
 from gridpeers.wire.driver.inbox import Inbox
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.trust.credentials import Credentials, Member
-
-
-def test_without_options_there_is_one_run_on_this_machine() -> None:
-    """No option is needed for one plant on a laptop."""
-    here = address_of("gridpeers", None)
-
-    assert (here.run, here.connect) == ("gridpeers", ("tcp/127.0.0.1:7447",))
 
 
 @pytest.mark.parametrize("run", ["a/b", "", "a*", "$", "run 1", "x" * 65, "@run", "é"])
@@ -63,14 +53,6 @@ def test_what_is_no_endpoint_is_told_with_what_would_be(text: str, said: str) ->
 
     assert str(told.value).startswith("--connect: ")
     assert said in str(told.value)
-
-
-@pytest.mark.parametrize(
-    "text", ["tcp/127.0.0.1:7447", "tcp/[::1]:7447", "tls/lab.example:1", "tcp/lab:7447#iface=eth0"]
-)
-def test_endpoints_of_zenoh_are_taken_as_they_are(text: str) -> None:
-    """Names, both kinds of addresses, and Zenoh's own suffixes."""
-    assert check_endpoint("--connect", text) == text
 
 
 def test_who_accepts_connections_is_known_though_it_says_nothing() -> None:
@@ -112,14 +94,6 @@ def test_the_options_that_find_a_run_say_what_is_not_the_default(endpoint: str, 
     address = RunAddress(run="gridpeers", connect=(endpoint,), access=Access(keys=Path("lab")))
 
     assert address.words == words
-
-
-def test_only_an_address_of_the_loopback_counts_as_one() -> None:
-    """Anybody may register a name that begins like an address."""
-    hosts = ("127.0.0.1", "[::1]", "localhost", "0.0.0.0", "127.lab.example")
-
-    assert [is_loopback_host(host) for host in hosts] == [True, True, True, False, False]
-    assert far_hosts(("tcp/127.0.0.1:7447", "tcp/192.168.1.10:7447")) == ["192.168.1.10"]
 
 
 def test_endpoints_as_other_commands_need_them() -> None:
@@ -209,14 +183,6 @@ def test_a_plant_of_another_run_is_told_at_once_and_once(waiting: Waiting) -> No
     ]
 
 
-def test_a_wait_is_told_ever_more_rarely(waiting: Waiting) -> None:
-    """A minute of waiting is five lines, and the sixth says that it was in vain."""
-    *reminders, last = waiting({}, 60.0)
-
-    assert [line.partition(":")[0] for line in reminders] == ["2", "4", "8", "16", "32"]
-    assert last.startswith("no plant of run lab at tcp/127.0.0.1:7447 within 60 s")
-
-
 def test_a_link_on_which_nothing_passes_is_told_once_and_at_the_end(waiting: Waiting) -> None:
     """A revoked certificate, which TLS accepts: the plant can say nothing to its holder, who says why it waits."""
     *reminders, last = waiting({}, 10.0, SHOWN)
@@ -253,14 +219,3 @@ def test_a_refused_certificate_ends_the_wait(waiting: Waiting, monkeypatch: pyte
         "asks for a certificate; say by --keys the folder of its site, or by --connect where the plant of this site is "
         "(docs/security.md)"
     )
-
-
-def test_who_has_a_link_asks_for_no_other(waiting: Waiting, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The handshake that tells why there is none would be a stranger's connection to a plant that is there."""
-
-    def never(*_: object) -> str:
-        raise AssertionError
-
-    monkeypatch.setattr(client, "tls_refusal", never)
-
-    assert len(waiting({}, 60.0)) == 6

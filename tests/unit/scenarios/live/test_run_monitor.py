@@ -10,8 +10,7 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
-from gridpeers.netem.ledger import LinkCounts, LinkTrace
-from gridpeers.scenarios.emulation.link_data import LinkReportData, encode_data
+from gridpeers.netem.ledger import LinkCounts
 from gridpeers.scenarios.live import run_client as client
 from gridpeers.scenarios.live.run_address import address_of
 from gridpeers.scenarios.live.run_client import RunClient
@@ -102,12 +101,12 @@ def test_a_visitor_shows_the_same_whatever_else_is_published(line: Line) -> None
     ]
     subscriber.take(0.1)
     before = plain(monitor.snapshot((), 0.0))
-    flood = list(hostile(keys, {"plant": 7, **dict.fromkeys(NAMES, 7)}, random.Random(1)))[::10]
+    flood = list(hostile(keys, {"plant": 7, **dict.fromkeys(NAMES, 7)}, random.Random(1)))[::20]
     line.events = [("message", key, payload, 0.0) for key, payload in flood if not is_status(payload, key)]
     sent = len(line.events)
     subscriber.take(0.1)
 
-    assert sent > 3_000
+    assert sent > 1_500
     assert plain(monitor.snapshot((), 0.0)) == before
     assert before.replace("\n", "").isprintable()
 
@@ -164,18 +163,6 @@ def test_a_book_of_links_that_cannot_be_is_counted_and_not_recorded(body: object
     assert dict(by_link(record)) == {}
 
 
-def test_a_sound_book_is_recorded() -> None:
-    """With all that it says."""
-    record = LinkRecord()
-    book = LinkReportData(
-        traces=(LinkTrace("inv2", "inv1", (1, 2), (0.0, 0.02), ("cut", 0.1)),), counts={"inv2": COUNTS}
-    )
-    record(LinkReport(sender="inv1", epoch=1, seq=0, t=0.0, data=encode_data(book)))
-
-    assert record.garbled == 0
-    assert record.counts == {("inv2", "inv1"): COUNTS}
-
-
 def test_every_message_that_is_sent_can_be_read_by_a_visitor_of_that_plant(line: Line) -> None:
     """And by nobody who sees another plant's token."""
     at = RunClient(address_of("lab", None))
@@ -196,17 +183,6 @@ def take_all(at: RunClient) -> None:
 def strangers(names: int, instances: int) -> list[str]:
     """Tokens of names that no run has."""
     return [KEYS.alive_agent(f"who{name}", f"a{one}") for one in range(instances) for name in range(names)]
-
-
-def test_a_client_keeps_a_bounded_number_of_tokens(line: Line) -> None:
-    """Of strangers' tokens as many wait as with an agent, and each kind has the room that it has there."""
-    at = RunClient(address_of("lab", None))
-    line.put("appeared", [KEYS.alive_plant(7), *strangers(3 * MOST_TOKENS, 1)])
-    (loss,) = line.inbox.take_losses()
-
-    assert loss.number == 2 * MOST_TOKENS + 1
-    take_all(at)
-    assert (at.plant, len(at.present)) == (True, MOST_INVERTERS)
 
 
 def test_what_a_client_has_noted_is_seen_to_go_and_to_come_back_in_a_flood(line: Line) -> None:

@@ -170,16 +170,6 @@ def test_only_the_answer_to_the_own_command_counts() -> None:
     assert (answer.text, [each.text for each in acknowledgements.values()]) == ("true", ["true"])
 
 
-def test_numbers_of_commands_cannot_be_foreseen() -> None:
-    """Of twenty no two are the same, and they have no order."""
-    client = Client()
-    for _ in range(20):
-        request(client, lambda answer: set(), verb="status")  # type: ignore[arg-type]
-
-    assert len({*client.numbers}) == 20
-    assert client.numbers != sorted(client.numbers)
-
-
 def test_an_answer_of_another_form_is_told_in_one_line() -> None:
     """Of a plant of another version, or of whoever speaks as one on open links: nothing else is raised."""
     with pytest.raises(NobodyError, match=r"run demo answers what cannot be read here: .* `phase`; is it of another"):

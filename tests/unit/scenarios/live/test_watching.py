@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 
 import msgspec
-import pytest
 from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import AgentConfig, Control
@@ -16,7 +15,6 @@ from gridpeers.scenarios.live.live_options import LiveOptions, configure
 from gridpeers.scenarios.live.run_monitor import InverterStatus, PlantStatus, RunMonitor, Snapshot
 from gridpeers.scenarios.live.watching import plain, table
 from gridpeers.scenarios.schema import load_scenario
-from gridpeers.scenarios.short_texts import short
 from gridpeers.wire.messages import AgentStatus, Pacing, PlantEvent, Telemetry
 
 PACING = Pacing(steps=200, late=0, p50=1e-4, p95=2e-4, p99=1e-3, worst=0.1, slipped=0.0)
@@ -103,19 +101,6 @@ def test_a_run_that_has_not_begun_shows_who_waits() -> None:
     assert text.splitlines()[3].endswith("has not reported yet")
 
 
-def test_a_frozen_agent_is_silent() -> None:
-    """A token without a status is told with the time since the last one."""
-    (line, _) = monitor().snapshot({"inv1"}, now=14.0).inverters
-
-    assert line.note == "silent for 4 s"
-    assert line.received is None
-
-
-def test_a_silent_plant_is_told() -> None:
-    """Old numbers are not shown as if they were new."""
-    assert monitor().snapshot({"inv1"}, now=14.0).pace == "the plant has been silent for 4 s"
-
-
 def numbers(line: InverterStatus) -> set[float | None]:
     """Telemetry of an inverter."""
     return {line.f, line.P, line.P_set, line.P_share, line.Q, line.V, line.V_set}
@@ -134,60 +119,6 @@ def test_after_the_end_of_a_run_no_number_of_it_is_shown_as_if_it_went_on() -> N
     assert broke.snapshot((), now=10.3).pace == "the run has ended: the deadline of inv1 passed"
 
 
-def test_numbers_of_a_silent_plant_are_not_shown() -> None:
-    """The numbers of a killed plant, which sends no end, disappear after a silence, and return with the next plant."""
-    seen = monitor()
-    before, silent = seen.snapshot({"inv1"}, now=11.4).inverters[0], seen.snapshot({"inv1"}, now=11.6).inverters[0]
-    seen.telemetry(told(0.2, life=2), now=20.0)
-
-    assert before.P == 300.0
-    assert numbers(silent) == {None}
-    assert seen.snapshot((), now=20.0).inverters[0].P == 300.0
-
-
-def test_a_plant_that_comes_after_an_ended_run_runs() -> None:
-    """The end belongs to the former plant's life."""
-    seen = monitor()
-    seen.telemetry(replace(told(2.2), final=True), now=10.2)
-    seen.telemetry(told(0.2, life=2), now=20.0)
-
-    assert seen.snapshot((), now=20.0).pace.startswith("pace: 100.00 %")
-    assert seen.snapshot((), now=20.0).inverters[0].P == 300.0
-
-
-def test_a_restarted_plant_begins_a_new_list_of_events() -> None:
-    """Events before a restart of the plant belong to another run."""
-    seen = monitor()
-    seen.telemetry(told(0.2, life=2), now=20.0)
-
-    assert seen.snapshot((), now=20.0).events == ()
-
-
-def test_only_neighbours_in_use_count_as_heard() -> None:
-    """The note names neighbours whose state is too old, or which are in another island."""
-    seen = monitor()
-    seen.status(status("inv1", {"inv2": 0.01, "inv3": 0.02, "inv4": -1.0}, ("inv2", "inv3")), now=10.0)
-    line = seen.snapshot({"inv1"}, now=10.0).inverters[0]
-
-    assert line.ages == {"inv2": 0.01, "inv3": 0.02}
-    assert line.note == "without inv4"
-
-
-@pytest.mark.parametrize(
-    ("names", "text"),
-    [
-        ([], "-"),
-        (["inv2"], "inv2"),
-        (["inv1", "inv2"], "inv1,2"),
-        (["inv1", "inv2", "inv3", "inv10"], "inv1-3,10"),
-        (["a", "b", "inv7"], "a b inv7"),
-    ],
-)
-def test_names_take_little_room(names: list[str], text: str) -> None:
-    """Running numbers are put together."""
-    assert short(names) == text
-
-
 def test_watch_shows_the_same_as_a_table() -> None:
     """Every number of the text is in the table, with the keys below."""
     console = terminal(width=160, record=True, file=io.StringIO())
@@ -196,12 +127,6 @@ def test_watch_shows_the_same_as_a_table() -> None:
 
     for word in ("run lab", "60.010", "310.0", "without inv2", "no agent", "13-152 opened", "q: quit"):
         assert word in text
-
-
-def test_a_look_at_nothing_is_one_line() -> None:
-    """No agent, no plant: only the run's name."""
-    assert plain(Snapshot(run="lab")) == "run lab   has not begun\n"
-    assert InverterStatus(name="inv1").note == ""
 
 
 def test_impaired_links_are_shown_only_while_there_are_any() -> None:

@@ -5,31 +5,16 @@ from pathlib import Path
 
 import pytest
 
-from gridpeers.plant.plant_config import ScheduledAction
 from gridpeers.scenarios.catalogue_files import CATALOGUE
 from gridpeers.scenarios.live.live_options import LiveOptions, configure
 from gridpeers.scenarios.results.event_windows import as_they_came, late_moves
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.schema.configs import configs
 from gridpeers.scenarios.schema.participants import inverters_of
-from gridpeers.scenarios.schema.scenario_writing import to_toml
 from gridpeers.wire.messages import PlantEvent
 from tests.scenario_files import problems, written
 
 PLUG = (CATALOGUE / "plug-n-play.toml").read_text(encoding="utf-8")
-
-
-def test_plug_n_play_is_the_papers_experiment() -> None:
-    """Section 4: inverter 2 leaves at 2 s and returns at 3 s; all nine agents are awaited at the start."""
-    plant, agents = configs(*load_scenario("plug-n-play"), "IV")
-
-    assert plant.schedule == (
-        ScheduledAction(t=2.0, inverter="inv2", action="leave"),
-        ScheduledAction(t=3.0, inverter="inv2", action="join"),
-    )
-    assert plant.agents == tuple(agent.name for agent in agents)
-    assert len(agents) == 9
-    assert plant.settings.spares == ()
 
 
 def test_a_spare_that_joins_is_there_but_not_awaited_at_the_start(tmp_path: Path) -> None:
@@ -50,13 +35,6 @@ def test_in_a_live_run_people_move_the_agents(tmp_path: Path) -> None:
 
     assert plant.schedule == ()
     assert [agent.name for agent in agents] == [f"inv{i}" for i in range(1, 11)]
-
-
-def test_schedules_survive_the_runs_copy(tmp_path: Path) -> None:
-    """The scenario file in a run's folder is the same scenario again."""
-    scenario, _ = load_scenario("plug-n-play")
-
-    assert load_scenario(written(tmp_path, to_toml(scenario, {})))[0] == scenario
 
 
 @pytest.mark.parametrize(
@@ -82,18 +60,6 @@ def test_each_problem_is_told_with_its_place_and_what_would_be_right(
 
     assert any(re.search(said, line) for line in found), found
     assert all(line.startswith("mine.toml:") for line in found)
-
-
-def test_all_problems_come_at_once(tmp_path: Path) -> None:
-    """An unknown leaver, a leave at no tick, and a join of a present agent are reported together."""
-    text = PLUG.replace('leave = ["inv2"]', 'leave = ["inv99"]').replace("t_s = 2.0", "t_s = 2.006")
-    found = problems(tmp_path, text)
-
-    assert [re.sub(r".*?: ([^:]*): .*", r"\1", line) for line in found] == [
-        "event[1].t_s",
-        "event[1].leave",
-        "event[2].join",
-    ]
 
 
 def test_an_event_is_measured_from_when_it_came() -> None:

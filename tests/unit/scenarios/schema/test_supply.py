@@ -8,16 +8,13 @@ from pathlib import Path
 
 import pytest
 
-import gridpeers as gp
 from gridpeers.plant.plant_config import LoadEvent
 from gridpeers.plant.tables.read import DATA
 from gridpeers.scenarios.catalogue_files import CATALOGUE
-from gridpeers.scenarios.results.plots.drawing import happening
 from gridpeers.scenarios.schema import ScenarioError, load_scenario
 from gridpeers.scenarios.schema.check_notes import liar_notes
 from gridpeers.scenarios.schema.configs import configs
-from gridpeers.scenarios.schema.scenario_writing import to_toml
-from gridpeers.scenarios.schema.supply import powers_after, supply_notes
+from gridpeers.scenarios.schema.supply import supply_notes
 from gridpeers.wire.messages import LoadSetting
 from tests.command_line import invoke
 from tests.scenario_files import problems, written
@@ -56,27 +53,6 @@ def test_changes_of_loads_reach_the_plant(tmp_path: Path) -> None:
     )
 
 
-def test_a_written_scenario_has_its_loads(tmp_path: Path) -> None:
-    """The copy that a run leaves is the same scenario, with no key that nobody gave."""
-    scenario, feeder = load_scenario(written(tmp_path, TEXT))
-    text = to_toml(scenario, {})
-
-    assert "load = { 48 = { factor = 1.5 }, 65 = { P_kW = 0.0, Q_kvar = 0.0 } }\n" in text
-    assert text.count("\nload = ") == 2
-    assert load_scenario(written(tmp_path, text)) == (scenario, feeder)
-
-
-def test_a_power_that_is_left_out_stays(tmp_path: Path) -> None:
-    """After each event a load has what the events until then say, together."""
-    powers = [powers for _, powers in powers_after(*load_scenario(written(tmp_path, TEXT)))]
-
-    assert powers == [
-        {},
-        {"48": 315e3 + 225e3j, "65": 0j},
-        {"48": 315e3 + 10.5e3j, "65": pytest.approx(140e3 + 100e3j)},
-    ]
-
-
 def test_a_load_is_named_by_its_bus_once(tmp_path: Path) -> None:
     """What is wrong with the loads of all events is told at once."""
     found = problems(tmp_path, TEXT.replace("factor = 1.5", "P_kW = 1e9").replace("65.factor", "650.factor"))
@@ -95,24 +71,6 @@ def test_an_island_is_noted_with_the_load_that_it_has_then(tmp_path: Path) -> No
     assert len(notes) == 2
     assert notes[0].startswith('event "step" at 1.5 s leaves 5')
     assert "more than they can feed" in notes[0]
-
-
-def test_a_figure_says_what_happens_to_loads(tmp_path: Path) -> None:
-    """One load by its name and power; several by their number."""
-    scenario, _ = load_scenario(written(tmp_path, TEXT.replace("load.65.factor = 1\n", "")))
-
-    assert [happening(event, scenario) for event in scenario.events] == [
-        "13-152 opens",
-        "2 loads change",
-        "load 48: 10.5 kvar",
-    ]
-
-
-def test_a_sweep_and_a_change_in_python_reach_a_load(tmp_path: Path) -> None:
-    """The factor of one load is a key like any."""
-    scenario = gp.load(written(tmp_path, TEXT)).replace({"event[1].load.48.factor": 0.5})
-
-    assert scenario.spec.events[1].load["48"].factor == 0.5
 
 
 ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
@@ -146,39 +104,6 @@ def test_a_feeder_of_followers_alone_cannot_begin_without_the_grid(tmp_path: Pat
     ), found
 
 
-def test_an_open_switch_that_cuts_off_load_at_the_start_is_refused(tmp_path: Path, folder: Path) -> None:
-    """Load behind a switch that is open in the beginning is a problem if nothing stands there to feed it."""
-    replace(folder, "switches.csv", "60,160,ABC,closed", "60,160,ABC,open")
-    replace(folder, "switches.csv", "13,152,ABC,closed", "13,152,ABC,open")
-    text = re.sub(r"(?s)\[\[event\]\].*?(?=\[case)", "", MINE)
-
-    (found,) = problems(tmp_path, text)
-
-    assert "at t = 0 nothing feeds 18 buses (52, 53, 54," in found
-    assert "1360 kW of load: " in found
-
-
-def test_a_feeder_of_followers_alone_runs_with_the_grid_and_a_note_tells_the_blackout(
-    tmp_path: Path, folder: Path
-) -> None:
-    """A blackout may be meant: the event that makes it is told in a note, with what goes dark."""
-    replace(folder, "inverters.csv", ",GFM,", ",GFL,")
-
-    notes = supply_notes(*load_scenario(written(tmp_path, MINE)))
-
-    assert len(notes) == 1
-    assert re.match(r'event "event1" at 1 s de-energises \d+ buses \(.*\) with \d+ kW of load and inv1, inv2', notes[0])
-    assert "no grid-forming inverter" in notes[0]
-
-
-def test_the_zone_that_the_paper_drops_is_told() -> None:
-    """Event 2 of the islanding experiment de-energises the passive zone and no inverter."""
-    (note,) = supply_notes(*load_scenario("islanding"))
-
-    assert note.startswith('event "event2" at 4 s de-energises 18 buses (52, 53, 54, ')
-    assert "with 1360 kW of load: " in note
-
-
 def test_the_last_leader_that_leaves_is_told(tmp_path: Path) -> None:
     """An agent that leaves takes its inverter with it, and an island its frequency if it was the last leader."""
     text = ISLANDING.replace('open = ["60-160"]', 'leave = ["inv1", "inv4", "inv7"]')
@@ -187,12 +112,6 @@ def test_the_last_leader_that_leaves_is_told(tmp_path: Path) -> None:
 
     assert note.startswith('event "event2" at 4 s de-energises ')
     assert "inv2, inv3, inv5, inv6, inv8, inv9" in note
-
-
-@pytest.mark.parametrize("name", [path.stem for path in CATALOGUE.glob("*.toml")])
-def test_no_catalogue_scenario_stops_an_inverter(name: str) -> None:
-    """Where nothing is said of inverters, none loses its leader in the catalogue."""
-    assert not any(" and inv" in note for note in supply_notes(*load_scenario(name)))
 
 
 def test_an_island_with_more_load_than_rating_is_told(tmp_path: Path, folder: Path) -> None:

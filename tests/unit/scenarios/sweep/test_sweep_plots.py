@@ -16,7 +16,7 @@ from gridpeers.scenarios.catalogue_files import CATALOGUE
 from gridpeers.scenarios.record.journal_reader import values_of
 from gridpeers.scenarios.results.plots.run_figures import draw_all, figures_of
 from gridpeers.scenarios.sweep.sweep_case import FATE
-from gridpeers.scenarios.sweep.sweep_plots import curves, heat_maps, indexes_of, is_drawn, spread_of
+from gridpeers.scenarios.sweep.sweep_plots import curves, indexes_of, spread_of
 from gridpeers.scenarios.sweep.sweep_table import label_of
 
 
@@ -92,20 +92,6 @@ def test_axes_say_what_is_varied_in_words_with_units_and_no_key_of_the_file() ->
     assert label_of("plant.gfl.T_pf") == "T_pf of [plant.gfl] (s)"
 
 
-def test_rounding_is_not_drawn_as_structure() -> None:
-    """Values that differ by 1e-16 lie flat at the foot of an axis, with one colour in a map; 0.1 of MPSI is seen."""
-    noise = [1e-16 * number for number in range(4)]
-    swept = table({"a": [1, 2, 3, 4]}, MPSI=noise, V_error=[0.0, 0.1, 0.0, 0.1])
-    flat, seen = curves(swept, "event1", "a").axes[:2]
-    mapped = table({"a": [1, 1, 2, 2], "b": [1, 2, 1, 2]}, MPSI=noise, V_error=[0.0, 0.1, 0.0, 0.1])
-    plain, told = (axes.collections[0] for axes in heat_maps(mapped, "event1", "a", "b", "IV").axes[:2])
-
-    assert flat.get_ylim() == (0.0, 0.01)
-    assert seen.get_ylim()[1] > 0.1
-    assert plain.get_clim() == (0.0, 0.01)
-    assert told.get_clim() == (0.0, 0.1)
-
-
 @given(st.lists(st.tuples(st.integers(0, 3), st.none() | st.floats(0.0, 9.0)), min_size=1, max_size=30))
 def test_a_time_that_never_came_counts_as_later_than_all_others(runs: list[tuple[int, float | None]]) -> None:
     """Median and range by sorting, None last: no run is left out because it was bad."""
@@ -122,14 +108,3 @@ def test_a_time_that_never_came_counts_as_later_than_all_others(runs: list[tuple
         came = [t for t in mine if t < np.inf]
         assert [row["low"], row["high"]] == ([came[0], came[-1]] if came else pytest.approx([np.nan] * 2, nan_ok=True))
     assert np.isnan(values_of(rows, "event1.MPSI")).sum() == sum(t is None for _, t in runs)
-
-
-def test_what_was_drawn_at_random_is_grouped_into_equal_parts() -> None:
-    """More values than an axis can have: their medians over groups of as many runs each."""
-    at = pd.Series(np.random.default_rng(3).permutation(np.arange(120.0)))
-
-    spread = spread_of(at, 2.0 * at)
-
-    assert is_drawn(at)
-    assert spread.index.tolist() == [4.5 + 10 * i for i in range(12)]
-    assert spread["median"].tolist() == [9.0 + 20 * i for i in range(12)]
