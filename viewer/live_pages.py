@@ -160,13 +160,7 @@ class OwnAgents:
 
 
 def looks_only(credentials: Credentials | None) -> str:
-    """Return that a page without `--control` only looks, and what would let it act.
-
-    A role that may not command gets no advice to say `--control` alone, which would be refused.
-
-    >>> looks_only(None)
-    'the page only looks (--control lets it act)'
-    """
+    """Return that a page without `--control` only looks, and how the same person could act."""
     if credentials is None or credentials.own.role in COMMANDING:
         return "the page only looks (--control lets it act)"
     folder = Path(credentials.certificate).parent

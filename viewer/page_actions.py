@@ -47,13 +47,7 @@ class PageAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
                 raise ValueError(f"{name!r:.40} is no name of a switch, load, inverter or agent: those begin otherwise")
 
     def words(self) -> list[str]:
-        """Return the words of the command that does the same.
-
-        >>> PageAction(kind="cut", subject="inv1", other="inv4").words()
-        ['link', 'cut', 'inv1', 'inv4']
-        >>> PageAction(kind="load", subject="48", P_kW=300.0, Q_kvar=90.0).words()
-        ['load', '48', '--P', '300', '--Q', '90']
-        """
+        """Return the words of the command that does the same."""
         match self.kind:
             case "open" | "close":
                 return ["event", self.kind, self.subject]
@@ -143,14 +137,6 @@ def scenario_form(action: PageAction) -> str:
 
     An entry `[[event]]` needs a label and t_s beside, and `[[link]]` takes from_s and to_s; to heal a link is to_s of
     the entry that cuts it.
-
-    >>> print(scenario_form(PageAction(kind="load", subject="48", factor=1.5)))
-    [[event]]
-    load = { 48 = { factor = 1.5 } }
-    >>> print(scenario_form(PageAction(kind="loss", subject="inv1", other="inv4", value=0.25)))
-    [[link]]
-    on = "inv1 <-> inv4"
-    loss = 0.25
     """
     match action.kind:
         case "open" | "close":

@@ -94,11 +94,11 @@ def _process(folder: Path, listening: socket.socket) -> Iterator[subprocess.Pope
 
 
 def serve(config: PageConfig) -> str:
-    from gridpeers.viewer.page_server import PageOptions, PageServer
+    from gridpeers.viewer.page_server import PageServer
     from gridpeers.viewer.record_pages import RecordedRun, RecordPages
 
     with socket.socket(fileno=config.descriptor) as listening:
-        PageServer(RecordPages(RecordedRun(Path(config.path))), PageOptions()).run(listening)
+        PageServer(RecordPages(RecordedRun(Path(config.path)))).run(listening)
     return ""
 
 

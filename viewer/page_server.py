@@ -10,7 +10,6 @@ import secrets
 import signal
 import socket
 from collections.abc import AsyncIterator, Coroutine
-from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any, NoReturn, Protocol
@@ -43,6 +42,8 @@ _log = logging.getLogger("view")
 
 COOKIE = "gridpeers_view"
 
+LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
+
 HEADERS = {
     "Content-Security-Policy": "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
     "frame-ancestors 'none'; base-uri 'none'; form-action 'self'",
@@ -56,15 +57,6 @@ _ASK_TOKEN = """<!doctype html><html lang="en"><meta charset="utf-8"><title>grid
 <form method="post" action="/token"><label>Token, as the command printed it
 <input name="token" type="password" autofocus required></label><button>Open</button></form>
 <p role="alert">%s</p></main></html>"""
-
-
-@dataclass(frozen=True, kw_only=True)
-class PageOptions:
-    token: str = ""
-    """What a page must know; "" asks for none."""
-    hosts: tuple[str, ...] = ("127.0.0.1", "localhost", "[::1]")
-    """Names in the address of the page; () takes any. Without it, a page of others could reach this one under a name of
-    theirs (DNS rebinding)."""
 
 
 Talk = Coroutine[Any, Any, None]
@@ -81,8 +73,13 @@ class Pages(Protocol):
 
 
 class PageServer:
-    def __init__(self, pages: Pages, options: PageOptions) -> None:
-        self._pages, self._options = pages, options
+    """Serve pages to whoever knows the token ("" asks for none), under names of the page in an address.
+
+    () takes any name. Without a list, a page of others could reach this one under a name of theirs (DNS rebinding).
+    """
+
+    def __init__(self, pages: Pages, token: str = "", hosts: tuple[str, ...] = LOOPBACK) -> None:
+        self._pages, self._token, self._hosts = pages, token, hosts
 
     def run(self, listening: socket.socket) -> None:
         """Serve on a socket that listens; SIGINT ends in KeyboardInterrupt, SIGTERM in StoppedError."""
@@ -124,11 +121,11 @@ class PageServer:
         host = connection.headers.get("host", "")
         name = host.rpartition(":")[0] if host.rpartition(":")[2].isdigit() else host
         origin = connection.headers.get("origin")
-        known = not self._options.hosts or name in self._options.hosts
+        known = not self._hosts or name in self._hosts
         return known and (origin is None or origin in (f"http://{host}", f"https://{host}"))
 
     def _knows_token(self, connection: HTTPConnection) -> bool:
-        token = self._options.token
+        token = self._token
         return not token or secrets.compare_digest(connection.cookies.get(COOKIE, "").encode(), _hashed(token).encode())
 
     async def _index(self, request: Request) -> Response:
@@ -147,7 +144,7 @@ class PageServer:
         return self._let_in(parse_qs(body).get("token", [""])[0])
 
     def _let_in(self, given: str) -> Response:
-        token = self._options.token
+        token = self._token
         if token and not secrets.compare_digest(_hashed(given), _hashed(token)):
             return _answer(_ASK_TOKEN % "That is not the token of this view.", 401)
         answer = _answer("", 303, Location="/")
@@ -219,9 +216,6 @@ async def send(socket: WebSocket, text: str) -> None:
         raise WebSocketDisconnect(1006, str(error)) from error
 
 
-LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
-
-
 def listen(address: str, port: int) -> socket.socket:
     """Return a socket that listens; port 0 takes any free one. UsageError if the port is in use."""
     if not 0 <= port <= 65535:
@@ -250,9 +244,6 @@ def access(address: str, token: str) -> tuple[str, tuple[str, ...]]:
 
     On this host's loopback no token is needed, and only names of this host are taken. Beyond it a token is: without a
     given one it is made up.
-
-    >>> access("127.0.0.1", "")
-    ('', ('127.0.0.1', 'localhost', '[::1]'))
     """
     if token != token.encode(errors="replace").decode():
         raise UsageError("--token: has bytes that are no text; give letters and digits")

@@ -232,22 +232,7 @@ class LivenessView(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Liveness:
-    """Decide from tokens and telemetry whether numbers are of now.
-
-    >>> liveness = Liveness()
-    >>> liveness.at(0.0).word
-    'waiting'
-    >>> liveness.heard(1, 1.0, ended=None)
-    False
-    >>> liveness.token(there=True, now=1.0)
-    >>> liveness.at(1.1).word, liveness.at(3.0).text
-    ('live', 'The plant has been silent for 2.0 s: frozen, or out of reach.')
-    >>> liveness.token(there=False, now=3.0)
-    >>> liveness.at(3.5).text
-    'The plant is gone; its last word came 2.5 s ago.'
-    >>> liveness.heard(2, 4.0, ended=None), liveness.at(4.0).word, liveness.at(4.0).restarts
-    (True, 'live', 1)
-    """
+    """Decide from tokens and telemetry whether numbers are of now."""
 
     def __init__(self) -> None:
         self._epoch: int | None = None
@@ -271,19 +256,17 @@ class Liveness:
             self._gone_at = now
 
     def at(self, now: float) -> LivenessView:
-        silent = None if self._heard_at is None else now - self._heard_at
+        word: Word = "live"
+        text, silent = "live", None if self._heard_at is None else now - self._heard_at
         if self._end is not None:
-            return self._view("ended", f"The run has ended{': ' + self._end if self._end else ''}.", silent)
-        if self._gone_at is not None and silent is not None:
-            return self._view("gone", f"The plant is gone; its last word came {silent:.1f} s ago.", silent)
-        if silent is None:
-            return self._view("waiting", "The run has not begun: the plant waits for its agents.", None)
-        if silent > FROZEN:
-            text = f"The plant has been silent for {silent:.1f} s: frozen, or out of reach."
-            return self._view("frozen", text, silent)
-        return self._view("live", "live", None)
-
-    def _view(self, word: Word, text: str, since: float | None) -> LivenessView:
-        again = f" The plant was restarted {self._restarts} times." if self._restarts and word != "live" else ""
-        since = None if since is None else round(since, 1)
-        return LivenessView(word=word, text=text + again, since=since, restarts=self._restarts)
+            word, text = "ended", f"The run has ended{': ' + self._end if self._end else ''}."
+        elif silent is None:
+            word, text = "waiting", "The run has not begun: the plant waits for its agents."
+        elif self._gone_at is not None:
+            word, text = "gone", f"The plant is gone; its last word came {silent:.1f} s ago."
+        elif silent > FROZEN:
+            word, text = "frozen", f"The plant has been silent for {silent:.1f} s: frozen, or out of reach."
+        if self._restarts and word != "live":
+            text += f" The plant was restarted {self._restarts} times."
+        since = None if silent is None or word == "live" else round(silent, 1)
+        return LivenessView(word=word, text=text, since=since, restarts=self._restarts)

@@ -28,22 +28,11 @@ finite, or of an inverter off the network."""
 
 
 class Strips:
-    """Keep points of the last `LENGTH` seconds.
-
-    >>> strips = Strips()
-    >>> strips.add(("inv1",), [(0.0, 60.0, 3e5, 0.0, 277.0, 3e5, 277.0), (0.01, 60.0, 3e5, 0.0, 277.0, 3e5, 277.0)], {})
-    >>> strips.since(-1.0)
-    [(0.0, (60.0, None, None, None, None, None))]
-    """
+    """Keep points of the last `LENGTH` seconds."""
 
     def __init__(self) -> None:
         self._points: deque[Point] = deque()
         self._due = 0.0
-
-    @property
-    def latest(self) -> float:
-        """Run time (s) of the latest point; -1 before the first."""
-        return self._points[-1][0] if self._points else -1.0
 
     def clear(self) -> None:
         self._points.clear()
@@ -57,7 +46,7 @@ class Strips:
             if row[0] + 1e-9 >= self._due:
                 self._due = next_due(row[0], len(inverters))
                 self._points.append(point_of(inverters, row, configs))
-        while self._points and self._points[0][0] < self.latest - LENGTH:
+        while self._points and self._points[0][0] < self._points[-1][0] - LENGTH:
             self._points.popleft()
 
     def since(self, t: float) -> list[Point]:

@@ -103,14 +103,14 @@ def _serve(
         token, hosts = access(address, token)
         listening = listen(address, port)  # first: a port in use is told at once
     with listening, pages() as (shown, line):
-        from gridpeers.viewer.page_server import PageOptions, PageServer
+        from gridpeers.viewer.page_server import PageServer
         from gridpeers.wire.driver.drive import StoppedError
 
         watch_readers(quits=False)
         signal = "SIGINT"
         typer.echo(line(url_of(listening, address) + (f"?token={quote(token, safe='')}" if token else "")))
         try:
-            PageServer(shown, PageOptions(token=token, hosts=hosts)).run(listening)
+            PageServer(shown, token, hosts).run(listening)
         except (KeyboardInterrupt, StoppedError) as stop:
             signal = str(stop) or "SIGINT"
         finished = f"{signal}: the page has ended"

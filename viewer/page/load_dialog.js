@@ -1,5 +1,5 @@
 // The dialog that sets a load: times its table, or in kW and kvar.
-const $ = id => document.getElementById(id);
+import { $ } from "./dom.js";
 const kilo = value => Number((value / 1e3).toPrecision(6));
 
 export class LoadDialog {

@@ -1,10 +1,11 @@
 // Plays a record: the time that is shown, what changes it, and the events to jump to.
+import { $, eventParts, make, put } from "./dom.js";
 const SPEEDS = [0.1, 0.2, 0.5, 1, 2, 5, 10], LISTED = 2000, MARKED = 300;
 
 export class Player {
   // send(question): asks the server for a time; latest(): time of the last point that the page has; chosen(): agent whose decision is shown
-  constructor($, send, latest, chosen) {
-    Object.assign(this, { $, send, latest, chosen, record: null, news: null, events: [], t: 0, speed: 1, playing: false, following: true, busy: false, due: false, decided: 0, case: "", shown: 0, wish: null });
+  constructor(send, latest, chosen) {
+    Object.assign(this, { send, latest, chosen, record: null, news: null, events: [], t: 0, speed: 1, playing: false, following: true, busy: false, due: false, decided: 0, case: "", shown: 0, wish: null });
     this.readAddress(); addEventListener("hashchange", () => { if (location.hash !== this.address) { this.readAddress(); this.resume(); } });
     const speed = $("speed");
     speed.replaceChildren(...SPEEDS.map(value => new Option(`${value}×`, value, value === 1, value === 1)));
@@ -22,18 +23,18 @@ export class Player {
   open(record) {
     this.record = record; this.news = null; this.events = []; this.busy = false; this.due = false; this.playing = false;
     this.following = this.wish === null; this.t = this.wish ?? 0; this.shown = this.t;
-    this.$("event-list").replaceChildren(); this.$("marks").replaceChildren();
+    $("event-list").replaceChildren(); $("marks").replaceChildren();
   }
   // a connection that was lost comes back with the record anew
   keepTime() { if (this.record && !this.following) this.wish = this.t; }
   take(news) {
     const first = !this.news || this.news.case !== news.case, grown = first || news.t_end > this.news.t_end || news.growth !== this.news.growth;
     this.news = news; this.list(news.events || []);
-    const cases = ["", ...news.cases], select = this.$("case");
+    const cases = ["", ...news.cases], select = $("case");
     if (select.options.length !== cases.length) select.replaceChildren(...cases.map(name => new Option(name || `${news.cases.at(-1)}, the latest`, name, false, name === this.case)));
     select.parentElement.hidden = news.cases.length < 2;
-    const notes = [...(news.notes || [])], holder = this.$("notes");
-    if (holder.textContent !== notes.join("")) holder.replaceChildren(...notes.map(text => { const line = document.createElement("li"); line.textContent = text; return line; }));
+    const notes = [...(news.notes || [])], holder = $("notes");
+    if (holder.textContent !== notes.join("")) holder.replaceChildren(...notes.map(text => make("li", {}, text)));
     if (this.case && !news.cases.includes(this.case)) this.case = "";
     if (first || grown && this.following) this.ask();
     if (!this.case || this.case === news.case) this.wish = null;
@@ -52,7 +53,7 @@ export class Player {
   go(t) { if (!this.record) return; this.following = false; this.t = Math.min(Math.max(0, t), this.end); this.ask(); this.show(); }
   goTo(t) {
     const beyond = t > this.end + 1e-9;
-    this.$("goto-note").textContent = beyond ? `the record ends at ${this.end.toFixed(2)} s` : "";
+    $("goto-note").textContent = beyond ? `the record ends at ${this.end.toFixed(2)} s` : "";
     if (t >= 0 && !beyond) { this.stop(); this.go(t); }  // nothing was typed: NaN
   }
   step(n) {
@@ -76,7 +77,7 @@ export class Player {
     this.ask(); this.show();
     if (this.playing) requestAnimationFrame(next => this.run(next));
   }
-  faster(by) { const at = Math.min(Math.max(0, SPEEDS.indexOf(this.speed) + by), SPEEDS.length - 1); this.speed = SPEEDS[at]; this.$("speed").value = String(this.speed); }
+  faster(by) { const at = Math.min(Math.max(0, SPEEDS.indexOf(this.speed) + by), SPEEDS.length - 1); this.speed = SPEEDS[at]; $("speed").value = String(this.speed); }
   key(event) {
     if (event.defaultPrevented) return;  // an item of the diagram has taken it
     const at = event.target, scrolls = at.classList?.contains("scroll");
@@ -99,13 +100,10 @@ export class Player {
 
   // ---- what is seen
   show() {
-    const { $ } = this;
     if (!this.record) return;
     const slider = $("slider"), text = `${this.shown.toFixed(2)} s of ${this.end.toFixed(2)} s`;
     slider.max = String(this.end); slider.value = String(this.t); slider.setAttribute("aria-valuetext", text);
-    if ($("at").textContent !== text) $("at").textContent = text;
-    const word = this.playing ? "Pause" : "Play";
-    if ($("play").textContent !== word) $("play").textContent = word;
+    put($("at"), text); put($("play"), this.playing ? "Pause" : "Play");
     $("to-end").setAttribute("aria-pressed", String(this.following && this.grows));
     this.writeAddress();
     for (const mark of $("marks").children) mark.style.left = `${100 * mark.dataset.t / (this.end || 1)}%`;
@@ -128,18 +126,16 @@ export class Player {
     }, 150);
   }
   list(events) {
-    const list = this.$("event-list"), marks = this.$("marks");
+    const list = $("event-list"), marks = $("marks");
     for (const event of events) {
       if (this.events.push(event) > LISTED) continue;
-      const line = document.createElement("li"), button = document.createElement("button"), time = document.createElement("span"), text = document.createElement("span");
-      button.type = "button"; button.className = "jump"; button.dataset.t = event.t; time.className = "time"; time.textContent = `${event.t.toFixed(2)} s`;
-      text.textContent = event.text.replace(/, at t = [0-9.e+]+ s$/, ""); text.className = `kind-${event.kind}`;
-      button.append(time, text); button.addEventListener("click", () => { this.stop(); this.go(event.t); }); line.append(button); list.append(line);
+      const button = make("button", { type: "button", className: "jump", onclick: () => { this.stop(); this.go(event.t); } }, ...eventParts(event));
+      button.dataset.t = event.t; list.append(make("li", {}, button));
       if (this.events.length > MARKED) continue;
-      const mark = document.createElement("i"); mark.dataset.t = event.t; mark.className = `kind-${event.kind}`; marks.append(mark);
+      const mark = make("i", { className: `kind-${event.kind}` }); mark.dataset.t = event.t; marks.append(mark);
     }
-    if (this.events.length > LISTED && !list.querySelector(".more")) { const line = document.createElement("li"); line.className = "more"; line.textContent = `only the first ${LISTED} events are listed`; list.append(line); }
+    if (this.events.length > LISTED && !list.querySelector(".more")) list.append(make("li", { className: "more" }, `only the first ${LISTED} events are listed`));
   }
   // events after the time that is shown have not happened yet
-  mark(t) { for (const button of this.$("event-list").querySelectorAll(".jump")) button.classList.toggle("to-come", button.dataset.t > t + 1e-9); }
+  mark(t) { for (const button of $("event-list").querySelectorAll(".jump")) button.classList.toggle("to-come", button.dataset.t > t + 1e-9); }
 }

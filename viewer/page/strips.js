@@ -1,4 +1,5 @@
 // The last 30 s of f, P, Q, V, MPSI and MQSI on canvases, with the events on the same axis.
+import { make } from "./dom.js";
 const LENGTH = 30, LEFT = 44, RIGHT = 8, AXIS = 18;
 const QUANTITIES = [
   { key: "f", label: "f", unit: "Hz", digits: 3, least: 0.02 },
@@ -13,12 +14,8 @@ export class Strips {
   constructor(holder) {
     this.points = []; this.names = []; this.lit = ""; this.ranges = {}; this.end = null; this.length = LENGTH;
     this.charts = QUANTITIES.map((quantity, i) => {
-      const figure = document.createElement("figure"), caption = document.createElement("figcaption");
-      const canvas = document.createElement("canvas"), now = document.createElement("span");
-      caption.textContent = quantity.label + (quantity.unit ? ` (${quantity.unit})` : "");
-      caption.append(now); canvas.setAttribute("role", "img");
-      canvas.setAttribute("aria-label", `${quantity.label}, last ${LENGTH} s; the table of agents has the present values`);
-      figure.append(caption, canvas); holder.append(figure);
+      const canvas = make("canvas", { role: "img", ariaLabel: `${quantity.label}, last ${LENGTH} s; the table of agents has the present values` }), now = make("span");
+      holder.append(make("figure", {}, make("figcaption", {}, quantity.label + (quantity.unit ? ` (${quantity.unit})` : ""), now), canvas));
       return { quantity, canvas, now, axis: i === QUANTITIES.length - 1 };
     });
   }

@@ -1,17 +1,17 @@
 // The page of a run: takes frames from the server, shows them, and sends what is clicked.
 import { Diagram, pairOf } from "./diagram.js";
 import { diagramText } from "./diagram_keys.js";
+import { $, eventParts, make, put } from "./dom.js";
 import { LoadDialog, loadWords } from "./load_dialog.js";
 import { Player } from "./player.js";
 import { Strips } from "./strips.js";
 
-const $ = id => document.getElementById(id);
 const silence = () => 1000 * (S.hello?.silent_s ?? 1); // ms without a word after which the numbers are old
 const S = { hello: null, map: null, frame: null, links: new Map(), switches: {}, loads: {}, events: [], inverters: new Map(), pending: new Map(), lit: "", tip: null, heard: 0, socket: null, chosen: "" };
 window.gridpeersView = S;
 
 const diagram = new Diagram($("diagram"), click, look), strips = new Strips($("canvases")), loadDialog = new LoadDialog(act);
-const player = new Player($, ask, () => strips.points.length ? strips.latest : -1, () => S.chosen);
+const player = new Player(ask, () => strips.points.length ? strips.latest : -1, () => S.chosen);
 window.gridpeersPlayer = player;
 const number = (value, digits) => value === null || value === undefined ? "–" : value.toFixed(digits).replace(/^-(0\.?0*)$/, "$1");
 const COLUMNS = [
@@ -43,8 +43,8 @@ function legend() {
   document.querySelectorAll(".key .microgrid").forEach(item => item.remove());
   const rows = (S.map?.inverters || []).filter(row => row.microgrid), named = new Map(rows.map(row => [row.microgrid, row.name]));
   for (const [microgrid, one] of named) {
-    const item = document.createElement("li"), mark = document.createElement("i"); item.className = "microgrid"; mark.className = "m";
-    mark.style.background = colourOf(one); item.append(mark, microgrid); document.querySelector(".key").append(item);
+    const mark = make("i", { className: "m", style: `background:${colourOf(one)}` });
+    document.querySelector(".key").append(make("li", { className: "microgrid" }, mark, microgrid));
   }
 }
 let colours = [];
@@ -94,9 +94,7 @@ function takeFrame(frame) {
   S.inverters = new Map(frame.inverters.map(one => [one.name, one]));
   for (const event of frame.events || []) {
     S.events.push(event);
-    const line = document.createElement("li"), time = document.createElement("span"), text = document.createElement("span");
-    time.className = "time"; time.textContent = `${event.t.toFixed(2)} s`; text.textContent = event.text.replace(/, at t = [0-9.e+]+ s$/, ""); text.className = `kind-${event.kind}`;
-    line.append(time, text); $("event-list").prepend(line);
+    $("event-list").prepend(make("li", {}, ...eventParts(event)));
   }
   while (!S.hello.record && S.events.length > 200) { S.events.shift(); $("event-list").lastChild.remove(); }
   if (S.hello.record) { strips.length = Math.min(30, Math.max(1, frame.t)); strips.end = Math.max(frame.t, strips.length); put($("strips-title"), frame.t < 30 ? "From the start" : "30 s up to then"); player.answered(frame); }
@@ -144,12 +142,10 @@ function draw() {
 }
 const acts = () => S.hello.control || S.hello.record;
 const stale = one => ({ ...one, f: null, P: null, P_set: null, P_share: null, Q: null, V: null, V_set: null, ages: {}, hears: null, late: false, off_voltage: false, received: null, sent: null, lost: null, island: "" });
-const put = (element, text) => { if (element.textContent !== text) element.textContent = text; };
 function heads() {
   const head = document.querySelector("thead tr"); head.replaceChildren(); document.querySelector("tbody").replaceChildren();
   for (const [title, unit, , kind] of [COLUMNS[0], ...(acts() ? [["", "", null, ""]] : []), ...COLUMNS.slice(1)]) {
-    const cell = document.createElement("th"); cell.scope = "col"; cell.textContent = title; cell.className = `${title === "agent" ? "text " : ""}${kind || ""}`.trim();
-    if (unit) { const small = document.createElement("small"); small.textContent = unit; cell.append(small); } head.append(cell);
+    head.append(make("th", { scope: "col", className: `${title === "agent" ? "text " : ""}${kind || ""}`.trim() }, title, ...(unit ? [make("small", {}, unit)] : [])));
   }
 }
 const tableRows = new Map();
@@ -159,13 +155,12 @@ function rows(inverters) {
   for (const one of inverters) {
     let row = tableRows.get(one.name);
     if (!row) {
-      const line = body.insertRow(), cells = COLUMNS.map(([, , , kind], c) => { const cell = c ? line.insertCell() : line.appendChild(document.createElement("th")); cell.className = `${c ? "" : "text "}${kind || ""}`.trim(); return cell; });
-      cells[0].scope = "row"; cells[0].style.position = "static"; cells[0].style.boxShadow = "none";
-      const dot = document.createElement("span"); dot.className = "dot"; dot.dataset.name = one.name; dot.style.cssText = `display:inline-block;width:9px;height:9px;border-radius:3px;margin-right:8px;background:${colourOf(one.name)}`;
-      const text = document.createElement("span"); cells[0].append(dot, text); cells[0].style.color = "var(--ink)"; cells[0].style.fontWeight = "600";
-      let button = null;
-      if (acts()) { const cell = line.insertCell(1); cell.className = "act"; button = document.createElement("button"); button.type = "button"; cell.append(button); button.addEventListener("click", () => click("agent", one.name)); }
-      line.addEventListener("pointerenter", () => light(one.name)); line.addEventListener("pointerleave", () => light(""));
+      const cells = COLUMNS.map(([, , , kind], c) => make(c ? "td" : "th", { className: `${c ? "" : "text "}${kind || ""}`.trim() }));
+      const dot = make("span", { className: "dot", style: `background:${colourOf(one.name)}` }), text = make("span");
+      dot.dataset.name = one.name; cells[0].scope = "row"; cells[0].append(dot, text);
+      const button = acts() ? make("button", { type: "button", onclick: () => click("agent", one.name) }) : null;
+      const line = make("tr", { onpointerenter: () => light(one.name), onpointerleave: () => light("") }, cells[0], ...(button ? [make("td", { className: "act" }, button)] : []), ...cells.slice(1));
+      body.append(line);
       row = { line, cells, text, button }; tableRows.set(one.name, row);
     }
     COLUMNS.forEach(([, , value], c) => put(c ? row.cells[c] : row.text, String(value(one))));
@@ -241,11 +236,9 @@ function act(action, key) { S.socket.send(JSON.stringify(action)); waiting.push(
 function done(result) {
   const key = result.command ? waiting.shift() : null, kind = S.pending.get(key);
   if (key && !(result.ok && (kind === "stop" || kind === "start"))) S.pending.delete(key);
-  const line = document.createElement("li"), text = document.createElement("span");
-  if (result.command) { const code = document.createElement("code"); code.textContent = result.command; line.append(code); }
-  text.textContent = result.text; line.append(text);
-  if (result.scenario) { const form = document.createElement("details"), head = document.createElement("summary"), entry = document.createElement("pre"); head.textContent = "in a scenario"; entry.textContent = result.scenario; form.append(head, entry); line.append(form); }
-  line.className = result.ok ? "" : "bad"; $("command-list").prepend(line);
+  const line = make("li", { className: result.ok ? "" : "bad" }, ...(result.command ? [make("code", {}, result.command)] : []), make("span", {}, result.text));
+  if (result.scenario) line.append(make("details", {}, make("summary", {}, "in a scenario"), make("pre", {}, result.scenario)));
+  $("command-list").prepend(line);
   while ($("command-list").children.length > 100) $("command-list").lastChild.remove();
   render();
 }

@@ -108,32 +108,17 @@ def test_a_link_that_does_otherwise_is_noticed(name: str) -> None:
 
 
 def test_sound_runs_of_any_kind_and_length_fail_no_more_often_than_promised() -> None:
-    """Of some 500 runs at most as many are below any level as the level says (Holm), also where bursts are rare."""
+    """Of some 250 runs at most as many are below any level as the level says (Holm), also where bursts are rare."""
     kinds = SOUND | {name: {"profile": name} for name in PROFILES}
     first = []
     for i, done in enumerate(kinds.values()):
-        for n, runs in ((5, 6), (60, 12), (450, 6)):
+        for n, runs in ((5, 4), (60, 8), (450, 2)):
             for seed in range(1000 * i, 1000 * i + runs):
                 values = [test.p for test in held_against(traced(done, n, seed), done, seed) if test.p is not None]
                 first += [min(1.0, len(values) * min(values))] if values else []
 
     for level in (0.001, 0.01, 0.05, 0.2):
         assert stats.binomtest(sum(p <= level for p in first), len(first), level, "greater").pvalue > 0.001
-
-
-@pytest.mark.parametrize("name", ["gilbert", "gilbert-elliott", "correlated"])
-def test_what_a_test_calls_improbable_is_as_rare_as_it_says(name: str) -> None:
-    """Of 150 sound links no test has more values of p below 0.2 than a fifth, chance aside."""
-    values: dict[str, list[float]] = {}
-    for seed in range(150):
-        for test in held_against(traced(SOUND[name], 300, seed), SOUND[name], seed):
-            assert test.p is not None
-            values.setdefault(test.what, []).append(test.p)
-
-    assert all(
-        stats.binomtest(sum(p <= 0.2 for p in found), 150, 0.2, "greater").pvalue > 0.01 for found in values.values()
-    )
-    assert all(min(found) < 0.05 for found in values.values())
 
 
 def test_one_falsified_link_of_72_is_the_only_one_that_is_named() -> None:

@@ -21,7 +21,7 @@ pytest.importorskip("uvicorn", reason="the page needs the extra view")
 SERVER = """
 import asyncio, functools, socket, uvicorn
 uvicorn.Config = functools.partial(uvicorn.Config, ws_ping_interval=0.1, ws_ping_timeout=0.1)
-from gridpeers.viewer.page_server import PageOptions, PageServer, send, texts
+from gridpeers.viewer.page_server import PageServer, send, texts
 class Pages:
     def close(self): pass
     def talk(self, page):
@@ -37,7 +37,7 @@ listening = socket.create_server(("127.0.0.1", 0))
 listening.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
 print(listening.getsockname()[1], flush=True)
 try:
-    PageServer(Pages(), PageOptions()).run(listening)
+    PageServer(Pages()).run(listening)
 except KeyboardInterrupt:
     print("ended")
 """

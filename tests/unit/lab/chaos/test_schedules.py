@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
-from unittest.mock import patch
 
 import pytest
 from hypothesis import given, settings
@@ -120,15 +119,6 @@ def test_a_failure_is_shrunk_to_what_makes_it() -> None:
     assert fails(simplest)
 
 
-def test_a_run_without_disturbances_that_fails_stays_empty() -> None:
-    """A base for which hypothesis draws nothing more has runs without any: their schedule is the simplest there is."""
-    base = base_named("islanding")
-
-    with patch.object(schedules_of_chaos, "_search"):
-        assert drawn(base, 1, 0) == [()] * BATCH
-        assert shrunk(base, 1, BATCH - 1, lambda schedule: True) == ()
-
-
 def test_shrinking_runs_each_schedule_once_and_no_more_than_it_may(monkeypatch: pytest.MonkeyPatch) -> None:
     """The disturbances that are left out one by one at the end count, too, and have a part of the runs for them."""
     base, tries = base_named("islanding"), 20
@@ -169,18 +159,6 @@ def test_a_lie_of_an_agent_that_has_left_changes_nothing_and_the_report_says_so(
     assert (row.history_sha256, row.passed) == (without.history_sha256, without.passed)
     assert "(nothing happens: inv4 has left at 0.3 s)" in failed.read_text(encoding="utf-8")
     assert next(summary.lines()).endswith("; disturbances: leave 1")
-
-
-def test_only_who_is_away_all_the_time_does_nothing(tmp_path: Path) -> None:
-    """A lie that begins before the leave, or ends after the return, or is another agent's, happens."""
-    (file := tmp_path / "small.toml").write_text(SMALL.format(extra=""), encoding="utf-8")
-    base = base_in(file)
-    early, late, idle = _lie("inv4", 0.2, 0.4), _lie("inv4", 0.5, 0.7), _lie("inv4", 0.4, 0.5)
-    schedule: Schedule = (late, idle, AWAY, early, _lie("inv1", 0.3, 0.5))
-
-    assert base.is_possible(schedule)
-    assert base.effective(schedule) == tuple(it for it in schedule if it is not idle)
-    assert ["nothing happens" in line for line in base.lines(schedule)] == [False, False, False, True, False]
 
 
 def test_every_check_with_a_first_time_gets_one_of_the_schedule() -> None:

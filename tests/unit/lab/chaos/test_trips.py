@@ -18,7 +18,7 @@ from gridpeers.lab.chaos.chaos_run import (
     run_scenario,
     run_schedule,
 )
-from gridpeers.lab.chaos.collapse import Collapse, collapses_at_changes, unexcused
+from gridpeers.lab.chaos.collapse import Collapse, collapses_at_changes
 from gridpeers.lab.chaos.disturbance import Disturbance
 from gridpeers.lab.chaos.disturbed_scenario import ChaosBase
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict, Violation
@@ -150,16 +150,6 @@ def test_a_collapse_excuses_no_other_island(monkeypatch: pytest.MonkeyPatch) -> 
     assert _run(monkeypatch, LASTS, LASTS, "inv7").collapse == ""
 
 
-def test_violations_that_a_verdict_does_not_keep_are_not_excused() -> None:
-    """Nobody knows of which inverters they are."""
-    verdict = replace(_verdict("inv1", "inv2"), count=30)
-
-    assert unexcused([verdict], WEST)["frequency"] == (
-        "frequency failed: 28 violations, beyond the 20 that a verdict keeps"
-    )
-    assert unexcused([_verdict("inv1", "inv2")], WEST) == {"frequency": ""}
-
-
 def test_a_run_that_never_settles_says_so(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Inverters that trip again in each longer run: the last is judged too early, and its line in chaos.csv tells."""
 
@@ -175,29 +165,6 @@ def test_a_run_that_never_settles_says_so(monkeypatch: pytest.MonkeyPatch, tmp_p
 
     assert row.unsettled.startswith(f"inverters trip and return: after {LONGER_RUNS} runs still judged from")
     assert row.unsettled in (tmp_path / "chaos.csv").read_text(encoding="utf-8")
-
-
-def test_a_base_with_faults_of_its_own_is_run_without_them(tmp_path: Path) -> None:
-    """The faults of its scenario and of its case go, all else stays; a base without any is itself."""
-    file = _file(tmp_path, 0.97)
-    calm = base_in(file)
-    faults = """
-[[node]]
-name = "inv1"
-from_s = 0.5
-kill = true
-
-[[case.IV.link]]
-on = "inv4 -> inv7"
-from_s = 0.5
-to_s = 0.9
-cut = true
-"""
-    file.write_text(file.read_text(encoding="utf-8") + faults, encoding="utf-8")
-
-    assert base_in(file).scenario != calm.scenario
-    assert base_in(file).without_faults().scenario == calm.scenario
-    assert calm.without_faults() is calm
 
 
 def test_only_first_trips_within_two_control_periods_come_before_any_control() -> None:

@@ -3,41 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any
 
 import msgspec
 import pytest
 
-from gridpeers.lab.communication.accounts import Missing
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.checks.judging import judge_by
-from gridpeers.wire.plugins.plugin import Plugin
 from tests.unit.lab.communication.records import LOSSY, in_real_time
 from tests.unit.scenarios.checks.cases import ran_with, verdict, with_content
-
-
-@pytest.mark.parametrize(("in_flight_s", "status"), [(7.0, "not judged"), (6.0, "passed")])
-def test_in_wall_clock_time_a_time_of_flight_longer_than_the_run_is_not_judged(in_flight_s: float, status: str) -> None:
-    """All that was sent may be on its way; in simulated time nothing is, so that the limit does not matter."""
-    found = SimpleNamespace(
-        unreadable=0,
-        counts={},
-        unjudged={},
-        info=SimpleNamespace(agent_names=("inv1", "inv2"), level="all"),
-        simulated=False,
-        dropped={},
-        arrivals={("inv1", "inv2"): []},
-        t_end=7.0,
-    )
-    limits = (("in_flight_s", in_flight_s),)
-    case: Any = SimpleNamespace(communication=found, case="IV")
-    (judged,) = judge_by({"message_account": Plugin(use="message_account", parameters=limits)}, case)
-
-    assert judged.status == status
-    found.simulated, found.unheard = True, {("inv1", "inv2"): Missing()}
-    (judged,) = judge_by({"message_account": Plugin(use="message_account", parameters=limits)}, case)
-    assert judged.status == "passed"
 
 
 def test_an_account_that_does_not_close_is_caught() -> None:

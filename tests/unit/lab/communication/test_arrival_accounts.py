@@ -92,7 +92,7 @@ def test_links_of_a_process_that_is_frozen_for_long_are_given_up() -> None:
 
 
 @pytest.mark.parametrize("renewed", LINK)
-@pytest.mark.parametrize("told_at", [50, 53, 70])
+@pytest.mark.parametrize("told_at", [50, 70])
 def test_the_links_of_a_new_session_are_made_anew(renewed: str, told_at: int) -> None:
     """Either end opens one at 5 s: what is lost in the second before and until something arrives is no fault."""
     ends = always, always
@@ -125,17 +125,3 @@ def test_a_short_pause_loses_nothing() -> None:
         return None if 30 <= k < 40 else 1
 
     assert missing(paused, always, [29]) == [2.9]
-
-
-def test_a_link_over_which_nothing_ever_arrives_is_missed() -> None:
-    """From 7 s after both ends are there: by then they must hear each other."""
-    assert missing(always, always, range(100)) == [round(0.1 * k, 9) for k in range(71, 90)]
-
-
-def test_a_new_process_that_never_hears_its_neighbour_is_missed() -> None:
-    """The receiver is another process from 1 s on, to which nothing comes: from 8 s on, that is missing."""
-
-    def restarted(k: int) -> int:
-        return 1 if k < 10 else 2
-
-    assert missing(always, restarted, range(10, 100)) == [round(0.1 * k, 9) for k in range(81, 90)]

@@ -87,21 +87,6 @@ def test_the_longest_time_that_both_are_at_work_is_that_of_a_heal(until: int, co
     assert found.count == count
 
 
-def test_a_heal_is_judged_whatever_is_planned_after_the_last_decision() -> None:
-    """A cut that is planned for later than anybody decides excuses nobody."""
-    spans = [(2.0, 2.16), (4.99, 5.0)]
-    changes = repr([{"on": "inv2 -> inv1", "cut": True, "from_s": a, "to_s": b} for a, b in spans])
-    case = ran_with((("case.IV.link", changes), ("time.end_s", "5.0"))).checked_case
-    content = case.content
-    decisions = {
-        agent: [(epoch, deaf(entry) if agent == "inv1" and entry.tick >= 100 else entry) for epoch, entry in entries]
-        for agent, entries in content.decisions.items()
-    }
-    found = verdict(with_content(case, replace(content, decisions=decisions)), "heal", within_s=1.0)
-
-    assert [one.agent for one in found.violations] == ["inv1"]
-
-
 def test_a_heal_is_not_judged_while_its_receiver_is_away() -> None:
     """inv2 leaves when a cut ends and comes back into another one: neither end is held against anybody."""
     links = [

@@ -52,14 +52,6 @@ def test_an_agent_whose_process_was_replaced_is_not_called_silent(sound: Checked
     )
 
 
-def test_an_agent_that_never_speaks_is_caught(sound: CheckedCase) -> None:
-    """It was configured, and nobody heard of it."""
-    states = {name: of for name, of in sound.content.states.items() if name != "inv7"}
-    found = verdict(with_content(sound, replace(sound.content, states=states)), "last_words")
-
-    assert found.violations[0].sentence == "never sends a state: inv7 at t = 0.00 s"
-
-
 def test_an_agent_that_the_scenario_kills_or_lets_leave_is_explained() -> None:
     """The scenario kills inv2; another one lets it leave and return."""
     assert verdict(ran_with(KILLED).checked_case, "last_words").sentence == "last_words passed"

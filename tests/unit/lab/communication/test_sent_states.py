@@ -2,22 +2,7 @@
 
 from __future__ import annotations
 
-import pytest
-
 from gridpeers.lab.communication.sent_states import SentState, SentStates, StateWindow
-
-
-def test_numbers_of_a_later_process_are_not_those_of_an_earlier_one() -> None:
-    """In wall-clock time every process counts anew: who is asked about a time gets the one that was there."""
-    sent = SentStates(simulated=False)
-    for epoch, since in ((1, 0.0), (2, 10.0)):
-        for number in range(100):
-            assert sent.put(SentState(number, since + 0.02 * number, epoch, idle=False, quiet=False))
-
-    assert sent.window_at(5.0).t(50) == pytest.approx(1.0)
-    assert sent.window_at(12.0).t(50) == pytest.approx(11.0)
-    assert sent.epochs == {1: (0.0, pytest.approx(1.98)), 2: (10.0, pytest.approx(11.98))}
-    assert not sent.put(SentState(50, 1.0, 1, idle=False, quiet=False)), "it came already"
 
 
 def test_epochs_have_no_order() -> None:

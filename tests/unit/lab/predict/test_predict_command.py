@@ -55,8 +55,6 @@ def test_who_leaves_and_returns_is_predicted_too() -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["predict"], "SCENARIO is missing"),
-        (["predict", "islandin"], 'did you mean "islanding"?'),
         (["predict", "islanding", "--case", "V"], '--case: no case "V"; did you mean "IV"?'),
         (["predict", "bad.toml"], "bad.toml:15: time.T_c_s: 20 s is not plausible"),
     ],
@@ -69,11 +67,3 @@ def test_bad_input_is_told_as_by_the_other_commands(elsewhere: Path, words: list
 
     assert code == 2
     assert said in text
-
-
-def test_help_shows_an_example() -> None:
-    """As every command's."""
-    code, text = invoke("predict", "--help")
-
-    assert code == 0
-    assert "Example:  gridpeers predict" in text

@@ -31,7 +31,7 @@ def random_graph(seed: int, n: int, *, directed: bool = False) -> np.ndarray:
     return A if directed else np.triu(A) + np.triu(A).T
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(6))
 def test_it_is_what_its_definition_says(seed: int) -> None:
     """For directed and undirected graphs of two to six agents, by all pairs of sets."""
     A = random_graph(seed, 2 + seed % 5, directed=seed % 2 == 0)
@@ -39,7 +39,7 @@ def test_it_is_what_its_definition_says(seed: int) -> None:
     assert robustness(A) == (by_definition(A), by_definition(A))
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(8))
 def test_the_bounds_of_large_graphs_hold(seed: int) -> None:
     """They enclose the exact number on graphs for which both can be had."""
     A = random_graph(seed, 4 + seed % 8)

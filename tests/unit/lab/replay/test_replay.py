@@ -14,7 +14,6 @@ from gridpeers.lab.replay.recorded_process import JournalParts, RecordedProcess,
 from gridpeers.lab.replay.replay import (
     ComparedRows,
     Difference,
-    Replay,
     ReplayedPart,
     message_difference,
     replay,
@@ -26,7 +25,7 @@ from gridpeers.netem.schema.netem import Netem
 from gridpeers.netem.schema.partition import Partition
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.wire.journal import MessageReference, ProcessEvent, ReceivedMessage, RejectedCount, Token, WakeUp
-from gridpeers.wire.messages import Measurement, State, Telemetry
+from gridpeers.wire.messages import State, Telemetry
 from gridpeers.wire.plugins.plugin import plugin_of
 from tests.record.fake_clock import FakeClockRun, fake_clock_record
 from tests.toy.toy_plant import ISLANDING, ToyPlant
@@ -89,14 +88,6 @@ def test_another_gain_is_named_where_it_first_acts(record: RunRecord) -> None:
     assert ISLANDING <= done.difference.t < 0.2
 
 
-def test_without_a_plant_the_agents_are_replayed_alone(record: RunRecord) -> None:
-    """As those of a run with the plant of another simulator."""
-    done = replay(record, None)
-
-    assert {part.name for part in done.parts} == {"inv1", "inv2", "inv3"}
-    assert done.difference is None
-
-
 def test_of_a_record_that_is_cut_off_what_there_is_is_replayed(record: RunRecord, tmp_path: Path) -> None:
     """The rest cannot be compared, and is no difference."""
     whole = record.path.read_bytes()
@@ -143,16 +134,6 @@ def test_the_steps_of_a_process_are_its_calls(record: RunRecord) -> None:
     assert all(isinstance(step.entry, WakeUp) for step in steps if step.sent)
 
 
-def test_the_plant_is_the_first_process(record: RunRecord) -> None:
-    """It sends a measurement to each agent that is there, at each step."""
-    first, *others = processes_of(record)
-
-    assert first.name == "plant"
-    assert sorted(each.name for each in others) == ["inv1", "inv2", "inv2", "inv3"]
-    sent = [message for step in first.steps() for message in step.sent]
-    assert {message.key for message in sent} == {f"measurement/inv{k}" for k in (1, 2, 3)}
-
-
 @pytest.mark.parametrize(("missing", "told"), [(2, "lacks 1 of its parts"), (0, "begins")])
 def test_where_parts_of_a_journal_are_lost_its_steps_end(missing: int, told: str, record: RunRecord) -> None:
     """What comes behind cannot be given to the node that lacks what was before; it says where, and why."""
@@ -173,7 +154,6 @@ def test_where_parts_of_a_journal_are_lost_its_steps_end(missing: int, told: str
     ("entry", "counts"),
     [
         (RejectedCount(1001.0, "state/inv2", "excess", 500), {"excess": 500}),
-        (RejectedCount(1001.0, "state/inv2", "garbled", 7), {"garbled": 7}),
         (RejectedCount(1001.0, "state/inv2", "of a later version", 7), {}),
         (ReceivedMessage(1001.0, "measurement/inv1", b"", "corrupt"), {"corrupt": 1}),
     ],
@@ -218,11 +198,8 @@ def test_a_replay_counts_what_a_flood_had_dropped(tmp_path: Path) -> None:
         ({}, None),
         ({"P_set": 5e4 + 1e-10}, None),
         ({"P_set": 5e4 + 1e-8}, ("P_set", "W")),
-        ({"V_set": 277.1}, ("V_set", "V")),
-        ({"Q": 1001.0}, ("Q", "var")),
         ({"shared": {"w": 0.5 + 1e-10}}, None),
         ({"shared": {"w": 0.6}}, ("shared", "")),
-        ({"shared": {"v": 0.5}}, ("shared", "")),
         ({"quiet": True}, ("quiet", "")),
     ],
 )
@@ -232,18 +209,6 @@ def test_the_first_field_that_differs_is_named(changes: dict[str, Any], found: t
 
     assert (None if difference is None else (difference.quantity, difference.unit)) == found
     assert difference is None or (difference.name, difference.t) == ("inv1", 0.06)
-
-
-def test_a_message_that_is_missing_is_named() -> None:
-    """In the replay, in the record, and one of another kind."""
-    measured = Measurement(
-        sender="plant", epoch=1, seq=3, t=0.06, to="inv1", P=5e4, Q=0.0, V=277.0, f=60.0,
-        P_set=5e4, V_set=277.0, grid_connected=False, island="inv1", roster=(),
-    )  # fmt: skip
-    assert message_difference(STATE, None) == Difference("inv1", 0.06, "the State 3", "there", "missing")
-    assert message_difference(None, measured) == Difference("inv1", 0.06, "the Measurement 3", "missing", "there")
-    assert message_difference(STATE, measured) is not None
-    assert message_difference(None, None) is None
 
 
 def test_the_first_number_of_a_row_that_differs_is_named() -> None:
@@ -281,18 +246,6 @@ def raised(message: Telemetry, t: float) -> Telemetry:
     return replace(message, rows=rows)
 
 
-def test_the_first_difference_of_all_is_the_earliest() -> None:
-    """And each note is told once."""
-    late, early = (Difference("inv1", t, "P_set", 1.0, 2.0, "W") for t in (2.0, 1.0))
-    parts = [
-        ReplayedPart(name="inv1", count=1, t_end=2.0, difference=difference, note=note)
-        for difference, note in ((late, "x"), (None, ""), (early, "x"))
-    ]
-
-    assert Replay(parts=tuple(parts)).difference is early
-    assert Replay(parts=tuple(parts)).notes == ("x",)
-
-
 EARLY = Fault(on="* -> inv1", delay=0.1, to_s=2.0)
 LONG = Fault(on="* -> inv2", delay=0.1)
 LATE = Fault(on="* -> inv3", delay=0.1, from_s=4.0, to_s=6.0)
@@ -309,7 +262,7 @@ def in_force(netem: Netem, t: float) -> set[object]:
     }
 
 
-@pytest.mark.parametrize("since", [0.0, 0.7, 1.5, 3.0, 4.0, 5.5, 8.0])
+@pytest.mark.parametrize("since", [0.0, 1.5, 4.0, 8.0])
 def test_each_time_has_the_faults_of_its_configuration(since: float) -> None:
     """Up to the change those of the one, from then on those of the other, at every time."""
     one = Netem(links=(EARLY, LONG, LATE, ENDED), partitions=(HALVES,))
@@ -323,13 +276,6 @@ def test_each_time_has_the_faults_of_its_configuration(since: float) -> None:
             assert entry.to_s is None or entry.from_s < entry.to_s
         for t in (0.0, 0.2, 0.6, 0.8, 1.2, 1.8, 2.2, 2.9, 3.2, 3.8, 4.5, 5.2, 5.8, 7.0, 9.0):
             assert in_force(both, t) == in_force(before if t < since else after, t), t
-
-
-def test_an_entry_of_both_stays_whole() -> None:
-    """So its random numbers are those of the record."""
-    both = spliced(Netem(links=(EARLY, LONG)), Netem(links=(LONG,)), 1.0)
-
-    assert both.links == (LONG, Fault(on="* -> inv1", delay=0.1, to_s=1.0))
 
 
 def test_without_loss_all_else_of_a_fault_is_left() -> None:

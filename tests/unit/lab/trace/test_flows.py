@@ -45,16 +45,6 @@ def test_in_ticks_a_message_arrives_with_the_decision_that_can_use_it() -> None:
     assert judged((0.1, 0.003), clock="wall")[0].arrived == pytest.approx(0.103)
 
 
-def test_each_copy_is_a_flow_of_its_own() -> None:
-    """One with a flipped bit arrives, and is damaged."""
-    found = judged((0.1, ((0.05, None), (0.03, 7))))
-
-    assert [(flow.fate, flow.arrived) for flow in found] == [
-        ("damaged", pytest.approx(0.13)),
-        ("", pytest.approx(0.15)),
-    ]
-
-
 def test_a_message_that_was_judged_anew_has_its_last_verdict() -> None:
     """A cut that kept it was healed early."""
     trace = LinkTrace("inv2", "inv1", (5, 5), (0.1, 0.1), (float("inf"), 0.2))
