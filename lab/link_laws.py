@@ -57,7 +57,6 @@ class LinkTest(NamedTuple):
     what: str
     configured: str
     realised: str
-    """Value in the run; why nothing was tested, if nothing was."""
     n: int = 0
     p: float | None = None
     """Probability that chance alone is as far off; 0 or 1 where nothing is left to chance, None if not tested."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import closing, suppress
+from contextlib import AbstractContextManager, closing, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -32,7 +32,8 @@ from gridpeers.wire.wording import counted
 REPEATED = 20
 """Every run of which the number is a multiple of this one is done twice, by whatever worker is free."""
 
-Tell = Callable[[str, float, float], None]
+Stage = Callable[[float], AbstractContextManager[Callable[[str, float], None]]]
+"""Begins a stage of so many parts: its function takes the present work, and how many parts are done."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,7 +94,7 @@ def undisturbed(campaign: Campaign) -> ChaosRow:
     return run_schedule(campaign.base, (), seed_of(campaign.seed, 0))
 
 
-def run_campaign(campaign: Campaign, folder: ChaosFolder, tell: Tell) -> Summary:
+def run_campaign(campaign: Campaign, folder: ChaosFolder, stage: Stage) -> Summary:
     """Do the runs that the folder lacks, shrink what fails, and write all of it, also what came until an interruption.
 
     MachineError if the machine lacks what a run needs: that is no failure of the scenario, and nothing is shrunk.
@@ -102,9 +103,9 @@ def run_campaign(campaign: Campaign, folder: ChaosFolder, tell: Tell) -> Summary
     try:
         with closing(TransientFolder("gridpeers-chaos-")) as temporary:  # workers that are ended leave theirs in it
             within = None if campaign.dask else temporary.path
-            _do_runs(campaign, folder, tell, within)
+            _do_runs(campaign, folder, stage, within)
             _add_failures(failures, folder)
-            _shrink_all(campaign, folder, failures, tell, within)
+            _shrink_all(campaign, folder, failures, stage, within)
         summary = _concluded(campaign, folder, failures)
         set_complete(folder.path)
     except BaseException as error:
@@ -118,25 +119,21 @@ def run_campaign(campaign: Campaign, folder: ChaosFolder, tell: Tell) -> Summary
     return summary
 
 
-def _do_runs(campaign: Campaign, folder: ChaosFolder, tell: Tell, within: Path | None) -> None:
+def _do_runs(campaign: Campaign, folder: ChaosFolder, stage: Stage, within: Path | None) -> None:
     text, seed, driver = campaign.base.text, campaign.seed, campaign.driver
     calls = ((text, seed, number, it, driver, within) for number, it in _numbered(campaign, dict(folder.rows)))
     jobs = 1 if driver == "processes" else campaign.jobs
     head, of = campaign.base.scenario.name, campaign.runs
-    tell(f"{head}, {len(folder.rows)} of {of} runs", len(folder.rows), of)
-    with closing(on_workers(calls, jobs, run_number, campaign.dask)) as results:
+    with stage(of) as tell, closing(on_workers(calls, jobs, run_number, campaign.dask)) as results:
+        tell(f"{head}, {len(folder.rows)} of {of} runs", len(folder.rows))
         for row in results:
             first = folder.rows.get(row.number)
             folder.add(row if first is None else compared(first, row, REPEATS))
             done, bad = len(folder.rows), sum(bool(row.violated) for row in folder.rows.values())
-            tell(f"{head}, {done} of {of} runs, {bad} violated", done, of)
+            tell(f"{head}, {done} of {of} runs, {bad} violated", done)
 
 
 def _numbered(campaign: Campaign, known: Mapping[int, ChaosRow]) -> Iterator[tuple[int, Schedule]]:
-    """Yield number and schedule of each run as they are asked for; of repeated ones again, at the end of the batch.
-
-    Runs that are known are left out, and the second time of those that are known to repeat.
-    """
     for batch in range(-(-campaign.runs // BATCH)):
         numbers = range(batch * BATCH, min((batch + 1) * BATCH, campaign.runs))
         once = {number for number in numbers if number not in known}
@@ -156,22 +153,23 @@ def _add_failures(failures: dict[str, Failure], folder: ChaosFolder) -> None:
 
 
 def _shrink_all(
-    campaign: Campaign, folder: ChaosFolder, failures: dict[str, Failure], tell: Tell, within: Path | None
+    campaign: Campaign, folder: ChaosFolder, failures: dict[str, Failure], stage: Stage, within: Path | None
 ) -> None:
     if not failures:
         return
     kinds = counted(len(failures), "kind of failure", "kinds of failure")
-    tell(f"shrinking, 0 of {kinds}", 0, len(failures))
     calls = []
     for name, it in failures.items():  # processes only for a failure that one process cannot show
         driver = campaign.driver if name in (SAME_IN_PROCESSES, REPEATS) else "inprocess"
         calls.append((campaign.base.text, campaign.seed, it.row.number, name, driver, within))
-    with closing(on_workers(calls, min(campaign.jobs, len(calls)), shrink_number, campaign.dask)) as simpler:
+    workers = on_workers(calls, min(campaign.jobs, len(calls)), shrink_number, campaign.dask)
+    with stage(len(failures)) as tell, closing(workers) as simpler:
+        tell(f"shrinking, 0 of {kinds}", 0)
         for done, (violated, simplest) in enumerate(simpler, start=1):
             found = failures[violated]
             file = folder.write_failure(violated, found.row, simplest)
             failures[violated] = replace(found, simplest=simplest, file=file)
-            tell(f"shrinking, {done} of {kinds}", done, len(failures))
+            tell(f"shrinking, {done} of {kinds}", done)
 
 
 def _concluded(campaign: Campaign, folder: ChaosFolder, failures: dict[str, Failure]) -> Summary:

@@ -13,7 +13,6 @@ WITHIN_S = 4.0
 rate of the law, and vars, the slowest, settle within 3 s after a large step."""
 
 JUDGED_S = 0.8
-"""Time (s) for which it is judged then, up to the end of the run."""
 
 REJOINED_S = 1.0
 """Longest time (s) after a cut until a value from over there is used: in simulated time nothing has to connect again,
@@ -35,10 +34,8 @@ RESTORED = frozenset({*_AFTER, "oscillation", RETURNS})
 """Checks of what control restores; the others hold whatever is done to a run."""
 
 TAIL_S = 2.0
-"""Tail of the run (s) in which nothing may oscillate any more."""
 
 _ALWAYS: Mapping[str, Mapping[str, Any]] = {"heal": {"within_s": REJOINED_S}, "oscillation": {"tail_s": TAIL_S}}
-"""Other limits of checks that hold for the whole run; those that are not named here have their own."""
 
 
 def chaos_checks(

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -28,7 +29,7 @@ from gridpeers.cli.usage import (
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from gridpeers.lab.chaos.campaign import Campaign, Tell
+    from gridpeers.lab.chaos.campaign import Campaign
     from gridpeers.lab.chaos.chaos_run import ChaosRow
     from gridpeers.scenarios.schema import ScenarioModel
 
@@ -91,6 +92,7 @@ def chaos(
     )
     from datetime import datetime
 
+    from gridpeers.cli.progress import remaining
     from gridpeers.lab.chaos.campaign import Campaign, run_campaign
     from gridpeers.lab.chaos.chaos_folder import RUNS, ChaosFolder, asked_of, kept_rows
     from gridpeers.lab.chaos.disturbed_scenario import ChaosBase
@@ -131,8 +133,7 @@ def chaos(
             with broken_if_ended(path):
                 folder = ChaosFolder(path, base, seed, command_line(*words, "--driver", driver), kept.rows, runs)
             kept.rows = folder.rows
-            with _stages(console) as tell:
-                summary = run_campaign(campaign, folder, tell)
+            summary = run_campaign(campaign, folder, partial(remaining, console))
     except FolderError as error:
         fail([str(error)], BAD_INPUT)
     for line in summary.lines():
@@ -181,8 +182,6 @@ def _try_undisturbed(console: Console, campaign: Campaign) -> None:
 
 @dataclass
 class _Kept:
-    """The runs that a campaign has so far, and its folder once there is one."""
-
     scenario: str
     campaign: Campaign
     path: Path | None
@@ -190,7 +189,6 @@ class _Kept:
 
     @contextmanager
     def told_if_ended(self) -> Iterator[None]:
-        """End the command with the error, the number of runs that are kept, and how to go on."""
         from gridpeers.cli.usage import exit_code, interruptible
         from gridpeers.lab.chaos.machine_error import MachineError, machine_error
         from gridpeers.scenarios.results.run_files import refusal, shown
@@ -214,21 +212,3 @@ class _Kept:
             if isinstance(error, OSError) and path:
                 fail([refusal(path, error), left], BROKEN)
             fail([str(machine_error(error) or error), left], BROKEN)
-
-
-@contextmanager
-def _stages(console: Console) -> Iterator[Tell]:
-    """Yield the function that takes a campaign's progress: each stage is estimated by itself."""
-    from gridpeers.cli.progress import remaining
-
-    with ExitStack() as shown:
-        stages: dict[str, Callable[[str, float], None]] = {}
-
-        def tell(what: str, done: float, of: float) -> None:
-            stage = what.partition(",")[0]
-            if stage not in stages:
-                shown.close()  # the bar of the stage before
-                stages[stage] = shown.enter_context(remaining(console, of))
-            stages[stage](what, done)
-
-        yield tell

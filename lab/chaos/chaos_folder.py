@@ -43,8 +43,6 @@ def again(file: Path) -> str:
 
 
 class ChaosFolder:
-    """The folder of a campaign, new or with the rows that it has (`kept_rows`); `command` makes the campaign again."""
-
     def __init__(
         self,
         path: Path,

@@ -88,7 +88,6 @@ def run_schedule(
 
 
 def compared(row: ChaosRow, other: ChaosRow, asked: str) -> ChaosRow:
-    """Return the result of a run that another one must equal to the byte."""
     apart = [
         f"{name} {str(mine)[:12]} and {str(its)[:12]}"
         for name, mine, its in (
@@ -167,7 +166,6 @@ class JudgedRun(NamedTuple):
     restored_s: float = 0.0
     collapses: tuple[Collapse, ...] = ()
     off: frozenset[str] = frozenset()
-    """Inverters that are out of service at its end."""
     verdicts: tuple[CheckVerdict, ...] = ()
 
 

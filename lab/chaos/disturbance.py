@@ -31,7 +31,6 @@ class Disturbance(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
     table: Literal["event", "link", "partition", "node"]
     entry: Mapping[str, Any]
     back: Mapping[str, Any] = {}
-    """Of an event: the later event that takes it back; empty if none does."""
 
     @property
     def begins_s(self) -> float:

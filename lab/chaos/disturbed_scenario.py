@@ -38,8 +38,6 @@ _LONGEST_NAME = 24
 
 @dataclass(frozen=True)
 class ChaosBase:
-    """A checked scenario of one case, to be disturbed."""
-
     scenario: ScenarioModel
     feeder: Feeder
     tree: Mapping[str, Any] = field(init=False, repr=False)
@@ -109,7 +107,6 @@ class ChaosBase:
         return kept
 
     def lines(self, schedule: Schedule) -> list[str]:
-        """Return a sentence for each disturbance, in the order of time, with why nothing happens where that is so."""
         lines = []
         for disturbance in sorted(schedule, key=lambda it: it.begins_s):
             why = self._why_idle(schedule, disturbance)

@@ -24,21 +24,17 @@ KILLED = 0.5
 class _Part(NamedTuple):
     inverters: tuple[InverterRow, ...]
     load: float
-    """Real power (W) of its loads, as in the feeder's tables."""
     buses: frozenset[str]
     has_substation: bool
     energised: bool
 
 
 class _State(NamedTuple):
-    """The feeder from a change on."""
-
     t_s: float
     closed: frozenset[str]
     present: frozenset[str]
     killed: frozenset[str]
     powers: Mapping[str, complex]
-    """Loads that an event has set (VA), by name."""
 
 
 class FeasibleSupply:

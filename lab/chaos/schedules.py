@@ -32,7 +32,6 @@ IDLE_PART = 5
 """A fifth of these runs is kept for leaving out disturbances one by one, once hypothesis is done."""
 
 MOST_DISTURBANCES = 10
-"""Most disturbances of a schedule, of which some may not be possible together."""
 
 LONGEST_S = 2.0
 
@@ -48,7 +47,6 @@ _FAR = 7_203_117_000_000_061
 loaded modules, so a seed would draw other schedules after any change of any of them; near this one it finds none."""
 
 Pick = Callable[[int], int]
-"""Draws a whole number from 0 to below a bound; towards 0 is simpler."""
 
 
 class _FailsError(Exception):
@@ -279,7 +277,6 @@ class _Draw:
         return self._event({"load": there}, {"load": {name: {"factor": 1.0} for name in names}})
 
     def _switch(self) -> Disturbance:
-        """Open or close a switch; who closes it waits for synchronism."""
         switch = self._one_of(self._switches)
         opens, closes = {"open": [switch]}, {"close": [switch], "synchronised": True}
         return self._event(opens, closes) if self._pick(3) else self._event(closes, opens)

@@ -42,7 +42,6 @@ class TickAccounts:
         self._sent, self._T_c, self._lost = sent, T_c, lost
         self._spoken: dict[int, set[str]] = {}
         self.missing: dict[Link, Missing] = {}
-        """Of each link over which an agent listens."""
 
     def state(self, agent: str, state: SentState) -> None:
         if not (state.quiet or state.idle):
@@ -99,7 +98,6 @@ class VerdictAccounts:
         self._advance(link, of, of.highest - WAIT)
 
     def missing(self) -> dict[Link, Missing]:
-        """Return the states without a verdict, by link, once all verdicts are there."""
         for link, of in self._links.items():
             self._advance(link, of, of.highest)
         return {link: of.missing for link, of in self._links.items()}
@@ -134,7 +132,6 @@ class ArrivalAccount:
     began: bool = False
     """The link must be there: something came, or both ends have been there for long."""
     missing: dict[tuple[int, int], float] = field(default_factory=dict)
-    """Run time (s) of the states that did not come, by epoch and number."""
 
     @property
     def since(self) -> float:
@@ -201,7 +198,6 @@ class ArrivalAccounts:
             del arrived[next(iter(arrived))]
 
     def flush(self, until: float) -> None:
-        """Close the accounts of what was sent up to a run time (s), as far as it has come."""
         for src, states in self._states.items():
             while states and states[0].t <= until:
                 state = states.popleft()
@@ -220,7 +216,6 @@ class ArrivalAccounts:
                         account.missing[key] = state.t
 
     def _at(self, agent: str, t: float, epoch: int | None = None) -> Presence | None:
-        """Return the time in which an agent, or one process of it, was there at a run time (s)."""
         for there in reversed(self._there[agent]):
             if there.since <= t <= there.until and epoch in (None, there.epoch):
                 return there

@@ -42,7 +42,6 @@ class OldUse:
     """A value of a neighbour that an agent used, older than all that it used of it later."""
 
     age: float
-    """Infinite if there was no value (s)."""
     t: float
     """Run time of the first decision that used one of this age (s)."""
     last: float
@@ -50,15 +49,12 @@ class OldUse:
 
 @dataclass(frozen=True, kw_only=True)
 class CommunicationSummary:
-    """Accounts of links, ages of values, heals, and the last states of each agent."""
-
     info: RecordInfo
     t_end: float
     unreadable: int
     sent: Mapping[str, SentStates]
     counts: Mapping[Link, LinkCounts]
     unjudged: Mapping[Link, Missing]
-    """Simulated time: states without a verdict of their emulated link."""
     unheard: Mapping[Link, Missing]
     """Simulated time: decisions without the state of the tick before, by link; for those without faults."""
     arrivals: Mapping[Link, Sequence[ArrivalAccount]]
@@ -198,7 +194,6 @@ class SummaryPass(RecordSink):
             self._alike[agent] = uses, [self._oldest[use.link][-1] for use in used]
 
     def _is_plain(self, age: float | None) -> bool:
-        """Return whether an age (s) counts as it is, whatever states its sender kept in force."""
         return age is None or not 1.5 * self._info.T_c < age < inf
 
     def _note_age(self, state: SentState, use: NeighbourUse) -> None:

@@ -95,7 +95,6 @@ def end_of(file: RecordFile) -> float:
 
 
 def read_into(file: RecordFile, sink: RecordSink) -> PassEnd:
-    """Give a sink all that a record has."""
     return _Pass(file, sink).read()
 
 

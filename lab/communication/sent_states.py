@@ -39,7 +39,6 @@ class StateWindow:
         """Latest number, and latest one of a state that was not quiet."""
 
     def put(self, state: SentState) -> bool:
-        """Note a state; return whether it is new."""
         at = state.number % KEPT
         if self._numbers[at] >= state.number:
             return False
@@ -67,11 +66,9 @@ class StateWindow:
         return self.has(number) and not self._flags[number % KEPT] & _IDLE
 
     def t(self, number: int) -> float | None:
-        """Return when (s) the state of this number was sent."""
         return self._t[number % KEPT] if self.has(number) else None
 
     def is_past(self, number: int) -> bool:
-        """Return whether a number is too old for this window."""
         return number < 0 or self._numbers[number % KEPT] > number
 
     def kept_until(self, number: int) -> int:
@@ -101,7 +98,6 @@ class SentStates:
         """Run time (s) of the last state that was for the neighbours."""
 
     def window_at(self, t: float) -> StateWindow:
-        """Return the states of the process that spoke last at a run time (s)."""
         found = _NONE
         for epoch, window in self._windows.items():
             if self._simulated or self.epochs[epoch][0] <= t:
@@ -112,7 +108,6 @@ class SentStates:
         return self._windows.get(0 if self._simulated else epoch)
 
     def put(self, state: SentState) -> bool:
-        """Note a state; return whether it is new."""
         epoch = 0 if self._simulated else state.epoch
         if epoch not in self._windows:
             if epoch in self.epochs:

@@ -78,7 +78,6 @@ class DecidedTicks:
         self._coming.append(decision)
 
     def flush(self, until: float) -> Iterator[Used]:
-        """Yield all states up to a run time (s), as far as it is known how the agent decided."""
         while self._states and self._states[0].t <= until:
             state = self._states.popleft()
             while self._coming and self._coming[0].tick <= state.number:
@@ -104,7 +103,6 @@ class DecidedStates:
         self._decisions.append((self._now, epoch, decision))
 
     def flush(self, until: float) -> Iterator[Used]:
-        """Yield all decisions whose states are of before a run time (s); all that was sent by then is known."""
         while self._decisions:
             came, epoch, decision = self._decisions[0]
             window = self._sent.window_of(epoch)

@@ -44,9 +44,7 @@ class Explanation:
     neighbours: tuple[NeighbourAccount, ...]
     """The in-neighbours by the graph: those that the agent had met, then the others."""
     step: LawStep | None
-    """The step of the law in its terms (pu); None if the law was on hold."""
     events: tuple[PlantEvent, ...]
-    """Events of the last second before the decision, and those about the agent since."""
     aftermath: tuple[str, ...]
     """Sentences on the time between the decision and the one that was asked for; none if it was made then."""
     damage: tuple[str, ...]
@@ -179,7 +177,6 @@ class TrailStep:
     decision: RecordedDecision
     step: LawStep | None
     largest: Term | None
-    """The largest term, which is followed if it comes from a neighbour; None if there is none."""
     end: str
     """Why the trail ends here; empty if it goes on to the neighbour of the largest term."""
 

@@ -32,7 +32,6 @@ class QuantityStep:
 
     @property
     def rest(self) -> float:
-        """Part of the step that neither terms nor limits explain."""
         return self.step - (sum(term.value for term in self.terms) + self.limits)
 
 
@@ -41,7 +40,6 @@ class LawStep:
     P_set: QuantityStep
     V_set: QuantityStep
     problem: str = ""
-    """Why the parts are not those of the law computed again; empty if they are."""
 
 
 def law_step(record: RunRecord, decision: RecordedDecision) -> LawStep | None:
@@ -79,7 +77,6 @@ def law_step(record: RunRecord, decision: RecordedDecision) -> LawStep | None:
 
 
 def _since_start(record: RunRecord, decision: RecordedDecision) -> tuple[RecordedDecision, ...]:
-    """Return the decisions of a law since its last start, the last one included."""
     back = 1.0
     while True:
         since = max(0.0, decision.t - back)

@@ -38,7 +38,6 @@ Rejections = Mapping[str, list[tuple[int, str, int]]]
 
 
 def verdicts(record: RunRecord, agent: str, since: float, until: float) -> Fates:
-    """Return the verdicts of the links into an agent on messages of some run time (s)."""
     found: dict[tuple[str, int], list[tuple[float, Outcome]]] = {}
     for trace in record.links():
         if trace.dst == agent:
@@ -117,7 +116,6 @@ def _fate(message: MessageOnWire, now: float, fates: Fates) -> str:
 
 
 def reason(record: RunRecord, decision: RecordedDecision, each: NeighbourInput) -> str:
-    """Return in words why a neighbour was left out of the sums; empty if it was not."""
     options = decision.config.control.degraded_communication
     if each.unused == "silent":
         return "no state of it was heard"
@@ -139,7 +137,6 @@ def reason(record: RunRecord, decision: RecordedDecision, each: NeighbourInput) 
 
 
 def _island_at(record: RunRecord, decision: RecordedDecision, t: float) -> str:
-    """Return the own island at an earlier time (s of run time), as the agent's own states have it."""
     island = ""
     for message in record.messages(decision.agent, since=max(0.0, t - decision.config.T_c), until=t, kind="State"):
         if isinstance(message.message, State):

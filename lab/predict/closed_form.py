@@ -59,7 +59,6 @@ class Modes:
     slowest_rate: float
     """Smallest real part of an eigenvalue of K (L + g w^T) (1/s), zeros left out: the exact slower one of the two."""
     fastest_rate: float
-    """Largest real part of the same (1/s)."""
 
     @property
     def euler_step_s(self) -> float:

@@ -21,7 +21,6 @@ from gridpeers.scenarios.schema.participants import inverters_of, without_agent
 @dataclass(frozen=True, kw_only=True)
 class InverterGroup:
     names: tuple[str, ...]
-    """Order of all arrays."""
     GFM: Flags
     """Which are grid-forming: the leaders, g_i = 1."""
     A: Floats
@@ -31,16 +30,12 @@ class InverterGroup:
     shares: Flags = field(default_factory=lambda: np.zeros(0, bool))
     """Which have an agent: the sharing index is theirs, as in a run (`Nameplates.shares`). All, if left out."""
     s: Floats = field(default_factory=lambda: np.zeros(0))
-    """Ratings (W); all alike, if left out."""
     m_p: Floats = field(default_factory=lambda: np.zeros(0))
-    """P-f droops (pu per pu); 0.01, if left out."""
     m_q: Floats = field(default_factory=lambda: np.zeros(0))
-    """Q-V droops (pu per pu); 0.05, if left out."""
     gains: Gains = field(default_factory=Gains)
     """Of the law; its limits are not part of a linear model."""
     f_nom: float = F_NOM
     T_c: float = 0.02
-    """Control period (s)."""
     parameters: tuple[InverterParameters, ...] = ()
     """Of the plant's inverters; the defaults of their kind, if left out."""
 

@@ -44,9 +44,7 @@ class Ticks:
     link: int | Mapping[LinkEnds, int] = 0
     """Of neighbours' states beyond the one period they always take, by (src, dst)."""
     measurement: int | Mapping[str, int] = 0
-    """Plant to agent, by inverter."""
     setpoint: int | Mapping[str, int] = 0
-    """Agent to plant, by inverter."""
     own: int = 0
     """Of the own value where it is compared with the neighbours'; a correct agent has 0."""
     loss: float | Mapping[LinkEnds, float] = 0.0
@@ -57,7 +55,6 @@ class Ticks:
 class Path:
     t: Floats
     e: Floats
-    """Frequency error (pu)."""
     power: Floats
     """m_p p of each inverter (pu frequency), shape (T, N)."""
     set_point: Floats
@@ -71,7 +68,6 @@ class _Delays:
     setpoint: list[int]
     loss: list[list[float]]
     lossy: list[tuple[int, int]] = field(default_factory=list)
-    """(receiver, sender) of links that lose and carry something."""
     depth: int = 1
     """H: how many past set-points of everybody the loop needs."""
 
@@ -241,7 +237,6 @@ def _of(value: float | Mapping[Any, Any], key: object) -> Any:
 
 
 ANGLES = 600
-"""Angles at which delay-independence is tried, between 1e-3 rad and pi, evenly in their logarithm."""
 
 
 def delay_limit(

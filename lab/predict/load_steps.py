@@ -25,10 +25,8 @@ class IslandStep:
     label: str
     t_s: float
     roster: tuple[str, ...]
-    """All inverters on the network then."""
     members: tuple[str, ...]
     load: LoadStep | None
-    """Their load before and after; None if they come from several islands."""
 
 
 class LoadError(RuntimeError):
@@ -75,7 +73,6 @@ def _through(scenario: ScenarioModel, config: PlantConfig, rating: dict[str, flo
 
 
 def _carried(plant: Plant, rating: dict[str, float], on: set[str]) -> dict[tuple[str, ...], tuple[float, bool]]:
-    """Return the mean p (pu) of each island's inverters, and whether the grid feeds it."""
     islands: dict[str, dict[str, float]] = {}
     for name, reading in plant.measure().items():
         if name in on:

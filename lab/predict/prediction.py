@@ -46,23 +46,10 @@ WIDTH = 100
 
 
 def predict(scenario: Scenario | str | Path, case: str, *, voltage: bool = True) -> Prediction:
-    """Predict how a case will go, without running it.
+    """Predict how a case of an experiment will go, without running it; its text has the modes of vars with `voltage`.
 
-    Parameters
-    ----------
-    scenario : Scenario, str or Path
-        The experiment, or its name or path.
-    case : str
-        Its case.
-    voltage : bool
-        Whether the text has the modes of voltage and vars, which take a second or two.
-
-    Raises
-    ------
-    ScenarioError
-        If there is no such case, or it runs another law than "consensus", of which theory tells nothing.
-    BrokenRunError
-        If the plant has no solution on droop alone.
+    Raise ScenarioError if there is no such case, or it runs another law than "consensus", of which theory knows
+    nothing; BrokenRunError if the plant has no solution on droop alone.
     """
     known = as_scenario(scenario)
     return predictions(with_cases(known.spec, [case]), known.feeder, voltage=voltage)[case]
@@ -92,8 +79,6 @@ def predictions(spec: ScenarioModel, feeder: Feeder, *, voltage: bool) -> dict[s
 
 
 class Prediction:
-    """Predictions by theory of one case; made by `gridpeers.predict`."""
-
     def __init__(
         self,
         title: str,
@@ -151,7 +136,6 @@ class Prediction:
 
     @cached_property
     def _times(self) -> list[tuple[IslandStep, InverterGroup, Times]]:
-        """Times after each event, by island; a note says why there are none."""
         found = []
         for step, island in self._islands:
             if step.load is None:

@@ -28,7 +28,6 @@ from gridpeers.plant.equipment.inverter_parameters import GfmParameters
 from gridpeers.scenarios.results.history import Floats
 
 PlantModel = Literal["lagged", "quasi-steady"]
-"""With the inverters' filters, or as if they had none."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,7 +59,6 @@ def response(inverters: InverterGroup, plant: PlantModel = "lagged") -> Response
 
 
 def _follows(inverters: InverterGroup) -> Floats:
-    """Return 1 for an inverter whose power follows the frequency, 0 for a GFL without freq-watt."""
     return np.array([1.0 if isinstance(it, GfmParameters) or it.frequency_watt else 0.0 for it in inverters.parameters])
 
 

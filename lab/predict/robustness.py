@@ -32,7 +32,6 @@ class Robustness(NamedTuple):
 
     @property
     def F(self) -> int:
-        """Liars among the neighbours of each agent that W-MSR bears for certain."""
         return max(0, (self.least - 1) // 2)
 
     def __str__(self) -> str:

@@ -43,7 +43,6 @@ __all__ = [
 
 
 def feeder_of(spec: ScenarioModel) -> Feeder:
-    """Return the feeder of a scenario, with what the scenario changes in it."""
     return as_in(spec, read_feeder(spec.plant.feeder, spec.plant.load_set))
 
 
@@ -52,7 +51,6 @@ def without_faults(spec: ScenarioModel) -> ScenarioModel:
 
 
 def first_window(spec: ScenarioModel, length_s: float) -> ScenarioModel:
-    """Return a scenario without faults that ends a time (s) after its first event, and has no other."""
     (first, *_) = spec.events
     time = replace(spec.time, end_s=first.t_s + length_s)
     return replace(without_faults(spec), events=(first,), time=time)

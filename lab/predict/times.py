@@ -29,16 +29,12 @@ HORIZON = 120.0
 
 @dataclass(frozen=True, kw_only=True)
 class LoadStep:
-    """Load of an island's inverters, mean p (pu of the ratings), before and after an event."""
-
     start_pu: float = 0.647
     """At the start all stand at it, at nominal frequency. The paper's start."""
     load_pu: float = 0.880
-    """From the event on. The paper's event 1."""
     islanding: bool = True
     """Whether the event makes the island, as islanding does; then late states of before are left out at first."""
     joining: tuple[str, ...] = ()
-    """Inverters that come with the event, at no load."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,9 +42,7 @@ class Times:
     """Times (s) after a step of load, by the bands of `gridpeers.scenarios.results.metrics`; None: above 120 s."""
 
     restore_s: float | None
-    """Until abs(f - f_nom) < 0.01 Hz for good."""
     share_s: float | None
-    """Until MPSI < 0.01 for good."""
     stable: bool
     note: str = ""
 

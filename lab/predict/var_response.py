@@ -74,7 +74,6 @@ class VarResponse:
         return np.asarray(self.v.sum(axis=0))
 
     def columns_of(self, inverters: InverterGroup) -> list[int]:
-        """Return the places of some inverters in rows and columns; ValueError if one is not there."""
         unknown = [name for name in inverters.names if name not in self.names]
         if unknown:
             raise ValueError(f"no response of {', '.join(unknown)}; there are {', '.join(self.names)}")

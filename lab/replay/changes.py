@@ -41,12 +41,9 @@ Entry = TypeVar("Entry", Fault, Partition)
 @dataclass(frozen=True, kw_only=True)
 class Changes:
     without: tuple[str, ...] = ()
-    """Links that are cut, as patterns: "inv4 -> inv7"."""
     without_loss: bool = False
     without_link_commands: bool = False
-    """The commands that people gave to emulated links are left out."""
     law: str = ""
-    """Another law; "" keeps that of the record."""
     keys: Mapping[str, Any] = field(default_factory=dict)
     since: float = 0.0
 
@@ -67,7 +64,6 @@ class Changes:
 @dataclass(frozen=True, kw_only=True)
 class ChangedRule:
     recorded: ScenarioModel
-    """The scenario of the record, with its case alone."""
     scenario: ScenarioModel
     """The scenario as changed, links too; the title of its case says what is changed."""
     links_written: bool
@@ -81,7 +77,6 @@ class ChangedRule:
     changes: Changes
 
     def unwritten(self, *, clock: str) -> Iterator[str]:
-        """Yield sentences on what the scenario file of what would have been does not say."""
         if not self.links_written:
             yield "The changes of links are not in this file: their entries would contradict others."
         if self.control is not None and (since := self.changes.since) > 0.0:
@@ -148,7 +143,6 @@ def changed_rule(record: RunRecord, changes: Changes) -> ChangedRule:
 
 
 def _tables(record: RunRecord) -> Tree:
-    """Return the tables of the record's scenario, with its case alone; no paper judges what would have been."""
     info = record.info
     if not info.toml:
         raise ReplayError(f"{record.path}: it has no scenario, so that nothing in it can be changed")
@@ -203,7 +197,6 @@ def _put(tables: Tree, case: str, path: str, value: Any, *, whole: bool) -> str:
 
 
 def lossless(fault: Fault) -> Fault | None:
-    """Return a fault without its loss; None if nothing is left of it."""
     models = fault.models()
     if "loss" not in models:
         return fault

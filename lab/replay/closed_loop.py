@@ -66,7 +66,6 @@ from gridpeers.wire.links import Links
 from gridpeers.wire.messages import PLANT, Command, LinkReport, LinkRequest, Measurement, State, Telemetry
 
 MOST_SENT = 100_000
-"""Messages that are kept for those that are yet to hear them: minutes of nine agents."""
 
 KEPT_DELAYS, KEPT_STATUSES = 1000, 16
 """Latest delays of a link, and latest statuses of an agent, that are kept: one may be some seconds on its way."""
@@ -81,8 +80,6 @@ _NOT_YET = Message("", b"not yet")
 
 
 class LoopProcess:
-    """A process of the loop: its calls in the record, the node made again, and how far it has come."""
-
     def __init__(self, recorded: RecordedProcess) -> None:
         self.recorded, self.name = recorded, recorded.name
         self.again: ReplayedProcess | None = None
@@ -213,13 +210,11 @@ class ClosedLoop:
         process.again = agent_again(process.recorded, config, step.instance, self._laws, links)
 
     def _links(self, name: str, recorded: dict[str, Any]) -> Links | None:
-        """Return the links into a node: those of the change; but where the record has none, only once it is made."""
         if self._rule is None or self._rule.links is None or not (recorded or self._changed):
             return recorded_links(self._record.info, name)
         return links_of(name, self._rule.links)
 
     def _settle(self, process: LoopProcess, step: RecordedStep) -> None:
-        """Undo what a step must not do to a process under the changes."""
         rule = self._rule
         if isinstance(step.entry, ReceivedMessage) and kind_of(step.entry.key) in TO_LINKS and rule and self._changed:
             for pattern in rule.changes.without:  # the command may have healed them
@@ -272,7 +267,6 @@ class ClosedLoop:
     # ---------------------------------------------------------------- messages
 
     def _heard(self, process: LoopProcess, step: RecordedStep) -> Message | None:
-        """Return the message of a step: as the replay sent it, or as recorded where nobody sends it there."""
         entry = step.entry
         if not isinstance(entry, MessageReference | ReceivedMessage):
             return None
@@ -304,7 +298,6 @@ class ClosedLoop:
     def _publish(
         self, process: LoopProcess, recorded: tuple[SentMessage, ...], sent: list[Message], due: float
     ) -> None:
-        """Bring the messages of a step to those who hear them, beside those of whom the record has them."""
         theirs = {(each.key, state.seq) for each in recorded if (state := tick_message(each)) is not None}
         for message in sent:
             kind = kind_of(message.key)
@@ -397,7 +390,6 @@ class LinkDelays:
         self._delays.setdefault((src, dst), deque(maxlen=KEPT_DELAYS)).append(delay)
 
     def draw(self, src: str, dst: str) -> float:
-        """Return a delay: those of the link in their order, again and again."""
         known = self._known(src, dst)
         number = self._drawn[src, dst] = self._drawn.get((src, dst), -1) + 1
         return known[number % len(known)]

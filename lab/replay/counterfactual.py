@@ -58,33 +58,15 @@ def counterfactual(
     since: float = 0.0,
     folder: str | Path | None = None,
 ) -> Counterfactual:
-    """Run a recorded run again, closed on our plant, with something changed.
+    """Run a recorded run again, closed on our plant, with something changed from a run time (s) on.
 
-    Parameters
-    ----------
-    run : Result, RunRecord, str or Path
-        The run, of any driver.
-    without : str or Iterable[str], optional
-        Links to cut, as in scenarios: "inv4 -> inv7", "inv4 <-> inv7", "* -> inv2".
-    without_loss : bool, optional
-        Whether no message is lost by chance.
-    without_link_commands : bool, optional
-        Whether the commands that people gave to emulated links are left out.
-    law : optional
-        Another law: its name, `module:Class`, or a class.
-    replace : Mapping[str, Any], optional
-        Values of keys of agents and links, by their paths: `{"gains.k_p": 0.001}`.
-    since : float, optional
-        Run time (s) from which on; up to it everything is as it was.
-    folder : str or Path, optional
-        New or empty; takes the run folder. When left out, the files live as long as the result.
+    `without` names links to cut, as in scenarios: "inv4 -> inv7", "inv4 <-> inv7", "* -> inv2". `without_loss` loses no
+    message by chance; `without_link_commands` leaves out the commands that people gave to emulated links. A `law` is a
+    name, `module:Class`, or a class. `replace` has values of keys of agents and links, by their paths:
+    `{"gains.k_p": 0.001}`. The folder is new or empty; without one the files live as long as the result.
 
-    Raises
-    ------
-    RecordFileError, ReplayError
-        As `replay`; also if a link, a law, a key or a value is wrong, or the time is outside of the record.
-    FolderError
-        If there is something in the folder, or it cannot be written.
+    Raise RecordFileError and ReplayError as `replay`, also if a link, a law, a key or a value is wrong, or the time is
+    outside of the record; FolderError if there is something in the folder, or it cannot be written.
     """
     record = record_of(run)
     try:
@@ -167,7 +149,6 @@ class Counterfactual:
         return Comparison({"": (self.was, self.would_be)}, ("was", "would be"))
 
     def plot(self) -> Figure:
-        """Draw f, P of every inverter and MPSI: of the recorded run in faint lines, of the other in strong ones."""
         from gridpeers.lab.replay.counterfactual_figure import counterfactual_figure
 
         shown_in_notebooks()

@@ -23,8 +23,6 @@ from gridpeers.wire.messages import State
 
 
 class Recomputed(NamedTuple):
-    """A decision of the record, and its state as the core decides it from the recorded inputs."""
-
     decision: RecordedDecision
     state: State
 

@@ -56,7 +56,6 @@ class RecordedStep(NamedTuple):
     """When it was called (s, monotonic): a message waits from its arrival until the calls before are done."""
     entry: Input
     sent: tuple[SentMessage, ...]
-    """Measurements and states that it sent in this call."""
     t: float
     """Run time at which its journal was sent (s); 0 before the run begins."""
     last: bool = False

@@ -57,21 +57,16 @@ UNITS = {"P": "W", "Q": "var", "V": "V", "f": "Hz", "P_set": "W", "V_set": "V", 
 
 @dataclass(frozen=True, kw_only=True)
 class ReplayedPart:
-    """The replay of one process, or of the plant's physics."""
-
     name: str
     count: int
     """Number of states of an agent, or of rows of the plant, that were compared."""
     t_end: float
     difference: Difference | None
     note: str = ""
-    """Why not everything was compared; "" if it was."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Replay:
-    """A record beside its replay."""
-
     parts: tuple[ReplayedPart, ...]
 
     @property
@@ -87,21 +82,10 @@ class Replay:
 
 
 def replay(run: Result | RunRecord | str | Path, make_plant: MakePlant | None = start_plant) -> Replay:
-    """Give the cores of a recorded run their inputs again, and compare their decisions.
+    """Give the cores of a recorded run, of any driver, their inputs again, and compare their decisions.
 
-    Parameters
-    ----------
-    run : Result, RunRecord, str or Path
-        The run, of any driver; its record may be cut off.
-    make_plant : Callable[[PlantConfig], LivePlant], optional
-        Starts the plant; None leaves it out.
-
-    Raises
-    ------
-    RecordFileError
-        If there is no record, or it cannot be read.
-    ReplayError
-        If it lacks the inputs of the cores, or its law, graph or feeder is not here.
+    Without `make_plant`, which starts the plant, the physics is left out. Raise RecordFileError if the record cannot be
+    read; ReplayError if it lacks the inputs of the cores, or its law, graph or feeder is not here.
     """
     record = record_of(run)
     require_arrivals(record)
@@ -185,7 +169,6 @@ def row_difference(
 
 
 def _in_real_time(record: RunRecord, make_plant: MakePlant | None) -> Iterator[ReplayedPart]:
-    """Replay all processes side by side, so that the file is read once."""
     plant = None if make_plant is None else start_plant_of(record.info, make_plant)
     laws: list[Law] = []
     try:
@@ -322,7 +305,6 @@ def _in_simulated_time(record: RunRecord, make_plant: MakePlant | None) -> Itera
 
 
 def _physics(record: RunRecord, make_plant: MakePlant) -> ReplayedPart:
-    """Make the run again in this process; only the scenario decides what happens in it."""
     info, rows, plant = record.info, ComparedRows(record), start_plant_of(record.info, make_plant)
     recorded = (int(record.t_end / info.plant.T_c) + 1) * info.plant.T_c  # a killed run may have been meant to go on
     try:
@@ -345,7 +327,6 @@ def _physics(record: RunRecord, make_plant: MakePlant) -> ReplayedPart:
 
 
 def _decisions(record: RunRecord, agent: str) -> ReplayedPart:
-    """Make the decisions of an agent again, each from the states that it had heard by the record."""
     count, t = 0, 0.0
     hole = min((since for since, _ in record.holes(agent)), default=inf)
     try:

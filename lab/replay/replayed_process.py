@@ -51,8 +51,6 @@ class _Outbox:
 
 
 class ReplayedProcess:
-    """One process, made again: its node, which has not started, with the emulated links into it."""
-
     def __init__(self, node: RealtimeAgent | RealtimePlant, links: Links | None) -> None:
         self.node, self.links = node, links
         self._root = node.keys.prefix
@@ -67,7 +65,6 @@ class ReplayedProcess:
         return self._root + key in self.node.routes and not self.node.finished
 
     def take(self, step: RecordedStep, message: Message | None = None) -> list[Message]:
-        """Call the node as in a recorded step, with the message that it hears there, if any; return its messages."""
         node, entry = self.node, step.entry
         at = entry.at or 0.0
         if isinstance(entry, RejectedCount):
@@ -89,7 +86,6 @@ class ReplayedProcess:
         return self._take()
 
     def hear(self, message: Message, at: float) -> list[Message]:
-        """Give the node a message that arrived at this time (s, monotonic); return its messages."""
         self.node.received(self._root + message.key, message.payload, at)
         return self._take()
 
@@ -113,7 +109,6 @@ class ReplayedProcess:
 def agent_again(
     recorded: RecordedProcess, config: AgentConfig, instance: str, laws: list[Law], links: Links | None
 ) -> ReplayedProcess:
-    """Make the process of an agent again; its law is added to a list, to be closed."""
     laws.append(law_again(config))
     try:
         return ReplayedProcess(RealtimeAgent(agent_as_run(config, recorded.epoch), instance, links, laws[-1]), links)
@@ -140,7 +135,6 @@ def plant_again(recorded: RecordedProcess, info: RecordInfo, plant: LivePlant, l
 
 
 def recorded_links(info: RecordInfo, name: str) -> Links | None:
-    """Return the emulated links into an agent or the plant, as they were at its start."""
     config = info.agent(name)
     tree = info.plant.links if name == PLANT else {} if config is None else config.links
     try:

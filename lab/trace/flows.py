@@ -56,7 +56,6 @@ def flows(record: RunRecord, since: float = 0.0, until: float = inf) -> list[Flo
 
 
 def _judged(src: str, dst: str, number: int, t: float, outcome: Outcome, least: float) -> Iterator[Flow]:
-    """Yield the copies of a message by its verdict; each takes so long at least (s)."""
     if isinstance(outcome, str):
         yield Flow(t, src, dst, number, None, outcome)
         return

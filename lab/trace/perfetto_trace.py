@@ -88,7 +88,6 @@ class PerfettoTrace:
 
 
 def write_perfetto_trace(record: RunRecord, path: Path) -> int:
-    """Write the whole record as a Perfetto trace; return the number of arrows."""
     trace = PerfettoTrace()
     for number, name in enumerate(("run", PLANT, *in_order(record.agents)), 1):
         trace.track(name, process=number)
@@ -104,7 +103,6 @@ def write_perfetto_trace(record: RunRecord, path: Path) -> int:
 
 
 def _add_messages(trace: PerfettoTrace, found: list[Flow], T_c: float) -> int:
-    """Add what each process sent, each arrival and each loss; return the number of arrows."""
     arrow = 0
     for (sent, src), together in groupby(found, key=lambda flow: flow[:2]):
         ids = []

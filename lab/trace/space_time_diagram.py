@@ -12,10 +12,8 @@ from gridpeers.lab.trace.flows import Flow
 from gridpeers.scenarios.results.plots.style import PAGE
 
 SENT, LOST, REJECTED = "#0072b2", "#d55e00", "#cc79a7"
-"""Colours of messages that arrived, were lost, and arrived but were rejected."""
 
 REACH = 0.6
-"""Part of the way to its receiver at which a lost message ends."""
 
 WIDTH, ROW = 7.4, 0.38
 

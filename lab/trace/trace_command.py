@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from gridpeers.scenarios.record.record_reader import RunRecord
 
 MOST = 20_000
-"""Most messages in a diagram: more are a grey area."""
 
 
 def trace(
