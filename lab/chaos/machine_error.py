@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import re
 import tempfile
-from collections.abc import Iterator
+import traceback
 
 _ERRORS = (
     *(errno.ENOMEM, errno.EAGAIN, errno.EMFILE, errno.ENFILE),
@@ -41,13 +41,8 @@ def machine_error(*told: BaseException | str) -> MachineError | None:
     'the machine lacks what a run needs (OSError: [Errno 24] Too many open files)'
     >>> machine_error(FileNotFoundError(errno.ENOENT, "No such file", "mine.csv"))
     """
-    for text in (text for it in told for text in ([it] if isinstance(it, str) else _texts(it))):
+    for it in told:  # an error brings along those that have led to it
+        text = it if isinstance(it, str) else "".join(traceback.format_exception(it))
         if lines := [line for line in text.splitlines() if _WORDS.search(line)]:
             return MachineError(lines[-1].strip())  # an error ends its traceback
     return None
-
-
-def _texts(error: BaseException | None) -> Iterator[str]:
-    while error is not None:
-        yield f"{type(error).__name__}: {error}".rstrip(": ")
-        error = error.__cause__ or error.__context__

@@ -10,15 +10,13 @@ from math import inf, nextafter
 
 from gridpeers.lab.communication.sent_states import Link, SentState, SentStates
 from gridpeers.lab.communication.uses import Uses
-from gridpeers.netem.ledger import LinkTrace
 from gridpeers.scenarios.record.decision_entries import Hole, inside
-from gridpeers.wire.messages import PLANT
 
 MOST_WAITING = 6000
 """Numbers of one link that are kept while they wait for their counterpart, or for the end of their process."""
 
 WAIT = 1000
-"""Verdicts of an emulated link after which a state without one has none: a link judges what it gets at once."""
+"""Ticks of which it is kept who told its neighbours something."""
 
 
 @dataclass
@@ -69,49 +67,6 @@ class TickAccounts:
             invented = number is not None and not use.unused and not (window.has(number) or window.is_past(number))
             if newer or (invented and not inside(self._lost, (number or 0) * self._T_c)):
                 self.missing[use.link].add(state.t)
-
-
-@dataclass
-class _Verdicts:
-    """Verdicts of one link: all numbers up to `done` are decided, those ahead have a verdict."""
-
-    done: int
-    highest: int = -1
-    ahead: set[int] = field(default_factory=set)
-    missing: Missing = field(default_factory=Missing)
-
-
-class VerdictAccounts:
-    """Simulated time with emulated links: every state between the first and the last verdict of a link has one."""
-
-    def __init__(self, sent: Mapping[str, SentStates]) -> None:
-        self._sent = sent
-        self._links: dict[Link, _Verdicts] = {}
-
-    def trace(self, trace: LinkTrace) -> None:
-        link = trace.src, trace.dst
-        if PLANT in link or not trace.seq:
-            return
-        of = self._links.setdefault(link, _Verdicts(done=min(trace.seq) - 1))
-        of.ahead.update(number for number in trace.seq if number > of.done)
-        of.highest = max(of.highest, *trace.seq)
-        self._advance(link, of, of.highest - WAIT)
-
-    def missing(self) -> dict[Link, Missing]:
-        for link, of in self._links.items():
-            self._advance(link, of, of.highest)
-        return {link: of.missing for link, of in self._links.items()}
-
-    def _advance(self, link: Link, of: _Verdicts, until: int) -> None:
-        """Decide all numbers up to one: of those that its sender has sent, so that a false one takes no time."""
-        if until <= of.done:
-            return
-        src, dst = (self._sent[name].window_at(inf) for name in link)
-        for number in src.numbers(of.done, until):
-            if number not in of.ahead and src.spoke(number) and dst.has(number) and dst.has(number + 1):
-                of.missing.add(src.t(number) or 0.0)
-        of.ahead = {number for number in of.ahead if number > until}
-        of.done = until
 
 
 # -------------------------------------------------------------------- real time

@@ -32,7 +32,7 @@ _SAID = re.compile(r"\S+ (leaves|left|dies)\b")  # Events of an agent that ends 
 class MessageAccount(Check):
     """Every state that was sent is accounted for at its receiver, link by link.
 
-    Of emulated links the accounts and verdicts of their receivers count; of others in simulated time every decision
+    Of emulated links the accounts of their receivers count; of others in simulated time every decision
     has the neighbours' states of the tick before; in real time every number arrives, from the first one on that
     does between two processes, or once both have been there for 7 s (`LINKED_WITHIN`), unless its receiver says that
     it dropped as many. A process that is silent for long, as it is frozen, begins anew: its links are given up.
@@ -52,13 +52,12 @@ class MessageAccount(Check):
                 text = f"messages of {src} delivered, dropped or in flight, of {sent} sent"
                 there = counts.delivered + sum(counts.dropped.values()) + counts.in_flight
                 yield Violation(text=text, agent=dst, value=there, limit=sent)
-            text = f"states of {src} without a verdict of the emulated link"
-            yield from _missing((src, dst), found.unjudged.get((src, dst), Missing()), text)
         links = self._without_account(found)
         for agent in found.info.agent_names:
             for link, missing in links.items():
-                if link[1] == agent:
-                    yield from _missing(link, missing, f"states of {link[0]} neither heard nor lost")
+                if link[1] == agent and missing.count:
+                    text = f"states of {link[0]} neither heard nor lost"
+                    yield Violation(text=text, t=missing.first, agent=agent, value=missing.count, limit=0)
         if not (found.counts or links):
             has_arrivals = found.simulated or found.info.level == "all"
             raise NotJudgedError("no agent listens to another" if has_arrivals else _NO_ARRIVALS)
@@ -81,11 +80,6 @@ class MessageAccount(Check):
             for t in late[found.dropped.get(link, 0) :]:
                 links[link].add(t)
         return links
-
-
-def _missing(link: Link, missing: Missing, text: str) -> Iterator[Violation]:
-    if missing.count:
-        yield Violation(text=text, t=missing.first, agent=link[1], value=missing.count, limit=0)
 
 
 class Rejoined(Check):

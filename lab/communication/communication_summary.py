@@ -14,7 +14,7 @@ from math import inf
 from pathlib import Path
 from types import MappingProxyType
 
-from gridpeers.lab.communication.accounts import ArrivalAccount, ArrivalAccounts, Missing, TickAccounts, VerdictAccounts
+from gridpeers.lab.communication.accounts import ArrivalAccount, ArrivalAccounts, Missing, TickAccounts
 from gridpeers.lab.communication.heals import Heal, Heals
 from gridpeers.lab.communication.record_pass import RecordSink, end_of, opened, read_into
 from gridpeers.lab.communication.sent_states import Link, SentState, SentStates
@@ -54,7 +54,6 @@ class CommunicationSummary:
     unreadable: int
     sent: Mapping[str, SentStates]
     counts: Mapping[Link, LinkCounts]
-    unjudged: Mapping[Link, Missing]
     unheard: Mapping[Link, Missing]
     """Simulated time: decisions without the state of the tick before, by link; for those without faults."""
     arrivals: Mapping[Link, Sequence[ArrivalAccount]]
@@ -98,7 +97,6 @@ class SummaryPass(RecordSink):
         self._sent: defaultdict[str, SentStates] = defaultdict(lambda: SentStates(simulated=simulated))
         self._decided: dict[str, DecidedTicks | DecidedStates] = {}
         self._ticks = TickAccounts(self._sent, info.T_c, lost.get(PLANT, ()))
-        self._verdicts = VerdictAccounts(self._sent)
         self._arrivals = ArrivalAccounts(PAUSE * speed, LINKED_WITHIN * speed)
         self._heals = Heals(info, t_end, self._sent)
         self._counts: dict[Link, LinkCounts] = {}
@@ -141,8 +139,6 @@ class SummaryPass(RecordSink):
 
     def take_trace(self, trace: LinkTrace) -> None:
         self._heals.trace(trace)
-        if self._simulated:
-            self._verdicts.trace(trace)
 
     def finish(self, unreadable: int) -> CommunicationSummary:
         self._flush(inf)
@@ -152,7 +148,6 @@ class SummaryPass(RecordSink):
             unreadable=unreadable,
             sent=self._sent,
             counts=self._counts,
-            unjudged=self._verdicts.missing(),
             unheard=self._ticks.missing,
             arrivals=self._arrivals.accounts,
             dropped=self._dropped,

@@ -52,12 +52,6 @@ class StateWindow:
     def has(self, number: int) -> bool:
         return number >= 0 and self._numbers[number % KEPT] == number
 
-    def numbers(self, after: int, until: int) -> list[int]:
-        """Return the sent numbers in (after, until], in order."""
-        if until - after > KEPT:
-            return sorted(number for number in self._numbers if after < number <= until)
-        return [number for number in range(after + 1, until + 1) if self.has(number)]
-
     def spoke(self, number: int) -> bool:
         """Return whether a state of this number was sent to the neighbours."""
         return self.has(number) and not self._flags[number % KEPT]

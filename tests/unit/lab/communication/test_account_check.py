@@ -24,20 +24,6 @@ def test_an_account_that_does_not_close_is_caught() -> None:
     assert found.violations[0].value == (found.violations[0].limit or 0) - 1
 
 
-def test_a_message_without_a_verdict_is_caught() -> None:
-    """A state that its sender noted, and that the emulated link never judged."""
-    case = ran_with(LOSSY).checked_case
-    link = ("inv1", "inv2")
-    first, *others = case.content.traces[link]
-    short = type(first)(first.src, first.dst, first.seq[:-9] + first.seq[-8:], first.t[:-9] + first.t[-8:],
-                        first.outcome[:-9] + first.outcome[-8:])  # fmt: skip
-    wrong = dict(case.content.traces) | {link: [short, *others]}
-    found = verdict(with_content(case, replace(case.content, traces=wrong)), "message_account")
-
-    assert (found.count, found.violations[0].agent, found.violations[0].value) == (1, "inv2", 1.0)
-    assert "states of inv1 without a verdict" in found.violations[0].text
-
-
 def test_a_state_that_never_arrived_is_caught(sound: CheckedCase) -> None:
     """Without faults of links a decision has the states of the tick before: one that uses an older one has lost it."""
     content = sound.content

@@ -84,8 +84,8 @@ def test_a_star_around_a_leader_swings_when_its_links_are_too_slow() -> None:
     leader = on_the_plant("star", link=ticks, end_s=12.0)
     follower = on_the_plant("star around inv2", link=ticks, end_s=12.0)
 
-    assert leader.f_error[-250:].max() > 0.04
-    assert follower.f_error[-250:].max() < 0.02
+    assert leader.f_error[-200:].max() > 0.04
+    assert follower.f_error[-200:].max() < 0.02
 
 
 @pytest.mark.parametrize("graph", ["path"])
