@@ -13,8 +13,15 @@ import msgspec
 
 from gridpeers.lab.chaos.chaos_run import SAME_IN_PROCESSES, ChaosRow
 from gridpeers.lab.chaos.disturbed_scenario import ChaosBase
-from gridpeers.scenarios.results.run_files import FolderError, shown, write_whole
-from gridpeers.scenarios.results.run_journal import JOURNAL, journal_line, open_journal, rows_in
+from gridpeers.scenarios.results.run_files import (
+    JOURNAL,
+    FolderError,
+    journal_line,
+    open_journal,
+    rows_in,
+    shown,
+    write_whole,
+)
 from gridpeers.scenarios.run_request import Driver
 from gridpeers.scenarios.schema.plugin_keys import with_relative_folders
 from gridpeers.scenarios.schema.scenario_writing import to_toml

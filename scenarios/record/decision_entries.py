@@ -1,8 +1,8 @@
 """The journal entries that say how agents decide: where each is in the file, and where parts of a journal are lost.
 
-In simulated time an entry holds until the next one of its agent, which may be minutes away. So the parts of the file
-are gone through once, and where each agent has entries is kept, not the entries. In wall-clock time each decision has
-an entry of its own, and the file is only gone through once it turns out to be damaged.
+In simulated time an entry holds until the next one of its agent, which may be minutes away: the parts of the file are
+gone through once, and the places of the entries are kept. In wall-clock time each decision has an entry of its own, and
+the file is only gone through once it turns out to be damaged.
 """
 
 from __future__ import annotations
@@ -30,15 +30,6 @@ class JournalCoverage:
 
     Parts of a periodic one come all the time, as of an agent with emulated links. Of another, one comes with each
     change, and says nothing about the time since the one before.
-
-    Examples
-    --------
-    >>> coverage = JournalCoverage(periodic=True)
-    >>> for number, t in ((0, 0.2), (1, 0.4), (3, 0.8)):
-    ...     part = Journal(sender="inv1", epoch=1, seq=number, t=t, data=b"")
-    ...     coverage.take(part, lambda t=t: (t - 0.18, t))
-    >>> [(since, round(until, 3)) for since, until in coverage.holes(())]
-    [(0.4, 0.62)]
     """
 
     def __init__(self, *, periodic: bool) -> None:
@@ -46,7 +37,7 @@ class JournalCoverage:
         self._epoch = self._number = -1
         self._t = -1.0
         """Run time of the last part (s)."""
-        self._span: Callable[[], Hole | None] = _nothing
+        self._span: Callable[[], Hole | None] = lambda: None
         self._since: float | None = None
         """Since when (s) parts are lost, as far as none has come that tells how it went on."""
         self._gaps: list[Hole] = []
@@ -78,10 +69,6 @@ class JournalCoverage:
         if since is None and behind:  # no part came after it, which would tell by its number what is lost
             since = self._t if self._periodic else max(self._t, min(behind) - INSTANT)
         return self._gaps if since is None else [*self._gaps, (since, inf)]
-
-
-def _nothing() -> None:
-    """Tell of nothing: no part has come."""
 
 
 def inside(holes: Sequence[Hole], t: float) -> bool:
@@ -147,8 +134,6 @@ class DecisionEntries:
         return any(
             begin < at <= until and (last is None or last <= begin + INSTANT) for begin, until in self.holes(agent)
         )
-
-    # ---------------------------------------------------------------- inner
 
     def _covered(self, node: str) -> JournalCoverage:
         if node not in self._coverage:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import suppress
-from functools import lru_cache
-from typing import Any
+from functools import lru_cache, partial
 
 from msgspec.structs import replace
 
@@ -14,7 +13,6 @@ from gridpeers.agents.agent_config import AgentConfig, nameplate_of
 from gridpeers.agents.graphs import GraphError, in_neighbours, rule_of
 from gridpeers.netem.liar import HeardFrom, lies_about
 from gridpeers.netem.models import INSTANT
-from gridpeers.netem.models.lie import Before
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.record.decision_entries import DecisionEntries
 from gridpeers.scenarios.record.message_index import MessageIndex, MessageOnWire, heard_of, on_wire
@@ -25,57 +23,6 @@ from gridpeers.wire.timing import time_of
 
 _REACH = 2.0
 """How far (s) a state may be from where its number says: in wall-clock time agents tick by their own clocks."""
-
-
-def hearing_of(links: Mapping[str, Any], sender: str, receiver: str) -> HeardFrom | None:
-    """Return how a receiver hears a sender by the tree `links` of its configuration; None if nobody lies about it."""
-    if not links:
-        return None
-    netem = EmulationConfig.of_tree(links).netem
-    lies = lies_about(netem, sender, receiver)
-    return HeardFrom(netem.seed, sender, receiver, lies) if lies else None
-
-
-class StatesInRecord:
-    """Earlier states of senders, as they were sent."""
-
-    def __init__(self, index: MessageIndex) -> None:
-        self._index = index
-        self._state = lru_cache(maxsize=20_000)(self._read)
-        self._last = lru_cache(maxsize=1000)(self._last_before)
-
-    def before(self, state: State) -> Before:
-        """Return the way from a run time (s) to the last state of the same process then, or its first one."""
-        return lambda t: self._last(state.sender, state.epoch, state.seq, state.t, t) or state
-
-    def _read(self, sender: str, epoch: int, number: int, t: float) -> State | None:
-        if number < 0:
-            return None
-        found = self._index.state(sender, number, t, epoch, _REACH)
-        return found if found is not None and found.epoch == epoch else None
-
-    def _last_before(self, sender: str, epoch: int, number: int, at: float, t: float) -> State | None:
-        T_c = self._index.info.T_c
-
-        def state(n: int) -> State | None:
-            return self._state(sender, epoch, n, max(0.0, at - (number - n) * T_c))
-
-        n = max(0, min(number, number - round((at - t) / T_c)))
-        while n < number and (later := state(n + 1)) is not None and later.t <= t + INSTANT:
-            n += 1
-        first = None
-        while (found := state(n)) is not None:
-            if not (found.idle or found.quiet):  # these no receiver hears
-                first = found
-                if found.t <= t + INSTANT:
-                    return found
-            n -= 1
-        while first is None and n < number:
-            n += 1
-            found = state(n)
-            if found is not None and not (found.idle or found.quiet):
-                first = found
-        return first
 
 
 _NOTHING = Decision(0, 0, [], [], [], [])
@@ -90,7 +37,7 @@ class DecisionReader:
         self.entries = DecisionEntries(index)
         self._listens = lru_cache(maxsize=None)(self._all_in_neighbours)
         self._hearing = lru_cache(maxsize=None)(self._heard_from)
-        self._true_states = StatesInRecord(index)
+        self._true_state = lru_cache(maxsize=20_000)(self._state_of_process)
 
     def decisions(self, agent: str, since: float, until: float) -> Iterator[RecordedDecision]:
         config = self._info.agent(agent)
@@ -98,14 +45,11 @@ class DecisionReader:
             return iter(())
         return (self._in_ticks if self._info.simulated else self._in_real_time)(config, since, until)
 
-    # ---------------------------------------------------------------- simulated time
-
     def _in_ticks(self, config: AgentConfig, since: float, until: float) -> Iterator[RecordedDecision]:
         name, T_c = config.name, self._info.T_c
         for index in self._index.near(since, until):
-            own = [
-                each for (sender, _), all_ in self._index.part(index).states.items() if sender == name for each in all_
-            ]
+            states = self._index.part(index).states.items()
+            own = [each for (sender, _), found in states if sender == name for each in found]
             for state in sorted(own, key=lambda each: each.seq):
                 t = time_of(state.seq, T_c)
                 if not since - 1e-9 <= t <= until + 1e-9 or not self.entries.knows(name, t):
@@ -128,12 +72,11 @@ class DecisionReader:
         for i, neighbour in enumerate([] if idle else form.neighbours):
             lag = form.states[i]
             number = None if lag is None else tick - lag
-            heard = None if number is None else self._index.state(neighbour, number, time_of(number, self._info.T_c))
-            since = None if number is None else t - (time_of(number, self._info.T_c) if heard is None else heard.t)
+            at = 0.0 if number is None else time_of(number, self._info.T_c)
+            heard = None if number is None else self._index.state(neighbour, number, at)
+            since = None if number is None else t - (at if heard is None else heard.t)
             neighbours.append(self._input(name, form, i, heard, number, since))
-        return self._decision(config, state, measured, tuple(neighbours), form, age=age)
-
-    # ---------------------------------------------------------------- wall-clock time
+        return self._decision(config, state, measured, tuple(neighbours), form, age)
 
     def _in_real_time(self, config: AgentConfig, since: float, until: float) -> Iterator[RecordedDecision]:
         name = config.name
@@ -153,15 +96,13 @@ class DecisionReader:
                     neighbours.append(self._input(name, entry, i, heard, number, age))
                 yield self._decision(config, state, measured, tuple(neighbours), entry)
 
-    # ---------------------------------------------------------------- both
-
     def _input(
         self, agent: str, form: Decision, i: int, state: State | None, number: int | None, age: float | None
     ) -> NeighbourInput:
         name, lie = form.neighbours[i], ""
         if state is not None and (heard := self._hearing(agent, name)) is not None:
             lie = heard.in_words(state.t)
-            state = heard.told(state, self._true_states.before(state))
+            state = heard.told(state, partial(self._last_state_before, state))
         unused = form.unused[i] if i < len(form.unused) else ""
         weight = form.weights[i] if i < len(form.weights) else 1.0
         return NeighbourInput(
@@ -175,8 +116,36 @@ class DecisionReader:
         )
 
     def _heard_from(self, agent: str, sender: str) -> HeardFrom | None:
+        """Return how an agent hears a sender; None if nobody lies about it."""
         config = self._info.agent(agent)
-        return None if config is None else hearing_of(config.links, sender, agent)
+        if config is None or not config.links:
+            return None
+        netem = EmulationConfig.of_tree(config.links).netem
+        lies = lies_about(netem, sender, agent)
+        return HeardFrom(netem.seed, sender, agent, lies) if lies else None
+
+    def _state_of_process(self, sender: str, epoch: int, number: int, t: float) -> State | None:
+        return None if number < 0 else self._index.state(sender, number, t, epoch, _REACH)
+
+    def _last_state_before(self, latest: State, t: float) -> State:
+        """Return the last state that the process of a state sent up to a run time (s), or its first one."""
+        T_c, number = self._info.T_c, latest.seq
+
+        def state(n: int) -> State | None:
+            return self._true_state(latest.sender, latest.epoch, n, max(0.0, latest.t - (number - n) * T_c))
+
+        n = max(0, min(number, number - round((latest.t - t) / T_c)))
+        while n < number and (later := state(n + 1)) is not None and later.t <= t + INSTANT:
+            n += 1
+        first = None
+        while (found := state(n)) is not None:
+            n -= 1
+            if not (found.idle or found.quiet):  # these no receiver hears
+                first = found
+                if found.t <= t + INSTANT:
+                    return found
+        later_ones = filter(None, map(state, range(n + 1, number + 1)))
+        return first or next((each for each in later_ones if not (each.idle or each.quiet)), latest)
 
     def _nameplate(self, name: str, state: State | None) -> Nameplate:
         known = self._nameplates.get(name)
@@ -191,10 +160,9 @@ class DecisionReader:
         measured: Measurement,
         neighbours: tuple[NeighbourInput, ...],
         form: Decision,
-        *,
         age: int = 0,
     ) -> RecordedDecision:
-        met = {each.name for each in neighbours}
+        met, own = {each.name for each in neighbours}, self._own_before(config, state, form)
         action = _action(config, state, measured)
         return RecordedDecision(
             config=config,
@@ -204,19 +172,12 @@ class DecisionReader:
             measurement_age=age,
             neighbours=neighbours,
             not_met=tuple(name for name in self._listens(config.name) if name not in met),
-            before=self._before(config, state, measured, action, form),
-            restarted=self._own_before(config, state, form) is None,
+            before=(measured.P_set, measured.V_set) if own is None or action != "law" else own,
+            restarted=own is None,
             saturated=form.saturated if action == "law" else (0, 0),
             action=action,
             state=state,
         )
-
-    def _before(
-        self, config: AgentConfig, state: State, measured: Measurement, action: Action, form: Decision
-    ) -> tuple[float, float]:
-        """Return the set-points (W, V) before a decision: the agent's own, or those of the plant after a pause."""
-        own = self._own_before(config, state, form)
-        return (measured.P_set, measured.V_set) if own is None or action != "law" else own
 
     def _own_before(self, config: AgentConfig, state: State, form: Decision) -> tuple[float, float] | None:
         """Return the agent's own set-points (W, V) before a decision; None where it starts, or starts again."""
@@ -235,8 +196,6 @@ class DecisionReader:
                 return in_neighbours(config.control, agent, self._nameplates, rule_of(config.control))
         return ()
 
-    # ---------------------------------------------------------------- messages as they were heard
-
     def heard(self, receiver: str, since: float, until: float) -> Iterator[MessageOnWire]:
         if self._info.clock == "wall":
             return self._heard_in_real_time(receiver, since, until)
@@ -251,10 +210,10 @@ class DecisionReader:
         for decision in self.decisions(receiver, since, until):
             if not decision.measurement_age:
                 key = f"measurement/{receiver}"
-                yield on_wire(key, None, None, receiver=receiver, message=decision.measurement)
+                yield on_wire(key, b"", None, receiver=receiver, message=decision.measurement)
             for each in decision.neighbours:
                 if each.state is not None and each.number != last.get(each.name):
-                    yield on_wire(f"state/{each.name}", None, None, receiver=receiver, message=each.state)
+                    yield on_wire(f"state/{each.name}", b"", None, receiver=receiver, message=each.state)
                 last[each.name] = each.number
 
     def _heard_in_real_time(self, receiver: str, since: float, until: float) -> Iterator[MessageOnWire]:
@@ -263,8 +222,7 @@ class DecisionReader:
                 if journal.sender != receiver:
                     continue
                 if isinstance(entry, MessageReference):
-                    found = self._index.named_by(entry, journal.t)
-                    message = heard_of(receiver, found, entry, journal.t)
+                    message = heard_of(receiver, self._index.named_by(entry, journal.t), entry, journal.t)
                 elif isinstance(entry, ReceivedMessage):
                     message = on_wire(entry.key, entry.payload, entry.at, receiver=receiver, rejected=entry.rejected)
                 else:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections import defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from math import inf
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from gridpeers.scenarios.record.journal_reader import entries_of, message_of, values_of
 from gridpeers.scenarios.record.record_file import RecordFile, RecordMessage
@@ -39,19 +39,19 @@ class MessageOnWire:
     """A message as it was sent, or as it was heard."""
 
     sender: str
-    receiver: str
+    receiver: str = ""
     """Name of who heard it; empty for a message as it was sent."""
-    kind: str
+    kind: str = ""
     """Its type, such as "State"; empty if it has none."""
     key: str
     """Its key, without `gridpeers/<run>/`."""
-    epoch: int
+    epoch: int = -1
     """Epoch of its sender; -1 if it cannot be read."""
-    number: int
+    number: int = -1
     """Its number; -1 if it cannot be read."""
-    t: float
+    t: float = -1.0
     """Run time that it says (s); -1 if it cannot be read. Of one that was rejected, about when that was."""
-    at: float | None
+    at: float | None = None
     """When it was sent, or heard, on the clock of that process (s, monotonic); None in simulated time."""
     rejected: str = ""
     """Kind of its rejection by the receiver (`gridpeers.wire.codec.KINDS`); empty if it was used, or as it was sent."""
@@ -104,8 +104,6 @@ class MessageIndex:
         if text not in self.damage:
             self.damage.append(text)
 
-    # ---------------------------------------------------------------- messages of the plant for recorders
-
     def of_type(self, topic: Topic, kind: type[M], parts: Iterable[int] | None = None) -> Iterator[M]:
         """Yield the messages of a topic that can be read, of some parts or of all."""
         for index in range(self.parts) if parts is None else parts:
@@ -152,7 +150,7 @@ class MessageIndex:
 
     def measurement(self, to: str, number: int, t: float, epoch: int | None = None) -> Measurement | None:
         """Return a measurement of about run time t (s), as `state` does."""
-        parts = (self.part(i).measurements for i in self._about(t))
+        parts = (self.part(i).measurements for i in self._about(t, 0.0))
         return _nearest((each for part in parts for each in part.get((to, number), ())), t, epoch)
 
     def named_by(self, entry: MessageReference, t: float) -> State | Measurement | None:
@@ -160,71 +158,59 @@ class MessageIndex:
         find = self.measurement if kind_of(entry.key) == "measurement" else self.state
         return find(name_of(entry.key), entry.seq, t, entry.epoch)
 
-    def _about(self, t: float, reach: float = 0.0) -> range:
+    def _about(self, t: float, reach: float) -> range:
         """Return the parts that may have a message of about run time t (s): a journal tells of the last second."""
         further = max(reach, self._reach)
         return self.near(t - 1.0 - further, t + further)
 
     def messages(self, sender: str | None, since: float, until: float, kind: str | None) -> Iterator[MessageOnWire]:
         """Yield messages as they were sent; see `RunRecord.messages`."""
-        known: dict[tuple[str, str, int, int], None] = {}
+        known: dict[tuple[str, int, int], None] = {}
         for index in self.near(since, until):
-            for journal, entry in self.part(index).entries:
-                for each in self._sent(journal, entry):
-                    key = (each.sender, each.kind, each.epoch, each.number)
+            for _, entry in self.part(index).entries:
+                for key, payload, message, at in self._sent(entry):
+                    if not key:
+                        continue
+                    each = on_wire(key, payload, at, message=message)
                     fits = (sender is None or each.sender == sender) and (kind is None or each.kind == kind)
                     if not fits or not since - 1e-9 <= each.t <= until + 1e-9:
                         continue
-                    if each.kind == "State" and key in known:  # the plant notes it too, while it knows no journal
-                        continue
-                    known[key] = None
-                    if len(known) > 100_000:
-                        known.pop(next(iter(known)))
+                    if each.kind == "State":  # the plant notes it too, while it knows no journal
+                        if (one := (each.sender, each.epoch, each.number)) in known:
+                            continue
+                        known[one] = None
+                        if len(known) > 100_000:
+                            known.pop(next(iter(known)))
                     yield each
 
-    def _sent(self, journal: Journal, entry: Entry) -> Iterator[MessageOnWire]:
+    def _sent(self, entry: Entry) -> Iterator[tuple[str, bytes, AnyMessage | None, float | None]]:
+        """Yield key, bytes, message and time (s, monotonic) of each message in an entry, as far as it has them."""
         if isinstance(entry, Exchange):
-            for kind, raws in ((Measurement, entry.measurements), (State, entry.states)):
+            kinds: tuple[tuple[type[Measurement] | type[State], Sequence[object]], ...]
+            kinds = ((Measurement, entry.measurements), (State, entry.states))
+            for kind, raws in kinds:
                 for raw in raws:
                     message = message_of(raw, kind, self.info)
-                    if isinstance(message, Measurement):
-                        yield on_wire(f"measurement/{message.to}", raw, None, message=message)
-                    elif isinstance(message, State):
-                        yield on_wire(f"state/{message.sender}", raw, None, message=message)
-        elif isinstance(entry, SentMessage):
-            yield on_wire(entry.key, entry.payload, entry.at)
-        elif isinstance(entry, ReceivedMessage) and not entry.rejected:
-            yield on_wire(entry.key, entry.payload, None)
+                    key = f"measurement/{message.to}" if isinstance(message, Measurement) else ""
+                    key = key or (f"state/{message.sender}" if message else "")
+                    yield key, raw if isinstance(raw, bytes) else b"", message, None
+        elif isinstance(entry, SentMessage) or (isinstance(entry, ReceivedMessage) and not entry.rejected):
+            at = entry.at if isinstance(entry, SentMessage) else None
+            yield entry.key, entry.payload, sound(entry.payload), at
 
     def _read_part(self, index: int) -> _Part:
         part = _Part()
-        for record in self.file.part(index):
-            if record.topic != "journal":
-                continue
-            journal = self._message(record)
-            if not isinstance(journal, Journal):
-                continue
+        for journal in self.journals_in(index):
             for entry in self.entries_in(journal):
                 part.entries.append((journal, entry))
-                self._note(part, entry)
+                for _, _, message, _ in self._sent(entry):
+                    if isinstance(message, State):
+                        part.states[message.sender, message.seq].append(message)
+                    elif isinstance(message, Measurement):
+                        part.measurements[message.to, message.seq].append(message)
+                    elif message is None:
+                        self.note_damage("a message in a journal cannot be read")
         return part
-
-    def _note(self, part: _Part, entry: Entry) -> None:
-        if isinstance(entry, Exchange):
-            for raw in entry.measurements:
-                self._keep(part, message_of(raw, Measurement, self.info))
-            for raw in entry.states:
-                self._keep(part, message_of(raw, State, self.info))
-        elif isinstance(entry, SentMessage) or (isinstance(entry, ReceivedMessage) and not entry.rejected):
-            self._keep(part, sound(entry.payload))
-
-    def _keep(self, part: _Part, message: AnyMessage | None) -> None:
-        if isinstance(message, State):
-            part.states[message.sender, message.seq].append(message)
-        elif isinstance(message, Measurement):
-            part.measurements[message.to, message.seq].append(message)
-        elif message is None:
-            self.note_damage("a message in a journal cannot be read")
 
 
 def _nearest(found: Iterable[M], t: float, epoch: int | None) -> M | None:
@@ -234,44 +220,52 @@ def _nearest(found: Iterable[M], t: float, epoch: int | None) -> M | None:
 
 
 def on_wire(
-    key: str, raw: Any, at: float | None, *, receiver: str = "", rejected: str = "", message: AnyMessage | None = None
+    key: str,
+    payload: bytes,
+    at: float | None,
+    *,
+    receiver: str = "",
+    rejected: str = "",
+    message: AnyMessage | None = None,
 ) -> MessageOnWire:
     """Return a message from its bytes, or from the message itself where none were sent."""
-    payload = raw if isinstance(raw, bytes) else b"" if message is None else encode(message)
     message = message or sound(payload)
     if message is None:
         values = values_of(payload)
-        named = {name: values.get(name) for name in ("type", "sender", "epoch", "seq", "t")}
-    else:
-        named = {
-            "type": type(message).__name__,
-            "sender": message.sender,
-            "epoch": message.epoch,
-            "seq": message.seq,
-            "t": message.t,
-        }
+        epoch, number, t = (values.get(name) for name in ("epoch", "seq", "t"))
+        return MessageOnWire(
+            sender=str(values.get("sender") or key.rpartition("/")[2])[:64],
+            receiver=receiver,
+            kind=str(values.get("type") or "")[:40],
+            key=key,
+            epoch=epoch if type(epoch) is int else -1,
+            number=number if type(number) is int else -1,
+            t=float(t) if isinstance(t, int | float) else -1.0,
+            at=at,
+            rejected=rejected,
+            payload=payload,
+        )
     return MessageOnWire(
-        sender=str(named["sender"] or key.rpartition("/")[2])[:64],
+        sender=message.sender,
         receiver=receiver,
-        kind=str(named["type"] or "")[:40],
+        kind=type(message).__name__,
         key=key,
-        epoch=_whole(named["epoch"]),
-        number=_whole(named["seq"]),
-        t=float(named["t"]) if isinstance(named["t"], int | float) else -1.0,
+        epoch=message.epoch,
+        number=message.seq,
+        t=message.t,
         at=at,
         rejected=rejected,
         message=message,
-        payload=payload,
+        payload=payload or encode(message),
     )
 
 
 def heard_of(receiver: str, message: AnyMessage | None, entry: MessageReference, t: float) -> MessageOnWire:
     """Return a message as it was heard, whose bytes are in its sender's journal."""
-    kind = Measurement if kind_of(entry.key) == "measurement" else State
     return MessageOnWire(
         sender=sender_of(entry.key),
         receiver=receiver,
-        kind=kind.__name__,
+        kind="Measurement" if kind_of(entry.key) == "measurement" else "State",
         key=entry.key,
         epoch=entry.epoch,
         number=entry.seq,
@@ -281,7 +275,3 @@ def heard_of(receiver: str, message: AnyMessage | None, entry: MessageReference,
         message=message,
         payload=b"" if message is None else encode(message),
     )
-
-
-def _whole(value: Any) -> int:
-    return value if isinstance(value, int) and not isinstance(value, bool) else -1

@@ -45,8 +45,6 @@ class RecordFileError(ValueError):
 
 
 class RecordMessage(NamedTuple):
-    """A message of the file."""
-
     topic: Topic
     t: int
     """Run time at which its sender published it (ns)."""
@@ -86,18 +84,15 @@ class RecordFile:
             raise RecordFileError(f"{path}: it ends before it says what was recorded: {self._size} bytes")
         self.info: RecordInfo = self._info
         self._recent: dict[int, tuple[RecordMessage, ...]] = {}
-        """Messages of the chunks that were read last, by their places, the latest last."""
+        """Messages of the chunks that were read last, as readers go back and forth."""
 
     @property
     def damage(self) -> tuple[str, ...]:
         """Sentences on parts of the file that could not be read, and on its end if it is cut off."""
-        return (*self._damage, *([self._end] if self._end else []))
+        return (*self._damage, *filter(None, [self._end]))
 
     def refresh(self) -> bool:
-        """Note what was written since, of a run that is still recorded; return whether that is anything.
-
-        Raise RecordFileError if the file cannot be read any more.
-        """
+        """Note what was written since, of a run that is still recorded; return whether that is anything."""
         if self.complete:
             return False
         chunks = len(self._chunks)
@@ -120,9 +115,12 @@ class RecordFile:
 
     def part(self, index: int) -> tuple[RecordMessage, ...]:
         """Return the messages of one of `spans`; none if it is damaged, which `damage` then tells."""
-        return self._load(index)
-
-    # ---------------------------------------------------------------- inside
+        # not an lru_cache of a method: in a cycle with its file it would stay in memory long after
+        messages = self._recent.pop(index) if index in self._recent else self._load_chunk(index)
+        self._recent[index] = messages
+        if len(self._recent) > RECENT:
+            del self._recent[next(iter(self._recent))]
+        return messages
 
     def _read_on(self) -> None:
         try:
@@ -180,7 +178,7 @@ class RecordFile:
             profile = ""
         if profile != PROFILE:
             raise RecordFileError(
-                f"{self.path}: an MCAP file, but no record of gridpeers: its profile is {profile[:40]!r}"
+                f"{self.path}: an MCAP file, but no record of gridpeers: its profile is {profile!r:.42}"
             )
 
     def _info_of(self, data: bytes) -> RecordInfo | None:
@@ -204,22 +202,14 @@ class RecordFile:
                 f"{self.path}: what it says about its run (written by gridpeers {by[:40]}) cannot be read: {error}"
             ) from None
 
-    def _load(self, index: int) -> tuple[RecordMessage, ...]:
-        """Return the messages of a chunk; those of the last few stay, as readers go back and forth."""
-        # not an lru_cache of a method: in a cycle with its file it would stay in memory long after
-        messages = self._recent.pop(index) if index in self._recent else self._load_chunk(index)
-        self._recent[index] = messages
-        if len(self._recent) > RECENT:
-            del self._recent[next(iter(self._recent))]
-        return messages
-
     def _load_chunk(self, index: int) -> tuple[RecordMessage, ...]:
         place = self._chunks[index]
         try:
             with self.path.open("rb") as file:
                 file.seek(place.offset)
                 chunk = Chunk.read(ReadDataStream(BytesIO(file.read(place.length))))
-            self._check_size(chunk)
+            if not 0 <= _unpacked_size(chunk) <= MOST_CHUNK:
+                raise ValueError("its length is not known, or too large")
             records = breakup_chunk(chunk, validate_crc=True)
         except OSError as error:
             raise RecordFileError(f"{self.path}: cannot be read: {error.strerror}") from None
@@ -241,19 +231,19 @@ class RecordFile:
                 messages.append(RecordMessage(topic, record.log_time, record.sequence, record.data))
         return tuple(messages)
 
-    def _check_size(self, chunk: Chunk) -> None:
-        """Raise ValueError over a chunk that would take more memory than it says."""
-        if chunk.compression == "zstd" and not 0 <= zstandard.frame_content_size(chunk.data) <= MOST_CHUNK:
-            raise ValueError("its length is not known, or too large")
-        if chunk.compression == "lz4" and not 0 < lz4.frame.get_frame_info(chunk.data)["content_size"] <= MOST_CHUNK:
-            raise ValueError("its length is not known, or too large")
+
+def _unpacked_size(chunk: Chunk) -> int:
+    if chunk.compression == "zstd":
+        return zstandard.frame_content_size(chunk.data)
+    if chunk.compression == "lz4":
+        return int(lz4.frame.get_frame_info(chunk.data)["content_size"]) or -1
+    return len(chunk.data)
 
 
 def record_path(path: str | Path, case: str = "") -> Path:
     """Return the file of a record, of the folder of a case or of a run; it may not be there.
 
-    Raise RecordFileError if the folder has no record, none of that case, or those of several cases and none is chosen;
-    one sentence.
+    Raise RecordFileError if the folder has no record, none of that case, or those of several cases and none is chosen.
     """
     if not isinstance(path, str | Path):
         raise RecordFileError(f'{path!r:.60}: needs the path of a record, as "runs/islanding/latest/IV"')
@@ -270,13 +260,12 @@ def record_path(path: str | Path, case: str = "") -> Path:
     found = {file.parent.name: file for file in sorted(path.glob(f"*/{FILE}"))}
     if not found:
         raise RecordFileError(f"{path}: there is no {FILE}: the run was not recorded, or this is no folder of a run")
-    if case:
-        if case not in found:
-            raise RecordFileError(f'{path}: no record of case "{case}"; {suggestion(case, found, "cases")}')
-        return found[case]
-    if len(found) == 1:
-        return next(iter(found.values()))
-    raise RecordFileError(
-        f"{path}: it has a record of each case, {', '.join(found)}; choose one with --case "
-        f"{next(iter(found))}, or give its folder, {next(iter(found.values())).parent}"
-    )
+    first, *others = found
+    if case and case not in found:
+        raise RecordFileError(f'{path}: no record of case "{case}"; {suggestion(case, found, "cases")}')
+    if others and not case:
+        raise RecordFileError(
+            f"{path}: it has a record of each case, {', '.join(found)}; choose one with --case {first}, "
+            f"or give its folder, {found[first].parent}"
+        )
+    return found[case or first]

@@ -39,7 +39,6 @@ class RecordInfo(msgspec.Struct, frozen=True, kw_only=True):
     driver: Literal["inprocess", "processes", "live"]
     versions: dict[str, str]
     inverters: tuple[str, ...]
-    """Names of all inverters, in the order of their table."""
     plant: PlantConfig
     agents: tuple[AgentConfig, ...]
     """Configuration of each agent, also of those that join later: nameplate, graph, law, emulated links."""
@@ -75,7 +74,7 @@ class RecordInfo(msgspec.Struct, frozen=True, kw_only=True):
         return next((config for config in self.agents if config.name == name), None)
 
     def to_metadata(self) -> dict[str, str]:
-        """Return the metadata of the file: everything as JSON, and what people look for first as texts of its own."""
+        """Return the metadata of the file: all as JSON, and what people look for first."""
         return {
             "format": str(self.format),
             "info": msgspec.json.encode(self).decode(),
@@ -151,7 +150,6 @@ _json = msgspec.json.encode
 
 
 def _schema(kind: type[AnyMessage]) -> dict[str, Any]:
-    """Return the JSON schema of a message; that of a journal has the schemas of its entries beside it."""
     schema = msgspec.json.schema(kind)
     if kind is Journal:
         entries = [msgspec.json.schema(entry) for entry in ENTRIES]

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
 import msgspec
 
@@ -26,14 +26,7 @@ from gridpeers.scenarios.schema.loading import read_tables
 from gridpeers.scenarios.schema.participants import with_agent
 from gridpeers.scenarios.schema.scenario_errors import Problems
 
-
-@dataclass(frozen=True, kw_only=True)
-class _Measured:
-    """What of a record is measured."""
-
-    history: History
-    windows: tuple[Window, ...]
-    notes: tuple[str, ...]
+_Measured = tuple[History, Sequence[Window], list[str]]  # Rows and windows that are measured, and notes on them
 
 
 def report_of(record: RunRecord) -> RunReport:
@@ -43,24 +36,24 @@ def report_of(record: RunRecord) -> RunReport:
     scenario, no rows, or its feeder is not there any more.
     """
     scenario, feeder = _scenario_of(record)
-    case, of = record.info.case, (_live if record.info.clock == "wall" else _simulated)(record, scenario, feeder)
+    case, events = record.info.case, record.events()
+    history, opened, notes = (_simulated if record.info.simulated else _live)(record, scenario, feeder)
     quiet = [each for message in record.telemetry() for each in message.quiet]
-    saved = messages_saved(quiet, of.windows, len(with_agent(scenario, feeder, case)), scenario.time.T_c_s)
-    events = record.events()
-    measured = CaseRecord(history=of.history, windows=of.windows, events=events, messages_saved=saved)
+    saved = messages_saved(quiet, opened, len(with_agent(scenario, feeder, case)), scenario.time.T_c_s)
+    measured = CaseRecord(history=history, windows=opened, events=events, messages_saved=saved)
+    notes += [f"the run broke: {record.outcome}"] if record.outcome else []
     return RunReport(
         scenario=scenario.name,
         titles={case: scenario.cases[case].title},
         findings=find(scenario, feeder, {case: measured}),
         verdicts=(),
         failures={case: law_failures(events)},
-        notes=[f"case {case}: {note}" for note in (*of.notes, *_about(record))],
+        notes=[f"case {case}: {note}" for note in (*notes, *record.damage)],
         folder="",
     )
 
 
 def _scenario_of(record: RunRecord) -> tuple[ScenarioModel, Feeder]:
-    """Return the scenario of a record, with its one case, and its feeder."""
     info = record.info
     if not info.toml or not info.case:
         raise RecordFileError(f"{record.path}: a live run without a scenario: it has no events to be measured after")
@@ -88,8 +81,9 @@ def _simulated(record: RunRecord, scenario: ScenarioModel, feeder: Feeder) -> _M
     if end < scenario.time.end_s - 1e-9:
         notes.append(f"the record ends at {end:.2f} s of {scenario.time.end_s:g} s; what is measured ends there")
     if len(kept) < len(came):
-        notes.append(f"not measured: {', '.join(_left_out(came, kept))}")
-    return _Measured(history=history, windows=kept, notes=tuple(notes))
+        labels = {window.label for window in kept}
+        notes.append(f"not measured: {', '.join(one.label for one in came if one.label not in labels)}")
+    return history, kept, notes
 
 
 def _live(record: RunRecord, scenario: ScenarioModel, feeder: Feeder) -> _Measured:
@@ -102,20 +96,4 @@ def _live(record: RunRecord, scenario: ScenarioModel, feeder: Feeder) -> _Measur
     notes = [f"the record ends at {end:.2f} s"] if end < scenario.time.end_s - 1e-9 else []
     notes += [f"not measured: {', '.join(window.label for window in left_out)}"] if left_out else []
     notes += [departures.note] if departures.note else []
-    return _Measured(
-        history=taken_part(scenario, feeder, history),
-        windows=of.measured,
-        notes=tuple(notes),
-    )
-
-
-def _left_out(came: Sequence[Window], kept: Sequence[Window]) -> Iterator[str]:
-    labels = {window.label for window in kept}
-    return (window.label for window in came if window.label not in labels)
-
-
-def _about(record: RunRecord) -> Iterator[str]:
-    """Yield notes on the record itself."""
-    if record.outcome:
-        yield f"the run broke: {record.outcome}"
-    yield from record.damage
+    return taken_part(scenario, feeder, history), of.measured, notes

@@ -35,26 +35,7 @@ KINDS = tuple(kind.__name__ for kind in get_args(AnyMessage))  # Types of the me
 
 
 class RunRecord:
-    """The record of one case, opened.
-
-    Make one with `RunRecord.open`.
-
-    Attributes
-    ----------
-    path : Path
-        The file.
-    info : RecordInfo
-        The run: scenario, case, configurations of plant and agents, versions.
-
-    Examples
-    --------
-    Why did inverter 4 do that at 4.3 s?
-
-    >>> record = RunRecord.open("runs/islanding/latest/IV")                             # doctest: +SKIP
-    >>> decision = record.decision("inv4", 4.3)                                         # doctest: +SKIP
-    >>> decision.before, decision.after                                                 # doctest: +SKIP
-    >>> [(each.name, each.age, each.weight, each.unused) for each in decision.neighbours]  # doctest: +SKIP
-    """
+    """The record of one case, opened by `RunRecord.open`: its file, and its run (`info`)."""
 
     def __init__(self, file: RecordFile) -> None:
         self._file = file
@@ -76,16 +57,13 @@ class RunRecord:
     def open(cls, path: str | Path, case: str = "") -> RunRecord:
         """Open a record: the file run.mcap, the folder of a case, or that of a run with one case or the case named.
 
-        Raise RecordFileError if there is none, or none of the case, it is no record of gridpeers, or from a later
-        version; one sentence.
+        Raise RecordFileError if there is none, it is no record of gridpeers, or from a later version.
         """
         return cls(RecordFile(record_path(path, case)))
 
-    # ---------------------------------------------------------------- what it is
-
     @property
     def complete(self) -> bool:
-        """Whether the record was closed properly. If not, its end is missing: at most the last second."""
+        """True if the record was closed properly. If not, its end is missing: at most the last second."""
         return self._file.complete
 
     def refresh(self) -> bool:
@@ -104,7 +82,7 @@ class RunRecord:
 
     @property
     def agents(self) -> tuple[str, ...]:
-        """Names of all agents that were configured, also of those that join later."""
+        """Names of all configured agents, also of those that join later."""
         return self.info.agent_names
 
     @property
@@ -112,8 +90,6 @@ class RunRecord:
         """Why the run broke; empty after a good end; None if the record ends before the run."""
         last = _last(self.telemetry(since=max(0.0, self.t_end - 1.0)))
         return last.outcome if last is not None and last.final else None
-
-    # ---------------------------------------------------------------- physics and events
 
     def telemetry(self, *, since: float = 0.0, until: float = inf) -> Iterator[Telemetry]:
         """Yield the plant's telemetry: rows and events, in the order of time.
@@ -124,10 +100,7 @@ class RunRecord:
         return self._index.of_type("telemetry", Telemetry, self._index.near(since, until))
 
     def physics(self) -> History:
-        """Return the rows of the plant: f, P, Q, V, P_set, V_set of every inverter, as in history.csv, to the last bit.
-
-        Raise RecordFileError if the record has no rows.
-        """
+        """Return the rows of the plant as in history.csv, to the last bit; RecordFileError if there are none."""
         rows: list[tuple[float, ...]] = []
         inverters = self.info.inverters
         for message in self.telemetry():
@@ -141,8 +114,6 @@ class RunRecord:
         """Return the events of the plant, the roster and the links, in the order of time, as in events.csv."""
         return tuple(event for message in self.telemetry() for event in message.events)
 
-    # ---------------------------------------------------------------- messages
-
     def messages(
         self, sender: str | None = None, *, since: float = 0.0, until: float = inf, kind: str | None = None
     ) -> Iterator[MessageOnWire]:
@@ -155,9 +126,8 @@ class RunRecord:
     def heard(self, agent: str, *, since: float = 0.0, until: float = inf) -> Iterator[MessageOnWire]:
         """Yield messages as an agent, or the plant, heard them, in the order of their arrival.
 
-        In simulated time without emulated links these are, for each decision, the states of the tick before; with
-        emulated links those that had arrived by then, at the tick that first used them. Raise RecordFileError if there
-        was no such agent.
+        In simulated time these are, for each decision, the states of the tick before, or those that emulated links had
+        brought by then. Raise RecordFileError if there was no such agent.
         """
         self._require(agent)
         _check_times(since=since, until=until)
@@ -191,13 +161,8 @@ class RunRecord:
         """Yield the commands to emulated links, in their order."""
         return self._index.of_type("link_requests", LinkRequest)
 
-    # ---------------------------------------------------------------- decisions
-
     def decisions(self, agent: str, *, since: float = 0.0, until: float = inf) -> Iterator[RecordedDecision]:
-        """Yield the decisions of an agent between two run times (s), the limits included, in the order of time.
-
-        Raise RecordFileError if there was no such agent, or the record has the physics only.
-        """
+        """Yield the decisions of an agent between two run times (s), the limits included, in the order of time."""
         self._require(agent)
         _check_times(since=since, until=until)
         if self.info.level == "physics":
@@ -205,18 +170,14 @@ class RunRecord:
         return self._decisions.decisions(agent, since, until)
 
     def holes(self, agent: str) -> list[Hole]:
-        """Return the run times (s) between which it is not known how an agent decided: the file is damaged there.
-
-        The first one is excluded, the last one included. In wall-clock time single decisions in between may be there.
-        """
+        """Return the run times (s) between which it is not known how an agent decided: the file is damaged there."""
         self._require(agent)
         return list(self._decisions.entries.holes(agent))
 
     def decision(self, agent: str, t: float) -> RecordedDecision:
         """Return the decision of an agent that was in force at a run time (s): its last one up to then.
 
-        Raise RecordFileError if there was no such agent, the time is outside of the record, the agent had not decided
-        by then, or the record lacks what it decided.
+        Raise RecordFileError if there is none, or the record lacks it.
         """
         _check_times(t=t)
         if not 0.0 <= t <= self.t_end + self.info.T_c:
@@ -245,13 +206,10 @@ class RunRecord:
 
 
 def _check_times(**times: object) -> None:
-    """Refuse what is no run time, by the name of its argument."""
     for name, t in times.items():
         if not isinstance(t, Real) or isnan(t):
             raise RecordFileError(f"{name}: needs a run time in s, as 4.3, got {t!r:.60}")
 
 
 def _last(items: Iterable[T]) -> T | None:
-    """Return the last of some items; None if there is none."""
-    latest = deque(items, maxlen=1)
-    return latest[0] if latest else None
+    return next(iter(deque(items, maxlen=1)), None)

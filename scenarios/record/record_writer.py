@@ -1,8 +1,8 @@
 """Write the record of one case while it runs: chunks, each on the disk within a second of its first message.
 
-A thread of its own encodes, compresses and writes, so that the run waits for no disk; a run in one process, which does
-nothing else, writes in between. A full or broken disk ends the
-record with one sentence, and the run goes on. What is in the file can be read whatever ends the process.
+A thread of its own encodes, compresses and writes, so that the run waits for no disk; a run in one process writes in
+between. A full or broken disk ends the record with one sentence, and the run goes on. What is in the file can be read
+whatever ends the process.
 """
 
 from __future__ import annotations
@@ -10,19 +10,31 @@ from __future__ import annotations
 import contextlib
 import os
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from tempfile import TemporaryFile
 from time import monotonic
-from typing import Any, NamedTuple, cast
+from typing import Any, cast
 
 import lz4.frame  # noqa: F401  # without these two mcap fails at the first chunk
+import msgspec
 import zstandard  # noqa: F401
 from mcap.data_stream import RecordBuilder
 from mcap.records import ChunkIndex
 from mcap.writer import CompressionType, Writer
 
-from gridpeers.scenarios.record.record_info import METADATA, PROFILE, RecordChannel, RecordInfo, Topic
+from gridpeers.scenarios.record.record_info import (
+    FILE,
+    METADATA,
+    PROFILE,
+    TOPICS,
+    RecordChannel,
+    RecordInfo,
+    Topic,
+    channels,
+)
+from gridpeers.wire.codec import payload_of
+from gridpeers.wire.messages import Journal, LinkReport, LinkRequest, PlantEvent, Telemetry
 
 SYNC = 0.9
 """Time (s) between two calls that have the disk keep all against a loss of power; other files wait meanwhile."""
@@ -36,13 +48,6 @@ processor's cache holds, and a reader takes one at a time."""
 
 BEHIND = 64_000_000
 """Bytes of messages that may wait for the disk; more end the record, so that the memory of a run is bounded."""
-
-
-class _Item(NamedTuple):
-    topic: Topic
-    t: int
-    number: int
-    data: bytes
 
 
 class _WholeWrites:
@@ -123,14 +128,16 @@ class RecordWriter:
         self._writer = Writer(cast("Any", self._file), chunk_size=2 * CHUNK, compression=compression)
         # the one place where a run of days would grow: should the library name it otherwise, a test tells
         self._writer._Writer__chunk_indices = self._index  # type: ignore[attr-defined,unused-ignore]  # noqa: SLF001
+        self._writer.start(profile=PROFILE, library=f"gridpeers {info.versions.get('gridpeers', '')}".strip())
+        self._writer.add_metadata(METADATA, info.to_metadata())
         self._channels: dict[Topic, int] = {}
-        self._begin(info, channels)
-        self._waiting: list[_Item] = []
+        for channel in channels:
+            schema = self._writer.register_schema(channel.schema_name, "jsonschema", channel.schema)
+            self._channels[channel.topic] = self._writer.register_channel(channel.topic, channel.encoding, schema)
+        self._flush()
+        self._waiting: list[tuple[Topic, int, int, bytes]] = []
         self._bytes = 0
-        self._wake = threading.Event()
-        self._closing = False
-        self._lock = threading.Lock()
-        self._closed = threading.Event()
+        self._lock, self._wake, self._closed = threading.Lock(), threading.Event(), threading.Event()
         self._written_at = self._began = monotonic()
         self._syncs = False
         self._thread: threading.Thread | None = None
@@ -138,21 +145,12 @@ class RecordWriter:
             self._thread = threading.Thread(target=self._write_all, name="record", daemon=True)
             self._thread.start()
 
-    def _begin(self, info: RecordInfo, channels: tuple[RecordChannel, ...]) -> None:
-        writer = self._writer
-        writer.start(profile=PROFILE, library=f"gridpeers {info.versions.get('gridpeers', '')}".strip())
-        writer.add_metadata(METADATA, info.to_metadata())
-        for channel in channels:
-            schema = writer.register_schema(channel.schema_name, "jsonschema", channel.schema)
-            self._channels[channel.topic] = writer.register_channel(channel.topic, channel.encoding, schema)
-        self._flush()
-
     def add(self, topic: Topic, t: int, number: int, data: bytes) -> None:
         """Take a message of run time t (ns); it is on the disk within a second."""
         if self.failure:
             return
         with self._lock:
-            self._waiting.append(_Item(topic, t, number, data))
+            self._waiting.append((topic, t, number, data))
             self._bytes += len(data)
             many = self._bytes
         if many > BEHIND:
@@ -164,11 +162,10 @@ class RecordWriter:
             self._wake.set()
 
     def close(self) -> None:
-        if self._closing:
+        if self._closed.is_set():
             return
-        self._closing = True
-        self._wake.set()
         self._closed.set()
+        self._wake.set()
         if self._thread is not None:
             self._thread.join()
         elif not self.failure:
@@ -182,14 +179,12 @@ class RecordWriter:
         self._index.close()
         self._file.close()
 
-    # ---------------------------------------------------------------- the thread
-
     def _write_all(self) -> None:
         """Write a chunk every `PERIOD`, or when there is much to write, until the end."""
         while not self.failure:
             self._wake.wait(PERIOD)
             self._wake.clear()
-            closing = self._closing
+            closing = self._closed.is_set()
             self._write()
             if closing:
                 return
@@ -197,7 +192,13 @@ class RecordWriter:
     def _write(self) -> None:
         """Write what waits as a chunk, and have the disk keep it now and then."""
         try:
-            self._write_waiting()
+            with self._lock:
+                waiting, self._waiting, self._bytes = self._waiting, [], 0
+            for topic, t, number, data in waiting:
+                self._writer.add_message(self._channels[topic], t, data, t, number)
+            if waiting:
+                self._flush()
+                self.ended = waiting[-1][1]
             self._written_at = monotonic()
             if not self._syncs and self._written_at - self._began > SYNC:  # a shorter run has no need of it
                 self._syncs, words = True, (self._file.descriptor(),)
@@ -215,16 +216,6 @@ class RecordWriter:
                 os.fsync(descriptor)
         os.close(descriptor)
 
-    def _write_waiting(self) -> None:
-        with self._lock:
-            items, self._waiting = self._waiting, []
-            self._bytes = 0
-        for item in items:
-            self._writer.add_message(self._channels[item.topic], item.t, item.data, item.t, item.number)
-        if items:
-            self._flush()
-            self.ended = items[-1].t
-
     def _flush(self) -> None:
         self._writer.flush()  # type: ignore[no-untyped-call,unused-ignore]  # as mcap declares it
 
@@ -233,3 +224,81 @@ class RecordWriter:
         with self._lock:
             self._waiting.clear()
             self._bytes = 0
+
+
+NANO = 1_000_000_000
+
+VIEW_STEP, LIVE_VIEW_STEP = 0.2, 0.05
+"""Least distance (s) of the rows that viewers get in simulated time, where each takes as long as a decision, and in
+real time, where they take a quarter of the file at 0.01 s. All rows are in the telemetry."""
+
+
+def nanoseconds(t: float) -> int:
+    """Return a run time (s) as time in a record: whole nanoseconds since t = 0."""
+    return round(t * NANO)
+
+
+def row_json(row: Sequence[float], inverters: Sequence[str], quantities: Sequence[str]) -> bytes:
+    """Return a row of telemetry as JSON; null stands for a number that is not finite."""
+    t, *values = row
+    number = len(quantities)
+    parts = (values[i : i + number] for i in range(0, len(values), number))
+    named = {name: dict(zip(quantities, part, strict=True)) for name, part in zip(inverters, parts, strict=True)}
+    return msgspec.json.encode({"t_s": t} | named)
+
+
+def event_json(event: PlantEvent) -> bytes:
+    """Return an event as a `foxglove.Log`, which viewers list."""
+    at = nanoseconds(event.t)
+    log = {
+        "timestamp": {"sec": at // NANO, "nsec": at % NANO},
+        "level": 3 if event.kind == "warning" else 2,
+        "message": event.text,
+        "name": event.kind,
+        "file": event.subject,
+        "line": 0,
+    }
+    return msgspec.json.encode(log)
+
+
+class Recording:
+    """Record one case: give it all that the plant publishes for recorders, then close it.
+
+    Raise OSError if the file cannot be made.
+    """
+
+    def __init__(self, folder: Path, info: RecordInfo, quantities: Sequence[str]) -> None:
+        self._writer = RecordWriter(folder / FILE, info, channels(info.inverters, tuple(quantities)))
+        self._quantities = quantities
+        self._step = nanoseconds(LIVE_VIEW_STEP if info.clock == "wall" else VIEW_STEP)
+        self._t = self._next = 0.0
+        """Time (s) of the last telemetry, and from which on a row is the next for viewers."""
+
+    @property
+    def failure(self) -> str:
+        """Sentence on why the record ended early; empty if it did not."""
+        writer = self._writer
+        if not writer.failure:
+            return ""
+        return f"the record {writer.path.name} ends at {writer.ended / 1e9:.2f} s: {writer.failure}"
+
+    def __call__(self, message: Telemetry | Journal | LinkReport | LinkRequest) -> None:
+        """Record a message of the plant for recorders; reports on links have no time of their own."""
+        if isinstance(message, Telemetry):
+            self._t = message.t
+        at = nanoseconds(self._t if isinstance(message, LinkReport) else message.t)
+        self._writer.add(TOPICS[type(message)], at, message.seq, payload_of(message))
+        if isinstance(message, Telemetry):
+            self._show(message)
+
+    def _show(self, message: Telemetry) -> None:
+        for row in message.rows:
+            if row[0] >= self._next:
+                at = nanoseconds(row[0])
+                self._next = (at + self._step) / NANO - 0.5 / NANO
+                self._writer.add("physics", at, 0, row_json(row, message.inverters, self._quantities))
+        for event in message.events:
+            self._writer.add("events", nanoseconds(event.t), 0, event_json(event))
+
+    def close(self) -> None:
+        self._writer.close()

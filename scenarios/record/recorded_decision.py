@@ -36,7 +36,7 @@ class NeighbourInput:
     age: float | None
     """Age of that state (s of run time); None if there was none."""
     weight: float
-    """Weight from 0 to 1 of that state in the sums; 0 if it was left out."""
+    """Weight from 0 to 1 of that state in the sums."""
     unused: str
     """Why it was left out: "silent", "stale" or "island" (`gridpeers.wire.journal.UNUSED`); empty if it was used."""
     lie: str = ""
@@ -88,7 +88,7 @@ class RecordedDecision:
 
     @property
     def after(self) -> tuple[float, float]:
-        """Set-points (W, V) after the decision."""
+        """Set-points (W, V) after the decision, as `before`."""
         return self.state.P_set, self.state.V_set
 
     @property
@@ -107,12 +107,10 @@ class RecordedDecision:
 
     @property
     def takes_part(self) -> bool:
-        """Whether the agent has secondary control in this case."""
         return self.config.control.acts(self.config.name, self.config.kind)
 
     @property
     def in_words(self) -> str:
-        """What the agent did, in words."""
         if self.action == "hold" and not self.takes_part:
             return "it has no secondary control in this case: the set-points are those that the plant holds"
         return _IN_WORDS[self.action]
@@ -125,21 +123,12 @@ class RecordedDecision:
 
 
 def limits_of(control: Control) -> dict[str, float]:
-    """Return the limits (pu) to which an agent holds what its law decides, by the name of their parameter.
-
-    Examples
-    --------
-    >>> limits_of(Control(secondary="all", graph="full"))["V_set_max"]
-    1.1
-    """
+    """Return the limits (pu) to which an agent holds what its law decides, by the name of their parameter."""
     choice = control.law
     kind: object = Law
-    if choice.use == LawChoice().use and not (choice.command or choice.fmu):
-        kind = law_in_force(control)
-    elif not (choice.command or choice.fmu):
-        with suppress(
-            ValueError
-        ):  # code that is not here: its limits are those of every law, if it has none of its own
-            kind = LAWS.resolve(choice.use, choice.folder)
+    if not (choice.command or choice.fmu):
+        with suppress(ValueError):  # code that is not here: its limits are those of every law
+            own_law = choice.use != LawChoice().use
+            kind = LAWS.resolve(choice.use, choice.folder) if own_law else law_in_force(control)
     own = limits_in(choice.parameters)
     return {name: float(own.get(name, getattr(kind, name))) for name in LIMITS}

@@ -31,15 +31,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Published:
-    """One published number.
-
-    Examples
-    --------
-    >>> place = {"case": "IV", "event": "event1", "quantity": "MPSI"}
-    >>> number = Published(source="Table 1", **place, paper=0.12, digits=2, limit=0.02)
-    >>> number.where, number.within(0.13), number.within(0.15)
-    ('case IV, event1', True, False)
-    """
+    """One published number."""
 
     source: str
     """Place in the publication, e.g. "Table I"."""
@@ -57,27 +49,17 @@ class Published:
 
     @property
     def where(self) -> str:
-        """Place for people, e.g. "case II, event2"."""
         return f"case {self.case}, {self.event}" + (f", island of {self.island}" if self.island else "")
 
     def within(self, ours: float) -> bool | None:
-        """Return whether our number is near enough; None where the number is not judged.
-
-        Both count at the precision of the computation: a printed 0.14 stands for exactly 0.14.
-        """
+        """Return whether our number is near enough to exactly the printed one; None where that is not judged."""
         return None if self.limit is None else abs(ours - self.paper) <= self.limit
 
 
-def _claim_objection(it: Any) -> str:
-    return "" if isinstance(it, Claim) else callable_objection(it, "findings")
-
-
-CLAIMS: Registry[Any] = Registry("claim", "claims", _claim_objection)
+CLAIMS: Registry[Any] = Registry(
+    "claim", "claims", lambda it: "" if isinstance(it, Claim) else callable_objection(it, "findings")
+)
 """Claims by name. Those of a publication come with its `Benchmark`."""
-
-
-def _nothing(findings: Findings) -> Sequence[str]:
-    return ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,9 +70,8 @@ class Benchmark:
     """
 
     numbers: tuple[Published, ...] = ()
-    """Numbers that it prints; they stand beside ours."""
     claims: tuple[Claim, ...] = ()
-    summary: Callable[[Findings], Sequence[str]] = _nothing
+    summary: Callable[[Findings], Sequence[str]] = lambda _: ()
     """Return our distance from it, in a few lines below the claims."""
 
     def lines(self, findings: Findings) -> list[str]:
@@ -103,26 +84,19 @@ class Benchmark:
     def number(self, case: str, event: str, quantity: str, island: str = "") -> Published | None:
         """Return the published number at a place of our results, or None where there is none."""
         place = (case, event, quantity, island)
-        same = (one for one in self.numbers if (one.case, one.event, one.quantity, one.island) == place)
-        return next(same, None)
+        return next((one for one in self.numbers if (one.case, one.event, one.quantity, one.island) == place), None)
 
 
 NO_BENCHMARK = Benchmark()  # The benchmark of a scenario that nobody has published
 
 
-def _benchmark_objection(it: Any) -> str:
-    return "" if isinstance(it, Benchmark) else "it is no gridpeers.Benchmark"
-
-
-BENCHMARKS: Registry[Benchmark] = Registry("benchmark", "benchmarks", _benchmark_objection)
-"""Benchmarks by name. Those that come with gridpeers are entry points, imported when a run is judged."""
+BENCHMARKS: Registry[Benchmark] = Registry(
+    "benchmark", "benchmarks", lambda it: "" if isinstance(it, Benchmark) else "it is no gridpeers.Benchmark"
+)
 
 
 def benchmark_of(key: str | Mapping[str, Any]) -> Benchmark:
-    """Return the benchmark that a scenario names in its key `paper`; an empty one for "".
-
-    Raise PluginError if there is none of this name.
-    """
+    """Return the benchmark that a scenario names in its key `paper`, PluginError without one; an empty one for ""."""
     plugin = plugin_of(key)
     return BENCHMARKS.resolve(plugin.use, plugin.folder) if plugin.use else NO_BENCHMARK
 
@@ -159,8 +133,6 @@ class Claim:
 
 @dataclass(frozen=True, kw_only=True)
 class Verdict:
-    """The judgement of a claim."""
-
     claim: Claim
     status: Status
     found: str
@@ -174,20 +146,11 @@ def judge(findings: Findings, claims: Sequence[Claim]) -> tuple[Verdict, ...]:
         try:
             status, found = _judgement(claim, findings)
         except ANYTHING as error:  # a claim is a user's code
-            status, found = "FAIL", f"cannot be judged: {named(error)}{_there(error, findings)}"
+            known = {*findings.results, *(event for of in findings.results.values() for event in of)}
+            there = f"; cases and events are {', '.join(sorted(known))}" if isinstance(error, KeyError) else ""
+            status, found = "FAIL", f"cannot be judged: {named(error)}{there}"
         verdicts.append(Verdict(claim=claim, status=status, found=found))
     return tuple(verdicts)
-
-
-def _there(error: BaseException, findings: Findings) -> str:
-    if not isinstance(error, KeyError):
-        return ""
-    known = {
-        "cases": findings.results,
-        "events": {event for of in findings.results.values() for event in of},
-        "scenario's own metrics": {n for of in findings.own.values() for one in of.values() for n in one.values},
-    }
-    return "".join(f"; the {kind} are {', '.join(sorted(names))}" for kind, names in known.items() if names)
 
 
 def _judgement(claim: Claim, findings: Findings) -> tuple[Status, str]:

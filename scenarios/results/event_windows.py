@@ -39,13 +39,7 @@ class Window:
 
 
 def windows(events: Sequence[tuple[str, float]], end: float) -> tuple[Window, ...]:
-    """Return the windows of events given as (label, time in s).
-
-    Examples
-    --------
-    >>> [(window.label, window.end) for window in windows([("event1", 1.0), ("event2", 4.0)], 7.0)]
-    [('event1', 4.0), ('event2', 7.0)]
-    """
+    """Return the windows of events given as (label, time in s)."""
     ends = [*(t for _, t in events), end][1:]
     return tuple(Window(label=label, start=t, end=stop) for (label, t), stop in zip(events, ends, strict=True))
 
@@ -53,9 +47,7 @@ def windows(events: Sequence[tuple[str, float]], end: float) -> tuple[Window, ..
 def as_they_came(scenario: ScenarioModel, recorded: Iterable[PlantEvent]) -> list[tuple[str, float]]:
     """Return label and time (s) of each event: the scenario's time, or that at which its last inverter moved.
 
-    In wall-clock time a process takes its time to start, so inverters join later than the scenario says. A window
-    begins with the event itself: "within 1 s of returning" does not count the start of a process. In simulated time
-    the two times are the same.
+    In wall-clock time a process takes its time to start, and inverters join later than the scenario says.
     """
     moved = [(event.t, event.subject) for event in recorded if event.kind == "inverter"]
     ends = [*(event.t_s for event in scenario.events), scenario.time.end_s][1:]
@@ -81,13 +73,7 @@ def late_moves(scenario: ScenarioModel, recorded: Iterable[PlantEvent]) -> list[
 def messages_saved(
     quiet: Iterable[tuple[float, int]], windows: Sequence[Window], agents: int, T_c: float
 ) -> dict[str, float]:
-    """Return the share of states that the laws did not send, by window; nothing if they sent all.
-
-    Examples
-    --------
-    >>> messages_saved([(1.0, 3), (1.02, 1)], [Window(label="event1", start=1.0, end=1.04)], agents=4, T_c=0.02)
-    {'event1': 0.5}
-    """
+    """Return the share of states that the laws did not send, by window; nothing if they sent all."""
     quiet = list(quiet)
     if not quiet:
         return {}
@@ -112,20 +98,10 @@ class CaseRecord:
 
     @classmethod
     def of(
-        cls,
-        scenario: ScenarioModel,
-        feeder: Feeder,
-        case: str,
-        recorded: Recorded,
-        opened: Sequence[Window] | None = None,
+        cls, scenario: ScenarioModel, feeder: Feeder, case: str, of: Recorded, opened: Sequence[Window] | None = None
     ) -> CaseRecord:
         """Return a case as recorded, with given windows, or with those of the scenario's events as they came."""
         if opened is None:
-            opened = windows(as_they_came(scenario, recorded.events), scenario.time.end_s)
-        agents = len(with_agent(scenario, feeder, case))
-        return cls(
-            history=history_of(recorded),
-            windows=opened,
-            events=recorded.events,
-            messages_saved=messages_saved(recorded.quiet, opened, agents, scenario.time.T_c_s),
-        )
+            opened = windows(as_they_came(scenario, of.events), scenario.time.end_s)
+        saved = messages_saved(of.quiet, opened, len(with_agent(scenario, feeder, case)), scenario.time.T_c_s)
+        return cls(history=history_of(of), windows=opened, events=of.events, messages_saved=saved)

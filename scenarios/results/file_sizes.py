@@ -50,15 +50,7 @@ class FileSizes(NamedTuple):
 
     @property
     def sentence(self) -> str:
-        """Sentence on a long run's size; "" for others.
-
-        Examples
-        --------
-        >>> FileSizes(history=60_000_000, links=0, record=30_000_000, room=90_000_000).sentence
-        'writes about 90 MB: history.csv 60 MB, run.mcap 30 MB'
-        >>> FileSizes(history=1_000_000, links=0, record=1_000_000, room=2_000_000).sentence
-        ''
-        """
+        """Sentence on a long run's size; "" for others."""
         whole = self.history + self.links + self.record
         if whole < LONG:
             return ""
@@ -109,10 +101,7 @@ def _links_used(scenario: ScenarioModel, feeder: Feeder, case: str, members: Map
 
 
 def require_room(folder: Path, sizes: FileSizes, option: str = "folder") -> None:
-    """Refuse a folder whose disk has not the room for a run.
-
-    Raise FolderError with the room that is needed and that there is; `option` names the other folder to be given.
-    """
+    """Raise FolderError if the disk of a folder lacks the room for a run; `option` names another folder."""
     there = next((each for each in (folder, *folder.absolute().parents) if each.exists()), Path())
     try:
         free = shutil.disk_usage(there).free

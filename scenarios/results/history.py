@@ -43,12 +43,11 @@ class Nameplates:
             object.__setattr__(self, "shares", np.ones(len(self.names), bool))
 
     def without(self, names: Collection[str]) -> Nameplates:
-        """Return the same with some inverters left out of the sharing indices, as they have no agent."""
+        """Return the same with some inverters left out of the sharing indices."""
         return replace(self, shares=np.array([name not in names for name in self.names], bool)) if names else self
 
     @classmethod
     def of(cls, inverters: Sequence[InverterRow]) -> Nameplates:
-        """Take the nameplates from a feeder's inverters."""
         return cls(
             names=tuple(row.name for row in inverters),
             GFM=np.array([row.kind == "GFM" for row in inverters]),
@@ -80,17 +79,15 @@ class History:
     t: Floats
     """Time (s), shape (T,)."""
     f: Floats
-    """Frequency (Hz), shape (T, N)."""
+    """Frequency (Hz), shape (T, N), as all below."""
     P: Floats
-    """Real power (W), shape (T, N)."""
+    """Real power (W)."""
     Q: Floats
-    """Reactive power (var), shape (T, N)."""
+    """Reactive power (var)."""
     V: Floats
-    """Terminal voltage (V), shape (T, N)."""
+    """Terminal voltage (V)."""
     P_set: Floats
-    """Real-power set-point (W), shape (T, N)."""
     V_set: Floats
-    """Voltage set-point (V), shape (T, N)."""
 
     @property
     def present(self) -> Flags:
@@ -109,15 +106,7 @@ class History:
         return replace(self, **columns)
 
     def frame(self) -> pd.DataFrame:
-        """Return a table with columns (inverter, quantity) and the index t (s); `attrs["units"]` has the units.
-
-        Examples
-        --------
-        >>> row = (0.0, 60.0, 3e5, 1e4, 2400.0, 3.1e5, 2401.0)
-        >>> frame = History.of(("inv1",), [row]).frame()
-        >>> float(frame["inv1"]["P"][0.0]), frame.attrs["units"]["P"]
-        (300000.0, 'W')
-        """
+        """Return a table with columns (inverter, quantity) and the index t (s); `attrs["units"]` has the units."""
         import pandas as pd  # takes longer to import than a case to run
 
         quantities = [name for name in UNITS if name != "t"]
@@ -129,10 +118,7 @@ class History:
 
     @classmethod
     def of(cls, inverters: tuple[str, ...], rows: Sequence[Row] | Floats) -> History:
-        """Return the arrays of recorded rows, see `gridpeers.wire.messages.Telemetry.rows`.
-
-        Raise ValueError if a row has not as many numbers as the inverters need.
-        """
+        """Return the arrays of rows of telemetry; ValueError if they have not as many numbers as inverters need."""
         table, shape = np.asarray(rows, np.float64), (len(rows), 1 + len(QUANTITIES) * len(inverters))
         if table.shape != shape:
             raise ValueError(f"the rows of a history have {table.shape[1:]} numbers instead of {shape[1]}")
@@ -141,11 +127,12 @@ class History:
 
 
 def read_only(of: T) -> T:
-    """The same, with arrays that cannot be written to: anybody's metric must not spoil what is measured after it."""
-    arrays = {item.name: it for item in fields(of) if isinstance(it := getattr(of, item.name), np.ndarray)}
-    views: dict[str, Any] = {name: array.view() for name, array in arrays.items()}
-    for view in views.values():
-        view.setflags(write=False)
+    """Return the same with arrays that cannot be written to: no metric may spoil what is measured after it."""
+    views: dict[str, Any] = {}
+    for item in fields(of):
+        if isinstance(array := getattr(of, item.name), np.ndarray):
+            views[item.name] = array.view()
+            views[item.name].setflags(write=False)
     return replace(of, **views)
 
 

@@ -40,10 +40,9 @@ def switch_events(scenario: ScenarioModel, feeder: Feeder, recorded: Iterable[Pl
 def closed_switches(
     feeder: Feeder, events: Iterable[PlantEvent], before: Collection[str] | None = None
 ) -> frozenset[str]:
-    """Return the names of the switches that are closed after some events.
+    """Return the switches that are closed after some events; `before` are those closed before, by default at the start.
 
-    A switch that waits for synchronism has no event of kind "switch" until it closes. `before` are those that are
-    closed before the events; by default at the start of a run.
+    A switch that waits for synchronism has no event of kind "switch" until it closes.
     """
     names = switch_names(feeder)
     closed = {switch.name for switch in feeder.switches if switch.closed} if before is None else set(before)
@@ -126,10 +125,9 @@ def _islands(feeder: Feeder, inverters: Sequence[str], closed: frozenset[str]) -
 
 
 def islands_at_end(intervals: Sequence[IslandInterval], window: Window) -> Islands:
-    """Return the islands at the end of a window: those that a table has, and that checks judge.
+    """Return the islands at the end of a window, by which it is measured and judged.
 
-    Steady values are means over the end of a window, so islands that a switch made or joined before count no more. An
-    operation at the very end belongs to the next window.
+    An operation at the very end belongs to the next window.
     """
     return next(it.islands for it in reversed(intervals) if it.start < window.end - 1e-9)
 

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import nullcontext
-from io import StringIO
 from pathlib import Path
 
 import msgspec
 
-from gridpeers.netem.ledger import LinkCounts, LinkTrace, Outcome, combined, copies_of
+from gridpeers.netem.ledger import LinkCounts, LinkTrace, combined, copies_of
 from gridpeers.scenarios.emulation.link_data import data_of
-from gridpeers.scenarios.results.run_files import write_whole
+from gridpeers.scenarios.results.run_files import csv_text, write_whole
 from gridpeers.wire.messages import LinkReport
 
 COLUMNS = ("src", "dst", "seq", "t_s", "delay_s", "fate")
@@ -75,11 +73,8 @@ class LinkRecord:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Links whose messages are neither delivered, dropped nor in flight."""
-        return tuple(
-            f"{src} -> {dst}: the account does not close: {counts}"
-            for (src, dst), counts in self.counts.items()
-            if not counts.closes
-        )
+        open_ = ((link, counts) for link, counts in self.counts.items() if not counts.closes)
+        return tuple(f"{src} -> {dst}: the account does not close: {counts}" for (src, dst), counts in open_)
 
     def traces(self) -> Iterator[LinkTrace]:
         """Yield the verdicts in parts, link by link; of those in the file only one part at a time is in memory."""
@@ -105,15 +100,9 @@ class LinkRecord:
 
     def _csv(self) -> Iterator[str]:
         """Yield the text of links.csv: a run of an hour has hundreds of megabytes."""
-        text = StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(COLUMNS)
+        yield csv_text([COLUMNS])
         for trace in self.traces():
-            writer.writerows(_rows(trace))
-            yield text.getvalue()
-            text.seek(0)
-            text.truncate()
-        yield text.getvalue()
+            yield csv_text(_rows(trace))
 
     def _json(self) -> str:
         counts = [{"src": src, "dst": dst, **msgspec.to_builtins(of)} for (src, dst), of in sorted(self.counts.items())]
@@ -147,12 +136,8 @@ _decode = msgspec.msgpack.Decoder(LinkTrace).decode
 
 def _rows(trace: LinkTrace) -> Iterator[tuple[object, ...]]:
     for seq, t, outcome in zip(trace.seq, trace.t, trace.outcome, strict=True):
-        for delay_s, fate in _fates(outcome):
-            yield trace.src, trace.dst, seq, t, delay_s, fate
-
-
-def _fates(outcome: Outcome) -> Iterator[tuple[object, str]]:
-    if isinstance(outcome, str):
-        yield "", outcome
-    for copy, (delay_s, bit) in enumerate(copies_of(outcome)):
-        yield delay_s, ("copy" if copy else "passed") + ("" if bit is None else f", bit {bit} flipped")
+        sent = trace.src, trace.dst, seq, t
+        if isinstance(outcome, str):
+            yield *sent, "", outcome
+        for copy, (delay_s, bit) in enumerate(copies_of(outcome)):
+            yield *sent, delay_s, ("copy" if copy else "passed") + ("" if bit is None else f", bit {bit} flipped")

@@ -36,24 +36,12 @@ DIGITS: dict[Measure, int] = {"f_error_Hz": 2, "MPSI": 2, "V_error": 3, "MQSI": 
 
 
 def label(measure: str, f_nom: float = 60.0) -> str:
-    """Return the name of a measure for people, at a nominal frequency (Hz).
-
-    Examples
-    --------
-    >>> label("f_error_Hz"), label("MPSI"), label("f_error_Hz", 50.0)
-    ('abs(f-60)', 'MPSI', 'abs(f-50)')
-    """
+    """Return the name of a measure for people, such as "abs(f-50)", at a nominal frequency (Hz)."""
     return {"f_error_Hz": f"abs(f-{f_nom:g})", "p": "P"}.get(measure, measure)
 
 
 def heading(quantity: Quantity, f_nom: float = 60.0) -> str:
-    """Return the heading of a column, with the unit, at a nominal frequency (Hz).
-
-    Examples
-    --------
-    >>> heading("f_error_Hz", 50.0), heading("V_error")
-    ('abs(f-50) Hz', 'V_error pu')
-    """
+    """Return the heading of a column, such as "abs(f-50) Hz", at a nominal frequency (Hz)."""
     return f"{label(quantity, f_nom)}{UNITS[quantity]}"
 
 
@@ -81,19 +69,13 @@ class Measured:
     """Values of the metrics of a scenario in one window."""
 
     values: Mapping[str, float | None] = field(default_factory=dict)
-    """By name; None where there is no value."""
+    """None where there is no value."""
     reasons: Mapping[str, str] = field(default_factory=dict)
     """Reasons of the metrics that lack a value."""
 
 
 def name_of(plugin: Plugin, label: str = "") -> str:
-    """Return the name of a metric in tables: its label, or the last part of its reference.
-
-    Examples
-    --------
-    >>> name_of(Plugin(use="mine:nadir_Hz")), name_of(Plugin(use="MPSI")), name_of(Plugin(use="mine:Within"), "near")
-    ('nadir_Hz', 'MPSI', 'near')
-    """
+    """Return the name of a metric in tables: its label, or the last part of its reference."""
     return label or plugin.use.rpartition(":")[2].rpartition(".")[2]
 
 
@@ -111,7 +93,8 @@ def measured(metrics: Sequence[tuple[str, Callable[[WindowData], Any]]], data: W
             several = dict(result) if isinstance(result, Mapping) else {"": result}
             numbers = {printable(str(key), 60): _number(value) for key, value in several.items()}
         except ANYTHING as error:  # a metric is a user's code, and its result is too
-            values[name], reasons[name] = None, f"failed: {_shown(error)}{_columns(error, data)}"
+            said = printable(str(error), 160) if isinstance(error, PluginError) else named(error)
+            values[name], reasons[name] = None, f"failed: {said}{_columns(error, data)}"
             continue
         finally:
             vars(data).pop("history", None)  # the next metric has a table that this one has not changed
@@ -147,10 +130,6 @@ def _number(value: Any) -> tuple[float | None, str]:
     except (TypeError, ValueError, OverflowError):
         return None, f"returned {printable(repr(value), 80)}; return a number, or numbers by name"
     return (number, "") if math.isfinite(number) else (None, f"is no finite number: {number}")
-
-
-def _shown(error: BaseException) -> str:
-    return printable(str(error), 160) if isinstance(error, PluginError) else named(error)
 
 
 def _columns(error: BaseException, data: WindowData) -> str:

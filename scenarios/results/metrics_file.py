@@ -81,16 +81,14 @@ def metrics_json(
 
 
 def _numbers(steady: dict[str, Any]) -> dict[str, Any]:
+    """Return measures that are numbers and steady; beside the reason of others is the mean of the last 0.2 s."""
     reasons: Mapping[Measure, str] = steady["reasons"]
+    finite = {name: x for name, x in steady.items() if isinstance(x, float) and math.isfinite(x)}
     numbers: dict[str, Any] = {
-        name: value if value is not None and math.isfinite(value) and name not in reasons else None
-        for name, value in steady.items()
-        if name not in ("p", "reasons")
+        name: None if name in reasons else finite.get(name) for name in steady if name not in ("p", "reasons")
     }
-    texts = {name: f"{text}{_last_mean(name, steady[name])}" for name, text in reasons.items()}
+    texts = {
+        name: text + (f"; last mean {finite[name]:.4g}{UNITS[name]}" if name in finite else "")
+        for name, text in reasons.items()
+    }
     return numbers | ({"reasons": texts} if texts else {})
-
-
-def _last_mean(name: Measure, value: Any) -> str:
-    """Return the mean of the last 0.2 s, of a measure that is a number without being steady."""
-    return f"; last mean {value:.4g}{UNITS[name]}" if isinstance(value, float) and math.isfinite(value) else ""

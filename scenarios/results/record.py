@@ -8,10 +8,8 @@ folder keeps no rows in memory: a run that lasts for hours takes no more than a 
 from __future__ import annotations
 
 import contextlib
-import csv
 import hashlib
 from collections.abc import Sequence
-from io import StringIO
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, BinaryIO
@@ -19,13 +17,13 @@ from typing import TYPE_CHECKING, BinaryIO
 import msgspec
 
 from gridpeers.scenarios.results.link_record import LinkRecord
-from gridpeers.scenarios.results.run_files import write_whole
+from gridpeers.scenarios.results.run_files import csv_text, write_whole
 from gridpeers.wire.messages import Journal, LinkReport, LinkRequest, PlantEvent, Telemetry
 from gridpeers.wire.wording import not_importable
 
 if TYPE_CHECKING:
     from gridpeers.scenarios.record.record_info import RecordInfo
-    from gridpeers.scenarios.record.recording import Recording
+    from gridpeers.scenarios.record.record_writer import Recording
 
 QUANTITIES = ("f_Hz", "P_W", "Q_var", "V_V", "P_set_W", "V_set_V")
 """Columns of each inverter, in the order of `gridpeers.wire.messages.Telemetry.rows`, with their units."""
@@ -65,13 +63,7 @@ class RecordError(RuntimeError):
 
 
 def header(inverters: tuple[str, ...]) -> tuple[str, ...]:
-    """Names of the columns of history.csv.
-
-    Examples
-    --------
-    >>> header(("inv1",))
-    ('t_s', 'inv1_f_Hz', 'inv1_P_W', 'inv1_Q_var', 'inv1_V_V', 'inv1_P_set_W', 'inv1_V_set_V')
-    """
+    """Return the names of the columns of history.csv."""
     return ("t_s", *(f"{name}_{quantity}" for name in inverters for quantity in QUANTITIES))
 
 
@@ -90,19 +82,12 @@ class Recorder:
     """Record one case: call it with every message that the plant publishes for recorders, then `finish()`.
 
     With a folder it writes history.csv, events.csv, links.csv and links.json and keeps no rows; without one it keeps
-    the rows in memory and writes nothing. The hash of the bytes of history.csv is the same either way. Floats are
-    written as the shortest text that reads back to the same number, and lines end in a line feed on every system, so
-    equal runs give equal bytes. Rows may be missing (`gaps`) in a run whose recorder was out of reach; else that is an
-    error. `record` is the run of a run.mcap beside.
+    the rows in memory and writes nothing. The hash of the bytes of history.csv is the same either way. Rows may be
+    missing (`gaps`) in a run whose recorder was out of reach; else that is an error. `record` is the run of a run.mcap
+    beside.
     """
 
-    def __init__(
-        self,
-        folder: Path | None = None,
-        *,
-        gaps: bool = False,
-        record: RecordInfo | None = None,
-    ) -> None:
+    def __init__(self, folder: Path | None = None, *, gaps: bool = False, record: RecordInfo | None = None) -> None:
         self._gaps, self._folder = gaps, folder
         self._hash = hashlib.sha256()
         self._file: BinaryIO | None = None
@@ -114,7 +99,7 @@ class Recorder:
         """Why there is no run.mcap though one was asked for."""
         if folder is not None and record is not None:
             try:
-                from gridpeers.scenarios.record.recording import Recording  # mcap: only for runs with a record
+                from gridpeers.scenarios.record.record_writer import Recording
 
                 self._recording = Recording(folder, record, QUANTITIES)
             except ImportError as error:
@@ -127,13 +112,10 @@ class Recorder:
         """Times of the first two rows (s)."""
         self.rows: list[Row] = []
         self.count = 0
-        """Number of rows so far."""
         self.ended = 0.0
         self.missing: list[tuple[float, float]] = []
-        """See `Recorded.missing`."""
         self._events: list[PlantEvent] = []
         self.quiet: list[tuple[float, int]] = []
-        """See `Recorded.quiet`."""
         self.reproducible = True
         """False once something unscripted, such as the death of an agent, has entered the run."""
         self.links = LinkRecord(folder)
@@ -147,7 +129,6 @@ class Recorder:
         self.close()
 
     def __call__(self, message: Telemetry | LinkReport | Journal | LinkRequest) -> None:
-        """Take one message; with a folder its rows and verdicts are in a file when this returns."""
         if isinstance(message, Telemetry):
             self._take(message)
         elif isinstance(message, LinkReport):
@@ -171,7 +152,12 @@ class Recorder:
         for row in telemetry.rows:
             if self.count and row[0] <= self.ended:
                 raise RecordError(f"telemetry: a row of {row[0]:g} s came after that of {self.ended:g} s")
-            self._note_time(row[0])
+            if len(self._first) < 2:
+                self._first.append(row[0])
+            elif row[0] - self.ended > 1.5 * self.record_step:
+                self.missing.append((self.ended, row[0]))
+            self.ended = row[0]
+            self.count += 1
             if self._file is None:
                 self.rows.append(row)
             self._write(csv_line(row))
@@ -182,10 +168,7 @@ class Recorder:
             self._file.flush()
 
     def finish(self, end: float, record_step: float) -> Recorded:
-        """Check that the whole run is there, and give the files their names; if rows are missing, they keep PARTIAL.
-
-        Raise RecordError if rows are missing.
-        """
+        """Give the files their names; raise RecordError if rows are missing: then they keep PARTIAL."""
         if self._recording is not None:
             self._recording.close()
         if self._file is not None:
@@ -235,22 +218,11 @@ class Recorder:
         """Distance of the first two rows (s); 0 while there are not two."""
         return round(self._first[1] - self._first[0], 9) if len(self._first) == 2 else 0.0
 
-    def _note_time(self, t: float) -> None:
-        if len(self._first) < 2:
-            self._first.append(t)
-        elif t - self.ended > 1.5 * self.record_step:
-            self.missing.append((self.ended, t))
-        self.ended = t
-        self.count += 1
-
     def _write(self, bytes_: bytes) -> None:
         self._hash.update(bytes_)
         if self._file is not None:
             self._file.write(bytes_)
 
     def _write_events(self, folder: Path) -> None:
-        text = StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(("t_s", "kind", "subject", "text"))
-        writer.writerows((repr(event.t), event.kind, event.subject, event.text) for event in self._events)
-        write_whole(folder / "events.csv", text.getvalue())
+        rows = ((repr(event.t), event.kind, event.subject, event.text) for event in self._events)
+        write_whole(folder / "events.csv", csv_text([("t_s", "kind", "subject", "text"), *rows]))

@@ -17,16 +17,6 @@ _LINE = re.compile(r"(?:law|graph) (?:(?!: ).)*? \((?P<line>[^()]+:\d+)\)(?::| o
 
 
 class LawFailure(NamedTuple):
-    """One law that failed.
-
-    Examples
-    --------
-    >>> why = "law mine:Mine (mine.py:12): step at t = 1.2 s raised ZeroDivisionError: division by zero"
-    >>> (failure,) = law_failures([PlantEvent(t=1.2, kind="law", subject="inv1", text=f"inv1: {why}{IDLE}")])
-    >>> failure.line, failure.sentence == f"inv1 at t = 1.20 s: {why}"
-    ('mine.py:12', True)
-    """
-
     t: float
     agent: str
     why: str
@@ -35,7 +25,6 @@ class LawFailure(NamedTuple):
 
     @property
     def sentence(self) -> str:
-        """The failure on one line."""
         return f"{self.agent} at t = {self.t:.2f} s: {self.why}"
 
 
@@ -56,13 +45,7 @@ def ended_by_a_law(on_law_failure: OnLawFailure, events: Iterable[PlantEvent]) -
 
 
 def first_of(failures: tuple[LawFailure, ...]) -> str:
-    """Return the first failure on one line, and how many more there are; empty without any.
-
-    Examples
-    --------
-    >>> first_of((LawFailure(1.2, "inv1", "law mine: no idea", ""), LawFailure(1.2, "inv2", "law mine: no idea", "")))
-    'inv1 at t = 1.20 s: law mine: no idea; and 1 more'
-    """
+    """Return the first failure on one line, and how many more there are; empty without any."""
     more = f"; and {len(failures) - 1} more" if len(failures) > 1 else ""
     return failures[0].sentence + more if failures else ""
 

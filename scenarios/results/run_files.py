@@ -1,16 +1,23 @@
-"""The run folder: its place, that it is empty and one command's, and the state of its run."""
+"""The run folder: its place, that it is empty and one command's, the state of its run, the journal of a study."""
 
 from __future__ import annotations
 
 import contextlib
+import csv
 import errno
 import fcntl
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from datetime import datetime
+from io import StringIO
+from itertools import count
 from pathlib import Path
+from typing import BinaryIO, Protocol, TypeVar
 
+import msgspec
+
+from gridpeers.wire.codec import decode_foreign
 from gridpeers.wire.driver.ending import OutputLostError
 
 RUNS = Path("runs")  # Parent of the run folders that the user does not name, seen from the working directory
@@ -33,7 +40,7 @@ class FolderError(ValueError):
 def new_folder(out: Path | None, scenario: str, now: datetime) -> Path:
     """Make the run folder: `out`, or `runs/<scenario>/<time>` with a link `runs/<scenario>/latest`.
 
-    Raise FolderError if the folder has something in it, is a file, or cannot be made. Nothing is written then.
+    Raise FolderError if the folder has something in it, is a file, or cannot be made.
     """
     if out is not None:
         return empty_folder(out, "--out", "running")
@@ -43,10 +50,7 @@ def new_folder(out: Path | None, scenario: str, now: datetime) -> Path:
 
 
 def require_folder(out: Path | None, scenario: str) -> None:
-    """Refuse what `new_folder` would, before a run, and make nothing.
-
-    Raise FolderError if the folder has something in it, is a file, or cannot be made.
-    """
+    """Raise FolderError if `new_folder` would, and make nothing."""
     if out is not None:
         _require_empty(out, f"--out {out}")
     folder = out if out is not None else RUNS / scenario
@@ -57,10 +61,9 @@ def require_folder(out: Path | None, scenario: str) -> None:
 
 
 def empty_folder(folder: Path, option: str = "", status: str = "") -> Path:
-    """Make a folder for results with a status, and return it; the option that names it is part of the errors.
+    """Make a folder for results, and return it; of two commands that take it at once for their status, one gets it.
 
-    Raise FolderError if there is something in it, it is a file, or it cannot be made or written. Of two commands that
-    take a folder at the same time for their status, one gets it.
+    Raise FolderError, which names the option, if there is something in it, it is a file, or it cannot be made.
     """
     where = f"{option} {folder}".strip()
     try:
@@ -100,13 +103,7 @@ def set_complete(folder: Path, missing: Iterable[str] = ()) -> None:
 
 
 def is_complete(status: str) -> bool:
-    """Return whether the run of a status came to its end and has its results.
-
-    Examples
-    --------
-    >>> is_complete("complete"), is_complete("complete: the record ends at 3 s"), is_complete("running")
-    (True, True, False)
-    """
+    """Return whether the run of a status came to its end and has its results."""
     return status.partition(":")[0] == "complete"
 
 
@@ -126,13 +123,7 @@ def no_room(error: BaseException) -> bool:
 
 
 def refusal(folder: Path, error: OSError) -> str:
-    """Return the file of a folder that could not be written, and the reason.
-
-    Examples
-    --------
-    >>> refusal(Path("here"), OSError(errno.ENOSPC, "No space left on device"))
-    'here: cannot be written: No space left on device'
-    """
+    """Return the file of a folder that could not be written, and the reason."""
     if no_room(error) or error.errno in _GONE:
         return f"{error.filename or shown(folder)}: cannot be written: {error.strerror}"
     return str(error)
@@ -159,6 +150,13 @@ def write_whole(path: Path, content: str | bytes | Iterable[str]) -> None:
         raise
 
 
+def csv_text(rows: Iterable[Iterable[object]]) -> str:
+    """Return rows as CSV, whose lines end in a line feed on every system: equal runs give equal bytes."""
+    text = StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()
+
+
 def shown(folder: Path) -> str:
     """Return the folder as short as it can be named from here."""
     with contextlib.suppress(ValueError):
@@ -169,17 +167,15 @@ def shown(folder: Path) -> str:
 def _made(parent: Path, now: datetime) -> Path:
     """Make a folder that is named by a time, and return it; a number tells those of one second apart."""
     stem = now.strftime("%Y-%m-%dT%H-%M-%S")
-    folder, number = parent / stem, 2
-    while True:
+    for number in count(1):
+        folder = parent / (stem if number == 1 else f"{stem}-{number}")
         try:
             folder.mkdir(parents=True)
             return folder
-        except FileExistsError as error:
-            if not os.path.lexists(folder):  # what is in the way is above it
-                raise FolderError(_unmade(folder, error.strerror, "--out")) from None
         except OSError as error:
-            raise FolderError(_unmade(folder, error.strerror, "--out")) from None
-        folder, number = parent / f"{stem}-{number}", number + 1
+            if not (isinstance(error, FileExistsError) and os.path.lexists(folder)):  # else what is in the way is above
+                raise FolderError(_unmade(folder, error.strerror, "--out")) from None
+    raise AssertionError
 
 
 def _point_latest(folder: Path) -> None:
@@ -194,18 +190,14 @@ LOCK = ".lock"
 
 
 def locked(folder: Path, option: str, command: str) -> int:
-    """Lock a folder for this process; the system opens the lock however the process ends.
-
-    Raise FolderError if another process has locked it.
-    """
+    """Lock a folder until this process ends; raise FolderError if another process has locked it."""
     handle = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         os.close(handle)
-        raise FolderError(
-            f"{option} {shown(folder)}: another `gridpeers {command}` is at work in it; let it end"
-        ) from None
+        text = f"{option} {shown(folder)}: another `gridpeers {command}` is at work in it; let it end"
+        raise FolderError(text) from None
     return handle
 
 
@@ -227,3 +219,47 @@ def broken_if_ended(folder: Path) -> Iterator[None]:
     except (Exception, OutputLostError) as error:
         set_broken(folder, str(error) or type(error).__name__)
         raise
+
+
+JOURNAL = "runs.jsonl"
+
+
+class JournalRow(Protocol):
+    """The result of a run of a study, as a struct of msgspec: a line of the journal, from which the study goes on."""
+
+    @property
+    def number(self) -> int: ...
+
+
+Row = TypeVar("Row", bound=JournalRow)
+
+
+def journal_line(row: JournalRow) -> bytes:
+    return msgspec.json.encode(row) + b"\n"
+
+
+def rows_in(folder: Path, kind: type[Row], problem: Callable[[Row], str]) -> dict[int, Row]:
+    """Return the runs in the journal of a folder, by their numbers; of two lines of one run the later one counts.
+
+    `problem` says why the study has no such run, as people edit journals; "" of a run that it has. A last line that a
+    kill cut off counts as not done. Raise FolderError if a line is damaged, or the study has no such run.
+    """
+    rows, decoder = dict[int, Row](), msgspec.json.Decoder(kind)
+    for place, line in enumerate((folder / JOURNAL).read_bytes().split(b"\n")[:-1], start=1):
+        try:
+            row = decode_foreign(decoder.decode, line)
+            text = problem(row)
+        except msgspec.DecodeError as error:
+            text = f"this line is damaged ({error}); remove it, and its run is done again"
+        if text:
+            raise FolderError(f"{shown(folder / JOURNAL)}:{place}: {text}")
+        rows[row.number] = row
+    return rows
+
+
+def open_journal(folder: Path) -> BinaryIO:
+    """Open the journal of a folder, a new one if there is none, to add lines; the one that a kill cut off goes."""
+    journal = (folder / JOURNAL).open("a+b")
+    journal.seek(0)
+    journal.truncate(journal.read().rfind(b"\n") + 1)
+    return journal

@@ -12,17 +12,20 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gridpeers.scenarios.results.run_files import (
+    JOURNAL,
     LOCK,
     RUNS,
     FolderError,
+    journal_line,
     locked,
+    open_journal,
     refusal,
+    rows_in,
     set_broken,
     set_status,
     shown,
     write_whole,
 )
-from gridpeers.scenarios.results.run_journal import JOURNAL, journal_line, open_journal, rows_in
 from gridpeers.scenarios.schema.scenario_writing import to_toml
 from gridpeers.scenarios.sweep.sweep_case import SweepRow, run_one
 from gridpeers.scenarios.sweep.sweep_reading import Plan

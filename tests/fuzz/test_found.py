@@ -13,8 +13,7 @@ from gridpeers.scenarios.emulation.link_data import LinkCommand, decode_statuses
 from gridpeers.scenarios.live.feeder_map import read_feeder_map
 from gridpeers.scenarios.live.run_requests import read_config
 from gridpeers.scenarios.record.journal_reader import entries_of, values_of
-from gridpeers.scenarios.results.run_files import FolderError
-from gridpeers.scenarios.results.run_journal import JOURNAL, rows_in
+from gridpeers.scenarios.results.run_files import JOURNAL, FolderError, rows_in
 from gridpeers.scenarios.sweep.sweep_case import SweepRow
 from gridpeers.wire.bounds import LONGEST_MESSAGE
 from gridpeers.wire.trust.key_folder import KeysError, read_list

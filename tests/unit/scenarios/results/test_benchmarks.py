@@ -101,7 +101,7 @@ def test_a_benchmark_that_raises_fails_its_claim_and_not_the_run() -> None:
     )
 
     (verdict,) = verdicts
-    assert (verdict.status, verdict.found) == ("FAIL", "cannot be judged: KeyError: 'V'; the cases are IV")
+    assert (verdict.status, verdict.found) == ("FAIL", "cannot be judged: KeyError: 'V'; cases and events are IV")
     assert "The benchmark's summary failed: AttributeError" in plain(report)
 
 
