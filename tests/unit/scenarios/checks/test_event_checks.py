@@ -10,11 +10,6 @@ from gridpeers.wire.messages import PlantEvent
 from tests.unit.scenarios.checks.cases import ran, verdict
 
 
-def test_a_run_whose_laws_decide_to_the_end_passes() -> None:
-    """Full coordination, where every inverter has a law."""
-    assert verdict(ran().checked_case, "law_failed").sentence == "law_failed passed"
-
-
 def test_each_law_that_fails_is_a_violation_in_the_order_of_time() -> None:
     """It names the agent, the time, and the line of the law; agents come in the order of the inverters."""
     why = "law mine:Mine (mine.py:12): step at t = 1.2 s raised ValueError: no"

@@ -9,7 +9,6 @@ from pathlib import Path
 from threading import Event
 from typing import Annotated, Any
 
-import numpy as np
 import pytest
 from msgspec.structs import replace
 
@@ -23,7 +22,6 @@ from gridpeers.scenarios.checks.check_verdict import (
     Violation,
     read_verdicts,
     summary,
-    verdicts_json,
 )
 from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.checks.judging import JudgingStop, judge_by
@@ -92,41 +90,6 @@ def test_a_check_of_ones_own_passes_fails_or_is_not_judged(
     assert judged(check, monkeypatch).sentence.startswith(said)
 
 
-@pytest.mark.parametrize(
-    ("error", "said"),
-    [
-        (NotJudgedError("no more clouds"), "not judged further: no more clouds"),
-        (NotJudgedError(), "not judged further: no reason given"),
-        (ZeroDivisionError("division"), "cannot judge further: ZeroDivisionError: division"),
-    ],
-)
-def test_what_a_check_has_yielded_counts_whatever_it_raises_then(
-    error: Exception, said: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """It has failed, with its violations, and with what was raised beside them."""
-
-    def check(case: CheckedCase) -> Iterator[Violation]:
-        yield Violation(text="late", agent="inv2")
-        yield Violation(text="late", agent="inv3")
-        raise error
-
-    found = judged(check, monkeypatch)
-
-    assert (found.status, found.count, [it.agent for it in found.violations]) == ("failed", 2, ["inv2", "inv3"])
-    assert found.reason == said
-    assert found.sentence == f"mine failed: late: inv2, and 1 more; {said}"
-
-
-def test_a_verdict_counts_all_violations_and_keeps_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Numbers of numpy are numbers; those that are none are left out."""
-    many = [Violation(text="x", t=np.float64(k), value=float("nan")) for k in range(100)]  # type: ignore[arg-type]
-    found = judged(lambda case: many, monkeypatch)
-
-    assert (found.count, len(found.violations)) == (100, SHOWN_VIOLATIONS)
-    assert (found.violations[1].t, found.violations[1].value) == (1.0, None)
-    assert found.sentence == "mine failed: x: at t = 0.00 s, and 99 more"
-
-
 def test_a_check_that_yields_without_end_is_asked_for_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
     """It has failed, with as many violations as were counted, of which the first are kept."""
     monkeypatch.setattr(judging, "MOST_VIOLATIONS", 1000)
@@ -159,26 +122,6 @@ def test_a_check_that_judges_for_long_is_named_once(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(judging, "PATIENCE", 1e6)
     assert judged(lambda case: (), monkeypatch).status == "passed"
     assert len(told) == 1
-
-
-def test_of_a_check_of_ones_own_the_module_is_named(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """On standard error, with what can be done."""
-    case = ran().checked_case
-    monkeypatch.setattr(judging, "PATIENCE", 0.0)
-    monkeypatch.setattr(judging, "tell", lambda text, real=judging.tell: (real(text), NAMED.set()))
-    judge_by({"slow": Plugin(use=f"{HERE}:waits_to_be_named")}, case)
-
-    assert capsys.readouterr().err == (
-        f"check slow of {HERE} has been judging case IV for 0 s; Ctrl-C ends the run, and keeps what is recorded\n"
-    )
-
-
-def waits_to_be_named(case: CheckedCase) -> tuple[()]:
-    """A check that returns when it has been named."""
-    assert NAMED.wait(60.0)
-    return ()
 
 
 def interrupted(case: CheckedCase) -> tuple[()]:
@@ -263,62 +206,9 @@ def test_a_wrong_check_is_refused_before_anything_starts(entries: list[Any], sai
     assert any(said in line for line in error.value.problems), error.value.problems
 
 
-def test_all_wrong_checks_come_at_once() -> None:
-    """One entry with three mistakes, and another one, are four problems."""
-    entries = [{"use": "frequency", "band_Hz": -1, "within_s": 1e9, "off": "yes"}, "nothing"]
-    with pytest.raises(gp.ScenarioError) as error:
-        gp.load("islanding").replace({"checks": entries})
-
-    assert len(error.value.problems) == 4
-
-
 def test_gridpeers_own_checks_are_entries_like_any_other() -> None:
     """Each has a sentence, limits that its defaults keep, and its name in docs/checks.md."""
     for name in {*CHECKS.own, *ALWAYS}:
         assert re.search(rf"`(checks = \[\")?{name}(\"\])?`", PAGE), name
         assert plugin_problems(CHECKS, Plugin(use=name)) == []
         assert CHECKS.resolve(name).__doc__
-
-
-def test_verdicts_read_back_from_their_file(tmp_path: Path) -> None:
-    """Every field, and those that are left out."""
-    verdicts = {
-        "IV": (
-            CheckVerdict(check="rating", status="failed", count=2, violations=(Violation(text="x", value=1.5),)),
-            CheckVerdict(check="heal", status="not judged", reason="no cut"),
-        )
-    }
-    (tmp_path / "checks.json").write_text(verdicts_json(verdicts), encoding="utf-8")
-
-    assert read_verdicts(tmp_path / "checks.json") == verdicts
-
-
-def test_a_verdict_is_one_line_with_each_failure() -> None:
-    """How many passed, what failed, with time, agent, value and limit, and how many were not judged."""
-    late = Violation(text="late", t=1.5, agent="inv2", value=3.0, unit="s", limit=2.0)
-    line = summary(
-        (
-            CheckVerdict(check="voltage", status="passed"),
-            CheckVerdict(check="heal", status="not judged", reason="no cut"),
-            CheckVerdict(check="frequency", status="failed", violations=(late,), count=1),
-        )
-    )
-
-    assert line == "1 of 2 checks passed, 1 not judged; frequency failed: late: inv2 3 s at t = 1.50 s (limit 2 s)"
-
-
-def test_the_report_of_a_run_has_the_verdict() -> None:
-    """A line for each case, in report.txt and on the terminal."""
-    lines = [line for line in ran().report.splitlines() if line.startswith("CHECKS")]
-
-    assert lines == ["CHECKS  case IV: 12 of 12 checks passed, 1 not judged"]
-
-
-def test_a_folder_without_verdicts_is_judged_when_it_is_asked(tmp_path: Path) -> None:
-    """The folder of an older run gets the verdict that it would get now."""
-    ran().save(tmp_path / "run")
-    (tmp_path / "run" / "checks.json").unlink()
-    result = gp.read(tmp_path / "run")
-
-    assert isinstance(result, gp.Result)
-    assert result.check_verdicts == ran().check_verdicts

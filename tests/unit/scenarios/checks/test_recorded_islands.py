@@ -45,13 +45,7 @@ def test_a_switch_that_closes_late_makes_an_island_that_is_judged_from_then_on(w
     assert verdict(closed, "power_sharing").status == "failed"
 
 
-def test_a_switch_that_operates_as_the_window_ends_belongs_to_the_next_one(waiting: CheckedCase) -> None:
-    """The event that begins a window does not change the islands of the one before."""
-    assert len(_islands(waiting, "islanding")) == 1
-    assert len(_islands(waiting, "splitting")) == 3
-
-
-@pytest.mark.parametrize("name", ["islanding", "microgrid-switching", "plug-n-play"])
+@pytest.mark.parametrize("name", ["microgrid-switching", "plug-n-play"])
 def test_without_a_wait_the_islands_are_those_that_the_scenario_plans(name: str) -> None:
     """Switches that operate on time leave what the scenario says, event by event."""
     case = ran(name, "IV").checked_case

@@ -24,8 +24,3 @@ def test_what_comes_late_by_the_clock_is_looked_for_at_the_speed_of_the_run(
 ) -> None:
     """A journal comes up to two seconds late by the clock, which are twenty of run time at ten times real time."""
     assert index_of(clock, speed).near(10.0, 10.0) == range(9, last)
-
-
-def test_what_comes_late_in_simulated_time_is_looked_for_by_ticks() -> None:
-    """Rows and journals are reported every so many ticks, at most 100: with T_c = 0.2 s that is 20 s of run time."""
-    assert index_of("simulated", 1.0, T_c=0.2).near(10.0, 10.0) == range(9, 30)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import random
-from functools import partial
 from pathlib import Path
 
 import pytest
@@ -12,7 +11,6 @@ from mcap.writer import Writer
 from gridpeers.scenarios.record.record_file import RecordFileError
 from gridpeers.scenarios.record.record_info import FILE, FORMAT, METADATA, PROFILE
 from gridpeers.scenarios.record.record_reader import RunRecord
-from tests.record.fake_clock import fake_clock_record
 from tests.record.recorded_runs import recorded_in_chunks, recorded_run
 
 CALM = '[time]\nend_s = 1.0\n[case.calm]\nsecondary = "all"\ngraph = "ring"\n'
@@ -50,7 +48,7 @@ def test_a_record_cut_off_anywhere_is_read_up_to_there(whole: Path, tmp_path: Pa
     """At every length, once the file says what it is, it opens, tells that it is cut off, and has what came before."""
     data, counts = whole.read_bytes(), []
     opened = 0
-    for length in (*range(1, 4000, 97), *range(4000, len(data), len(data) // 60)):
+    for length in (*range(1, 4000, 197), *range(4000, len(data), len(data) // 25)):
         (tmp_path / FILE).write_bytes(data[:length])
         try:
             record, count = read_all(tmp_path)
@@ -62,7 +60,7 @@ def test_a_record_cut_off_anywhere_is_read_up_to_there(whole: Path, tmp_path: Pa
         assert not record.complete
         assert any("cut off" in text for text in record.damage)
 
-    assert opened > 40
+    assert opened > 15
     assert counts == sorted(counts)
     assert counts[-1] > counts[len(counts) // 2] > 0
 
@@ -70,7 +68,7 @@ def test_a_record_cut_off_anywhere_is_read_up_to_there(whole: Path, tmp_path: Pa
 def test_a_record_with_changed_bytes_is_read_around_them(whole: Path, tmp_path: Path) -> None:
     """Whatever byte is wrong, what can be read is read, the rest is told, and nothing else is raised."""
     data, draws, told = whole.read_bytes(), random.Random(7), 0
-    for _ in range(120):
+    for _ in range(40):
         changed = bytearray(data)
         for _ in range(draws.choice((1, 1, 20))):
             changed[draws.randrange(len(data))] = draws.randrange(256)
@@ -81,7 +79,7 @@ def test_a_record_with_changed_bytes_is_read_around_them(whole: Path, tmp_path: 
         except RecordFileError:
             told += 1
 
-    assert told > 60
+    assert told > 20
 
 
 @pytest.mark.parametrize(
@@ -135,19 +133,6 @@ def test_what_was_not_there_is_told(whole: Path, tmp_path: Path) -> None:
         RunRecord.open(tmp_path)
     with pytest.raises(RecordFileError, match="cannot be read: No such file"):
         RunRecord.open(whole.parent / "other.mcap")
-
-
-def test_an_inverter_without_an_agent_is_told_from_one_that_has_not_decided_yet(tmp_path: Path) -> None:
-    """A spare whose agent never came has no decision at any time; one that came later had none before that."""
-    never = fake_clock_record(tmp_path / "never", spares=("inv3",), end=0.2)
-    later = fake_clock_record(
-        tmp_path / "later", spares=("inv3",), end=0.6, happens=lambda run: run.at(0.3, partial(run.start, "inv3"))
-    )
-
-    with pytest.raises(RecordFileError, match=r"by t = 0\.1 s, nor later; agents that decided: inv1,2$"):
-        never.decision("inv3", 0.1)
-    with pytest.raises(RecordFileError, match=r"inv3 had not decided anything by t = 0\.1 s; its first decision is of"):
-        later.decision("inv3", 0.1)
 
 
 def test_physics_alone_have_no_decisions(tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import msgspec
@@ -59,18 +58,6 @@ def test_a_record_that_is_cut_off_is_measured_up_to_its_end(result: Result, tmp_
     assert code == 0
     assert "Frequency and power sharing after each event" in printed
     assert all(note in printed for note in report.notes)
-
-
-def test_the_command_names_the_cases_of_a_run(result: Result, tmp_path: Path) -> None:
-    """The folder of a run with one case will do; no record, or no such case, is one line."""
-    shutil.copytree(result.folder / "IV", tmp_path / "run" / "IV")
-    code, printed = invoke("metrics", str(tmp_path / "run"))
-    none = invoke("metrics", str(tmp_path / "run"), "--case", "V")
-
-    assert (code, "Voltage and var sharing" in printed) == (0, True)
-    assert none[0] == 2
-    assert 'no record of case "V"; ' in none[1]
-    assert "IV" in none[1]
 
 
 def test_a_record_without_a_scenario_is_told(tmp_path: Path) -> None:

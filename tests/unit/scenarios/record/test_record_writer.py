@@ -94,18 +94,6 @@ def test_a_disk_that_stands_still_ends_the_record_and_not_the_run(
     one.close()
 
 
-def test_a_record_closed_twice_is_closed(tmp_path: Path) -> None:
-    """The second time does nothing, and what was written is whole."""
-    one = writer(tmp_path)
-    one.add("events", 0, 0, b"{}")
-    one.close()
-    one.close()
-
-    file = RecordFile(tmp_path / "run.mcap")
-    assert file.complete
-    assert len(list(file.messages())) == 1
-
-
 def test_the_index_of_a_long_run_takes_no_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of chunks nothing is kept; in the file every chunk is in the index, for viewers, and no other file is left."""
     monkeypatch.setattr(record_writer, "CHUNK", 100)

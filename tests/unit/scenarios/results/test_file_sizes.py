@@ -51,28 +51,11 @@ def test_the_files_of_a_run_have_about_the_size_that_was_told(tmp_path: Path) ->
     assert forecast.links == pytest.approx(written["links.csv"], rel=0.25)
 
 
-def test_links_without_a_fault_write_nothing() -> None:
-    """A fault on one link counts one link; without any there is no links.csv."""
-    one = ISLANDING.replace({"link": [{"on": "inv1 -> inv2", "delay": 0.01}]})
-    four = with_cases(one.spec, ["IV"])
-
-    assert file_sizes(with_cases(ISLANDING.spec, ["IV"]), one.feeder).links == 0
-    assert file_sizes(four, one.feeder).links == 350 * 36
-
-
-def test_a_live_run_without_an_end_is_told_by_the_hour() -> None:
-    """An hour of nine inverters is 356 MB of history, whatever the scenario's own end is, and as much of record."""
-    forecast = file_sizes(with_cases(ISLANDING.spec, ["IV"]), ISLANDING.feeder, 3600.0, "wall")
-
-    assert forecast.sentence == "writes about 864 MB: history.csv 356 MB, run.mcap 508 MB"
-
-
 def test_a_record_has_about_the_size_that_was_told(tmp_path: Path) -> None:
-    """In simulated time, with the physics alone, and with emulated links."""
+    """In simulated time, and with emulated links."""
     delayed = ISLANDING.replace({"link": [{"on": "* <-> *", "delay": 0.05}]})
     for name, scenario in (
         ("all", ISLANDING),
-        ("physics", ISLANDING.replace({"record": "physics"})),
         ("links", delayed),
     ):
         file = tmp_path / f"{name}.toml"
@@ -81,14 +64,6 @@ def test_a_record_has_about_the_size_that_was_told(tmp_path: Path) -> None:
         forecast = file_sizes(with_cases(scenario.spec, ["IV"]), scenario.feeder)
 
         assert forecast.record == pytest.approx(written, rel=0.35)
-
-
-def test_check_tells_the_size_of_a_long_run(tmp_path: Path) -> None:
-    """Four cases of ten minutes are some 400 MB; the experiment itself is too short to speak of."""
-    code, output = invoke("check", str(long_run(tmp_path)))
-    assert (code, "writes about 398 MB: history.csv 238 MB, run.mcap 160 MB" in output) == (0, True)
-
-    assert "writes" not in invoke("check", "islanding")[1]
 
 
 def test_a_disk_without_room_refuses_a_run_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

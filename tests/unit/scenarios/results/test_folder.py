@@ -2,6 +2,7 @@
 
 import errno
 import os
+import shutil
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import IO, Any
@@ -9,7 +10,20 @@ from typing import IO, Any
 import pytest
 
 from gridpeers.scenarios.results import run_files
-from gridpeers.scenarios.results.run_files import FolderError, new_folder, set_broken, set_status, write_whole
+from gridpeers.scenarios.results.run_files import (
+    FolderError,
+    TerminatedError,
+    broken_if_ended,
+    new_folder,
+    set_broken,
+    set_status,
+    write_whole,
+)
+from gridpeers.scenarios.run import run
+from gridpeers.scenarios.run_request import BrokenRunError, Request
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.wire.driver.ending import READER_GONE, OutputLostError
+from tests.scenario_files import written
 
 NOW = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
 
@@ -23,12 +37,6 @@ def test_runs_get_folders_by_time_and_latest_is_the_last(tmp_path: Path, monkeyp
     assert first == Path("runs/islanding/2026-01-02T03-04-05")
     assert second == Path("runs/islanding/2026-01-02T03-04-05-2")
     assert Path("runs/islanding/latest").resolve() == second.resolve()
-
-
-def test_an_empty_folder_is_taken(tmp_path: Path) -> None:
-    """A folder that the user has made is as good as a new one, and is told to hold a running run."""
-    assert new_folder(tmp_path, "islanding", NOW) == tmp_path
-    assert (tmp_path / "status.txt").read_text() == "running\n"
 
 
 def test_a_folder_with_something_in_it_is_refused_and_left_alone(tmp_path: Path) -> None:
@@ -53,15 +61,6 @@ def test_of_two_commands_at_once_one_gets_the_folder(tmp_path: Path, monkeypatch
     assert (tmp_path / "status.txt").read_text() == "complete\n"
 
 
-def test_a_link_to_nowhere_in_the_way_of_the_runs_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """No folder can be made below it, whatever its name."""
-    monkeypatch.chdir(tmp_path)
-    Path("runs").symlink_to("nowhere")
-
-    with pytest.raises(FolderError, match="cannot be made or written: File exists; give another folder by --out"):
-        new_folder(None, "islanding", NOW)
-
-
 def test_a_file_is_no_folder(tmp_path: Path) -> None:
     """A file in the place of the folder is told, also as a parent."""
     (tmp_path / "file").write_text("")
@@ -69,13 +68,6 @@ def test_a_file_is_no_folder(tmp_path: Path) -> None:
     for out in (tmp_path / "file", tmp_path / "file" / "below"):
         with pytest.raises(FolderError, match=r"this is a file|cannot be made or written: Not a directory"):
             new_folder(out, "islanding", NOW)
-
-
-def test_the_status_is_one_line(tmp_path: Path) -> None:
-    """A reason of several lines is told in one."""
-    set_status(tmp_path, "broken: inv3 died\nlast lines")
-
-    assert (tmp_path / "status.txt").read_text() == "broken: inv3 died last lines\n"
 
 
 def test_a_full_disk_leaves_no_part_of_a_file_and_the_status_still_tells(
@@ -110,3 +102,43 @@ def test_a_text_that_names_a_folder_of_any_bytes_is_utf_8(tmp_path: Path) -> Non
 
     assert (tmp_path / "report.txt").read_text(encoding="utf-8") == "Results: runs\\udcff/"
     assert (tmp_path / "status.txt").read_text(encoding="utf-8") == "broken: runs\\udcff is gone\n"
+
+
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [
+        (KeyboardInterrupt(), "interrupted from the keyboard"),
+        (TerminatedError(), "interrupted by SIGTERM"),
+        (ValueError("two\nlines"), "two lines"),
+        (ZeroDivisionError(), "ZeroDivisionError"),
+        (OSError(errno.ENOSPC, "No space left on device", "out/history.csv"), "out/history.csv: cannot be written: "),
+        (OutputLostError(READER_GONE, "nobody reads its output any more"), "nobody reads its output any more"),
+    ],
+)
+def test_the_status_says_why_a_run_ended_early(error: BaseException, told: str, tmp_path: Path) -> None:
+    """In one line; the error goes on to whoever has asked for the run."""
+    with pytest.raises(type(error)), broken_if_ended(tmp_path):
+        raise error
+
+    assert (tmp_path / "status.txt").read_text().startswith(f"broken: {told}")
+
+
+SHORT = '[time]\nend_s = 0.1\n[case.calm]\nsecondary = "all"\ngraph = "ring"\n'
+
+
+def test_a_run_whose_folder_is_removed_says_so(tmp_path: Path) -> None:
+    """It names what it could not write, and no log that is gone as well."""
+    scenario, feeder = load_scenario(written(tmp_path, SHORT))
+    folder = tmp_path / "lab"
+    folder.mkdir()
+
+    def remove(case: str, t: float, end: float) -> None:
+        if t > 0.0:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    request = Request(scenario=scenario, feeder=feeder, driver="inprocess", folder=folder)
+    with pytest.raises(BrokenRunError) as caught:
+        run(request, remove)
+
+    assert str(caught.value).endswith("cannot be written: No such file or directory")
+    assert str(folder) in str(caught.value)

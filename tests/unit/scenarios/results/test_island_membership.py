@@ -10,7 +10,6 @@ import pytest
 import gridpeers as gp
 from gridpeers.scenarios.results.event_windows import Window
 from gridpeers.scenarios.results.island_membership import island_intervals, islands_at_end
-from gridpeers.scenarios.results.plots.drawing import drawing_of
 from gridpeers.scenarios.results.plots.run_figures import figures_of, measured
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.wire.messages import PlantEvent
@@ -51,18 +50,6 @@ def test_a_switch_that_never_closes_leaves_two_islands_in_the_figures(waiting: g
     assert measured(drawing, "IV", "V_error")[-1] == max(errors[:6].mean(), errors[6:].mean())
 
 
-def test_cases_of_one_run_have_islands_of_their_own(waiting: gp.Result) -> None:
-    """Where a switch waits, or opens, in one case alone, the others have none, and no figure of any."""
-    scenario, feeder = load_scenario("islanding")
-    recorded = {"I": [], "IV": [_operated(1.0, "opened")]}
-    drawing = drawing_of(scenario, feeder, dict.fromkeys(recorded, waiting.record), recorded, [])
-
-    assert list(drawing.island_intervals) == ["IV"]
-    assert [name for name in figures_of(drawing) if name.startswith("microgrids")] == ["microgrids_IV"]
-    ours, whole = (measured(drawing, case, "V_error")[-1] for case in ("IV", "I"))
-    assert ours > whole
-
-
 def _operated(t: float, text: str) -> PlantEvent:
     closed = "closed" in text
     return PlantEvent(t=t, kind="switch", subject="97s-97", text=f"switch sw2_3 (97s-97) {text}", closed=closed)
@@ -83,12 +70,3 @@ def test_a_window_has_the_islands_of_its_end() -> None:
     ]
     found = [len(islands_at_end(intervals, Window(label="", start=1.0, end=end))) for end in (2.0, 2.5, 3.0, 3.1)]
     assert found == [2, 2, 1, 2]
-
-
-def test_an_inverter_that_only_people_started_is_in_its_island() -> None:
-    """The scenario lets no inverter 10 join; the columns of the history have it."""
-    scenario, feeder = load_scenario("islanding")
-    _, apart = island_intervals(scenario, feeder, ("inv1", "inv10", "inv7"), [_operated(1.0, "opened")])
-
-    assert "inv10" in {name for island in apart.islands.values() for name in island.inverters}
-    assert [island.fed for island in apart.islands.values()] == [True, False]

@@ -5,7 +5,6 @@ import json
 import tracemalloc
 from pathlib import Path
 
-import msgspec
 import pytest
 from msgspec.structs import replace
 
@@ -50,18 +49,6 @@ def test_every_row_of_links_csv_has_the_header_s_columns_whatever_befell_the_mes
     assert found == expected
     assert any("passed, bit" in row["fate"] for row in rows)
     assert any("copy, bit" in row["fate"] for row in rows)
-
-
-def test_an_account_that_does_not_close_is_a_warning_of_every_run() -> None:
-    """The report tells of a message that is neither delivered nor dropped nor on its way, checked or not."""
-    record = LinkRecord()
-    count = LinkCounts(sent=3, duplicated=0, delivered=1, dropped={"loss": 1}, corrupted=0, in_flight=0)
-    record.counts["inv1", "inv2"] = count
-
-    (warning,) = record.warnings
-    assert warning.startswith("inv1 -> inv2: the account does not close")
-    record.counts["inv1", "inv2"] = msgspec.structs.replace(count, in_flight=1)
-    assert not record.warnings
 
 
 @pytest.mark.parametrize("finished", [True, False])

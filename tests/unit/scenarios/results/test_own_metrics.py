@@ -1,10 +1,7 @@
 """Metrics and claims of one's own: their values, and what becomes of those that fail."""
 
-import inspect
-import re
 import sys
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import fields
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -14,10 +11,8 @@ from gridpeers.scenarios.results.claims import CLAIMS, Claim, judged
 from gridpeers.scenarios.results.event_windows import Window
 from gridpeers.scenarios.results.findings import Findings
 from gridpeers.scenarios.results.history import History, Nameplates, read_only
-from gridpeers.scenarios.results.metric import ALWAYS, METRICS, make_metrics, measured, name_of
-from gridpeers.scenarios.results.metrics import Steady
+from gridpeers.scenarios.results.metric import METRICS, make_metrics, measured, name_of
 from gridpeers.scenarios.results.window_metrics import WindowData
-from gridpeers.scenarios.sweep.sweep_table import unit_of
 from gridpeers.wire.plugins.plugin import Plugin, plugin_problems
 from gridpeers.wire.plugins.registry import PluginError
 
@@ -42,19 +37,6 @@ def window_data() -> WindowData:
     )
     event = Window(label="event1", start=1.0, end=2.0)
     return WindowData.cut(whole, event, case="IV", nameplates=nameplates, f_nom=60.0, T_c=0.02)
-
-
-class Unlisted(Mapping[str, float]):
-    """Values by name that cannot be listed."""
-
-    def __getitem__(self, name: str) -> float:
-        raise KeyError(name)
-
-    def __iter__(self) -> Iterator[str]:
-        raise RuntimeError("no list")
-
-    def __len__(self) -> int:
-        return 1
 
 
 def of(metric: Callable[[WindowData], Any]) -> tuple[dict[str, float | None], dict[str, str]]:
@@ -107,16 +89,6 @@ def test_gridpeers_own_metrics_are_entries_like_any_other() -> None:
     assert len(plugins) == 16
 
 
-def test_the_metrics_that_every_run_has_are_those_of_its_file() -> None:
-    """A metric that is added in one place alone, or whose name lacks its unit, is found here."""
-    ours = METRICS.names[:16]
-
-    assert set(ALWAYS) == {field.name for field in fields(Steady)} - {"reasons"} | {"messages_saved"}
-    for name in set(ours) - {"p"}:
-        unit = re.search(r"\((s|Hz|pu)\)", inspect.getdoc(METRICS.resolve(name)) or "")
-        assert unit_of(name) == (unit[1] if unit else "")
-
-
 def test_what_is_no_metric_and_no_claim_is_refused() -> None:
     """One line with what would be right; a name of ours is never taken over."""
     (wrong,) = plugin_problems(METRICS, Plugin(use="math:pi"))
@@ -148,23 +120,6 @@ def fails(found: Findings) -> bool:
 STEADY = Claim(name="steady", text="is steady", source="here", judge=lambda _: (True, "1"), measures=(), cases=("IV",))
 
 
-def says_no(found: Findings) -> str:
-    """Returns a text alone."""
-    return "no"
-
-
-def forgets(found: Findings) -> None:
-    """Returns nothing."""
-
-
-def test_a_claim_that_says_neither_yes_nor_no_does_not_hold() -> None:
-    """A text is true to Python, and would pass as a claim whatever it says."""
-    verdicts = judged(Findings(results={}), [Plugin(use=f"{__name__}:{name}") for name in ("says_no", "forgets")])
-
-    assert [one.status for one in verdicts] == ["FAIL", "FAIL"]
-    assert verdicts[0].found.startswith("cannot be judged: TypeError: returned 'no'; return True or False, or that and")
-
-
 def test_a_function_or_a_claim_object_is_judged_and_one_that_raises_fails_in_one_line() -> None:
     """The docstring's first line is the claim; a case that was not run is told."""
     plugins = [Plugin(use=f"{__name__}:{name}") for name in ("holds", "fails", "STEADY", "nothing")]
@@ -177,36 +132,6 @@ def test_a_function_or_a_claim_object_is_judged_and_one_that_raises_fails_in_one
     ]
     assert verdicts[1].found == "cannot be judged: KeyError: 'V'"
     assert 'has no "nothing"' in verdicts[3].found
-
-
-@pytest.mark.parametrize(
-    ("metric", "said"),
-    [
-        (lambda window: sys.exit(3), "failed: SystemExit: 3"),
-        (lambda window: window.f.fill(0.0), "failed: ValueError: assignment destination is read-only"),
-        (lambda window: 10**400, "returned 1000"),
-        (lambda window: {"a\nb": 1.0, 3: "x"}, "returned 'x'"),
-        (lambda window: Unlisted(), "failed: RuntimeError: no list"),
-    ],
-)
-def test_a_metric_ends_no_run_and_changes_nothing_of_it(metric: Callable[[Any], Any], said: str) -> None:
-    """It may leave Python, write to what it is given, or return what cannot be read."""
-    _, reasons = of(metric)
-
-    assert next(iter(reasons.values())).startswith(said)
-    assert all(name.isprintable() for name in reasons)
-
-
-def test_a_metric_that_changes_its_table_changes_no_others() -> None:
-    """Each has a table of its own."""
-
-    def spoils(window: WindowData) -> float:
-        window.history.iloc[:, :] = 0.0
-        return float(window.history["inv1"]["f"].min())
-
-    found = measured([("one", spoils), ("other", lambda window: window.history["inv1"]["f"].min())], window_data())
-
-    assert found.values == {"one": 0.0, "other": 59.5}
 
 
 def spoils(found: Findings) -> bool:

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from gridpeers.scenarios.results.history import History, history_of, read_history
+from gridpeers.scenarios.results.history import history_of, read_history
 from gridpeers.scenarios.results.record import PARTIAL, Recorder, RecordError
 from gridpeers.wire.messages import PlantEvent, Telemetry
 
@@ -35,18 +35,6 @@ def telemetry(rows: Rows, events: tuple[PlantEvent, ...] = (), *, reproducible: 
 def row(t: float, x: float = 0.1) -> tuple[float, ...]:
     """A row of one inverter."""
     return (t, 60.0, 388200.0, x, 2401.7771198288433, 388200.0, 2401.7771198288433)
-
-
-def test_the_header_names_every_column_with_its_unit(tmp_path: Path) -> None:
-    """A reader of history.csv needs no other page to know what a column is."""
-    with Recorder(tmp_path / "I") as recorder:
-        recorder(telemetry((row(0.0), row(0.5))))
-        recorder.finish(0.5, 0.5)
-
-    lines = (tmp_path / "I" / "history.csv").read_bytes().split(b"\n")
-    assert lines[0] == b"t_s,inv1_f_Hz,inv1_P_W,inv1_Q_var,inv1_V_V,inv1_P_set_W,inv1_V_set_V"
-    assert lines[1] == b"0.0,60.0,388200.0,0.1,2401.7771198288433,388200.0,2401.7771198288433"
-    assert lines[-1] == b""
 
 
 def test_the_hash_is_that_of_the_bytes_however_they_came(tmp_path: Path) -> None:
@@ -129,39 +117,3 @@ def test_a_recorder_keeps_no_rows(tmp_path: Path) -> None:
 
     assert grown < 50_000
     assert (len(history.t), history.V_set[-1, -1]) == (20_000, 59.0)
-
-
-def test_rows_come_in_the_order_of_time(tmp_path: Path) -> None:
-    """A row that comes twice is an error, not a row."""
-    with Recorder(tmp_path / "I") as recorder:
-        recorder(telemetry((row(0.5),)))
-        with pytest.raises(RecordError, match=r"a row of 0.5 s came after that of 0.5 s"):
-            recorder(telemetry((row(0.5),)))
-
-
-def test_one_unscripted_thing_makes_a_case_irreproducible_for_good(tmp_path: Path) -> None:
-    """Later telemetry does not make it reproducible again."""
-    with Recorder(tmp_path / "I") as recorder:
-        recorder(telemetry((row(0.0),), reproducible=False))
-        recorder(telemetry((row(0.5),)))
-        recorded = recorder.finish(0.5, 0.5)
-
-    assert not recorded.reproducible
-
-
-def test_a_file_that_is_no_history_is_told(tmp_path: Path) -> None:
-    """Reading checks the header, so that columns are never mixed up."""
-    (tmp_path / "history.csv").write_text("t_s,inv1_P_W,inv1_f_Hz\n0.0,1.0,2.0\n")
-
-    with pytest.raises(ValueError, match=r"history.csv: the first line is not the header of a history"):
-        read_history(tmp_path / "history.csv")
-
-
-def test_columns_go_to_the_quantity_they_name() -> None:
-    """Of two inverters' rows each number comes out where it was put in."""
-    rows = [(0.5, *(float(i) for i in range(12)))]
-
-    history = History.of(("inv1", "inv2"), rows)
-
-    assert (history.t[0], history.f[0].tolist(), history.V_set[0].tolist()) == (0.5, [0.0, 6.0], [5.0, 11.0])
-    assert (history.P[0].tolist(), history.Q[0].tolist(), history.V[0].tolist()) == ([1, 7], [2, 8], [3, 9])

@@ -66,14 +66,6 @@ def test_a_number_that_is_off_is_marked_and_fails() -> None:
     assert "FAIL" in text
 
 
-def test_without_a_paper_there_is_nothing_beside() -> None:
-    """A scenario of one's own has our numbers only, and no verdicts."""
-    text = plain(report(judged=False))
-
-    assert "|" not in text
-    assert "PASS" not in text
-
-
 @pytest.mark.parametrize("coloured", [True, False])
 def test_colours_are_for_terminals_only(coloured: bool) -> None:
     """In a pipe no control character is printed; the words are the same."""
@@ -115,21 +107,6 @@ def test_what_several_islands_share_together_is_not_told() -> None:
     assert [row[3:] for row in rows if row[:1] == ["island"]] == [["0.041", "0.019", "0.37", "s"], ["0.0900", "0.135"]]
     assert text.count("-: where there are several islands, each shares for itself") == 2
     assert "-:" not in plain(report())
-
-
-def test_an_island_without_load_has_no_time_to_share_it() -> None:
-    """Nothing is shared, so it is never shared equally: "never" would be a verdict on the control."""
-    idle = {"MPSI": "nothing shared: the total is below 0.1% of the ratings"}
-    part = Steady(f_error_Hz=0.0, MPSI=12719.3, V_error=0.0, MQSI=0.1, t_restore_s=None, p={}, reasons=idle)
-    text = plain(
-        RunReport(
-            scenario="own", titles={}, findings=Findings(results={"IV": {"e": part}}), verdicts=(), notes=(), folder=""
-        )
-    )
-
-    assert "nothing shared            -\n" in text
-    assert "MPSI nothing shared: the total is below 0.1% of the ratings\n" in text
-    assert "12719" not in text
 
 
 def test_metrics_of_several_islands_together_are_null() -> None:
