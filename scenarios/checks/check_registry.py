@@ -68,12 +68,6 @@ def chosen_checks(entries: Iterable[str | Mapping[str, Any]]) -> dict[str, Plugi
     """Return the checks of a run by their names in the verdict: those of every run, changed by a scenario's entries.
 
     An entry takes the place of the check that has its name; `off = true` takes that one out.
-
-    Examples
-    --------
-    >>> found = chosen_checks([{"use": "rating", "P_limit_pu": 1.2}, {"use": "steady", "off": True}, "mine:Calm"])
-    >>> found["rating"].parameters, "steady" in found, found["Calm"].use
-    ((('P_limit_pu', 1.2),), False, 'mine:Calm')
     """
     found = {name: Plugin(use=name) for name in ALWAYS}
     for entry in entries:

@@ -41,14 +41,7 @@ class Check:
 
 
 class Violation(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """One violation of a limit.
-
-    Examples
-    --------
-    >>> found = dict(text="abs(f - 60), event1", t=3.5, agent="inv1", value=0.1364, unit="Hz", limit=0.01)
-    >>> Violation(**found).sentence
-    'abs(f - 60), event1: inv1 0.136 Hz at t = 3.50 s (limit 0.01 Hz)'
-    """
+    """One violation of a limit."""
 
     text: str
     t: float | None = None

@@ -90,13 +90,7 @@ class Rating(Check):
 
 
 def longest_stretch(holds: Flags) -> tuple[int, int]:
-    """Return first and last row of the longest stretch in which something holds; (0, -1) if it never does.
-
-    Examples
-    --------
-    >>> longest_stretch(np.array([True, False, True, True, False])), longest_stretch(np.array([False]))
-    ((2, 3), (0, -1))
-    """
+    """Return first and last row of the longest stretch in which something holds; (0, -1) if it never does."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], holds, [False]]).astype(int)))
     starts, ends = edges[::2], edges[1::2] - 1
     if not starts.size:

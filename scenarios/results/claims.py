@@ -147,7 +147,8 @@ def judge(findings: Findings, claims: Sequence[Claim]) -> tuple[Verdict, ...]:
             status, found = _judgement(claim, findings)
         except ANYTHING as error:  # a claim is a user's code
             known = {*findings.results, *(event for of in findings.results.values() for event in of)}
-            there = f"; cases and events are {', '.join(sorted(known))}" if isinstance(error, KeyError) and known else ""
+            lacks = isinstance(error, KeyError) and known
+            there = f"; cases and events are {', '.join(sorted(known))}" if lacks else ""
             status, found = "FAIL", f"cannot be judged: {named(error)}{there}"
         verdicts.append(Verdict(claim=claim, status=status, found=found))
     return tuple(verdicts)

@@ -91,16 +91,7 @@ def island_intervals(
 ) -> tuple[IslandInterval, ...]:
     """Return the islands of a run over time, in the order of time and without gaps.
 
-    Checks, metrics and figures all take the islands from here. Switches alone decide, as they were recorded: one that
-    waits for synchronism has not closed yet. See `switch_events` for a plant that records no switch.
-
-    Examples
-    --------
-    >>> from gridpeers.scenarios.schema import load_scenario
-    >>> scenario, feeder = load_scenario("islanding")
-    >>> opened = PlantEvent(t=2.5, kind="switch", subject="67s-67", text="switch sw1_2 (67s-67) opened", closed=False)
-    >>> [(it.start, list(it.islands)) for it in island_intervals(scenario, feeder, ["inv1", "inv4"], [opened])]
-    [(-inf, ['inv1']), (2.5, ['inv1', 'inv4'])]
+    Switches alone decide, as they were recorded: one that waits for synchronism has not closed yet.
     """
     closed = closed_switches(feeder, ())
     states = [(-inf, closed)]
@@ -141,10 +132,7 @@ def part_of(history: History, nameplates: Nameplates, names: tuple[str, ...]) ->
 
 
 def taken_part(scenario: ScenarioModel, feeder: Feeder, history: History) -> History:
-    """Return a history without the spare inverters that nobody ever started.
-
-    In a live run all spare inverters have columns; in others those have that the scenario lets join.
-    """
+    """Return the history of a live run without the spare inverters that nobody ever started."""
     own, present = {row.name for row in inverters_of(scenario, feeder)}, history.present
     names = tuple(name for i, name in enumerate(history.inverters) if name in own or bool(present[:, i].any()))
     return part_of(history, Nameplates.of_columns(history.inverters, feeder), names)[0]

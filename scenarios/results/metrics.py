@@ -170,13 +170,7 @@ def _mean(x: Floats) -> float:
 
 
 def for_good(t: Floats, holds: Flags, start: float) -> float | None:
-    """Return the time (s) from `start` to the first row from which on all rows hold; None when the last one does not.
-
-    Examples
-    --------
-    >>> for_good(np.array([1.0, 1.1, 1.2]), np.array([True, False, True]), 1.0)
-    0.2
-    """
+    """Return the time (s) from `start` to the first row from which on all rows hold; None if the last does not."""
     failing = np.flatnonzero(~holds)
     first = 0 if failing.size == 0 else int(failing[-1]) + 1
     return None if first >= t.size else round(float(t[first]) - start, 9)

@@ -68,13 +68,7 @@ def header(inverters: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def csv_line(row: Row) -> bytes:
-    r"""Return a row of history.csv: of each number the shortest text that reads back to the same bits.
-
-    Examples
-    --------
-    >>> csv_line((0.1, -0.0, 2.5e-07, 1e22, float("nan")))
-    b'0.1,-0.0,2.5e-07,1e+22,nan\n'
-    """
+    """Return a row of history.csv: of each number the shortest text that reads back to the same bits."""
     return (",".join(map(repr, row)) + "\n").encode("ascii")
 
 
@@ -142,7 +136,6 @@ class Recorder:
 
     @property
     def record_failure(self) -> str:
-        """Sentence on why run.mcap ends early, or is not there; empty if it is whole."""
         return self._not_recorded if self._recording is None else self._recording.failure
 
     def _take(self, telemetry: Telemetry) -> None:

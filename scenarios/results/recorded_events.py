@@ -40,7 +40,7 @@ def law_failures(events: Iterable[PlantEvent]) -> tuple[LawFailure, ...]:
 
 
 def ended_by_a_law(on_law_failure: OnLawFailure, events: Iterable[PlantEvent]) -> bool:
-    """Return whether a failed law has ended a run that broke; with "droop" something else has."""
+    """Return whether a failed law has ended a run that broke."""
     return on_law_failure == "stop" and any(event.kind == "law" for event in events)
 
 
@@ -56,18 +56,7 @@ _RETURNS = re.compile(f"(?:black start by )?{_NAMES}(?:$| back in service)")
 
 
 def tripped_by(event: PlantEvent) -> tuple[str, ...]:
-    """Return the inverters that trip by an event, without a substation that trips with them.
-
-    None do by an event of another kind, or by one that tells of returns.
-
-    Examples
-    --------
-    >>> texts = ("inv1, inv2 tripped, as the island", "inv1: tripped 3 times, off until", "inv1 back in service, at no")
-    >>> [tripped_by(PlantEvent(t=1.0, kind="trip", subject="inv1", text=text)) for text in texts]
-    [('inv1', 'inv2'), (), ()]
-    >>> tripped_by(PlantEvent(t=1.0, kind="trip", subject="inv1", text="inv1, substation tripped, as the island"))
-    ('inv1',)
-    """
+    """Return the inverters that trip by an event, without a substation that trips with them; else none."""
     found = _TRIPS.match(event.text) if event.kind == "trip" else None
     return tuple(name for name in found["names"].split(", ") if name != SUBSTATION) if found else ()
 

@@ -35,16 +35,10 @@ class Grid(NamedTuple):
 
 
 def folded(grid: Grid, width: int) -> Iterator[Grid]:
-    r"""Yield a table in parts that are at most so wide (characters), one below the other; no event is torn apart.
+    """Yield a table in parts that are at most so wide (characters), one below the other; no event is torn apart.
 
     Each part begins with the first column and has the rows that say something in it. An event that is wider has a part
     of its own.
-
-    Examples
-    --------
-    >>> grid = Grid("", ("case", "a\nf", "a\nMPSI", "b\nf"), (("I", "0.1", "0.2", "0.3"),))
-    >>> [part.header for part in folded(grid, 21)]
-    [('case', 'a\nf', 'a\nMPSI'), ('case', 'b\nf')]
     """
     widths = [
         GAP + max(len(line) for cell in column for line in cell.split("\n"))

@@ -27,13 +27,7 @@ def sharing_index(x: Floats, s: Floats, m: Floats, present: Flags | None = None)
 
     .. math:: \frac{1}{N} \sum_i \left| \frac{m_i x_i / s_i - \eta}{\eta} \right|
 
-    N counts the inverters that are present in the row, as the sums do. It is not a number where nothing is shared
-    (eta = 0).
-
-    Examples
-    --------
-    >>> sharing_index(np.array([[300.0, 700.0], [400.0, 600.0]]), np.array([600.0, 1400.0]), np.array([0.01, 0.01]))
-    array([0.        , 0.23809524])
+    N counts the inverters that are present in the row, as the sums do. It is not a number where eta = 0.
     """
     everybody = np.ones(x.shape, bool) if present is None else present
     equal = eta(x, s, m, everybody)[:, None]

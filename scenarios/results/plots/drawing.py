@@ -24,7 +24,7 @@ class Mark(NamedTuple):
     """Label of its window; "" for none."""
     t: float
     what: str = ""
-    """The event in a few words: "13-152 opens"."""
+    """The event in a few words."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,15 +99,7 @@ def drawing_of(
 
 
 def happening(event: Event, scenario: ScenarioModel) -> str:
-    """Return an event in a few words.
-
-    Examples
-    --------
-    >>> from gridpeers.scenarios.schema import load_scenario
-    >>> scenario, _ = load_scenario("microgrid-switching")
-    >>> [happening(event, scenario) for event in scenario.events]
-    ['13-152 opens', 'sw1_2, sw2_3 open']
-    """
+    """Return an event in a few words, as "13-152 opens"."""
     done = (
         (event.open, ", ".join(event.open), "open"),
         (event.close, ", ".join(event.close), "close"),

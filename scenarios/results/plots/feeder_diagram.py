@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import cycle
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -23,7 +23,7 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Of the microgrids, in the order of the inverters, then of other zones (Okabe and Ito's palette)."""
 
 BESIDE = "#8a8a8a"
-"""The zone of the substation, and buses of no zone."""
+"""Colour of the zone of the substation, and of buses of no zone."""
 
 WIDTH = {1: 0.7, 2: 1.1, 3: 2.0}  # Width of a branch (pt) by its number of phases
 HALO: Any = [withStroke(linewidth=2.0, foreground="white")]  # Around labels, so that they can be read on branches
@@ -112,46 +112,26 @@ def _draw_switch(switch: Switch, at: Places, axes: Axes) -> None:
     axes.plot(*_middle(switch, at), marker="s", ms=5, mfc=face, mec="black", zorder=3)
 
 
-class _Marked(NamedTuple):
-    text: str
-    size: float
-    place: tuple[float, float]
-    """Of its mark (drawing units)."""
-    gap: float
-    """From the middle of the mark (pt)."""
-    bold: bool = False
-    optional: bool = False
-    """Whether it is left out where it has no room."""
-
-
 def _draw_labels(feeder: Feeder, at: Places, axes: Axes) -> None:
-    """Write the names of substation, inverters and switches beside their marks, where they cover least.
-
-    Then those of buses, where they cover nothing.
-    """
-    marked: list[_Marked] = []
+    """Write the names of marks where they cover least, then those of buses where they cover nothing."""
+    marked: list[Label] = []
     if feeder.source is not None:
-        marked.append(_Marked("substation", 10.0, at[feeder.source.bus], 9.0))
+        marked.append(Label("substation", 10.0, at[feeder.source.bus], 9.0))
     inverters = (*feeder.inverters, *feeder.spares)
     if len(feeder.inverters) <= MOST_LABELS:
-        marked += [
-            _Marked(f"{row.name}{' (spare)' * row.spare}", 10.0, at[row.bus], 8.0, bold=True) for row in inverters
-        ]
+        marked += [Label(f"{row.name}{' (spare)' * row.spare}", 10.0, at[row.bus], 8.0, bold=True) for row in inverters]
     loads: list[str] = []
     if len(feeder.buses) <= MANY:
-        marked += [_Marked(one.alias or one.name, 7.5, _middle(one, at), 6.0) for one in feeder.switches]
+        marked += [Label(one.alias or one.name, 7.5, _middle(one, at), 6.0) for one in feeder.switches]
         loads = list(feeder.load_by_bus())
         taken = {row.bus for row in inverters} | ({feeder.source.bus} if feeder.source else set())
         names = dict.fromkeys((*loads, *(bus.name for bus in feeder.buses)))
-        marked += [_Marked(bus, 5.5, at[bus], 4.0, optional=True) for bus in names if bus not in taken]
+        marked += [Label(bus, 5.5, at[bus], 4.0, optional=True) for bus in names if bus not in taken]
     axes.figure.draw_without_rendering()  # type: ignore[union-attr]  # lays the figure out; subfigures are not used
     ends = [(a, b) for a, b, _ in feeder.branches()] + [(one.from_bus, one.to_bus) for one in feeder.switches]
     lines = _on_paper(axes, [at[bus] for pair in ends for bus in pair]).reshape(-1, 4)
     places_on_paper = _on_paper(axes, [one.place for one in marked])
-    labels = [
-        Label(one.text, one.size, (float(x), float(y)), one.gap, one.optional)
-        for one, (x, y) in zip(marked, places_on_paper, strict=True)
-    ]
+    labels = [one._replace(place=(x, y)) for one, (x, y) in zip(marked, places_on_paper.tolist(), strict=True)]
     sure = [not one.optional for one in marked]
     marks = np.vstack([_on_paper(axes, [at[row.bus] for row in inverters]), places_on_paper[sure]])
     widths = [5.0] * len(inverters) + [0.6 * one.gap for one in marked if not one.optional]

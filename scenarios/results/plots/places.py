@@ -29,7 +29,7 @@ def places(feeder: Feeder) -> dict[str, tuple[float, float]]:
 
 
 def has_coordinates(feeder: Feeder) -> bool:
-    """Whether a feeder is drawn on its coordinates: more than a quarter of its buses stand apart."""
+    """Return whether a feeder is drawn on its coordinates: more than a quarter of its buses stand apart."""
     return len({(bus.x, bus.y) for bus in feeder.buses}) > len(feeder.buses) // 4
 
 
@@ -60,7 +60,10 @@ def _tree(feeder: Feeder) -> dict[str, tuple[float, float]]:
                     depth[other] = depth[bus] + 1
                     children[bus].append(other)
                     reached.append(other)
-        order += _depth_first(root, children)
+        waiting = [root]
+        while waiting:
+            order.append(waiting.pop())
+            waiting += reversed(children[order[-1]])
     height: dict[str, float] = {}
     leaves = 0
     for bus in reversed(order):
@@ -69,15 +72,6 @@ def _tree(feeder: Feeder) -> dict[str, tuple[float, float]]:
             leaves += 1
         height[bus] = float(np.mean(below)) if below else float(leaves)
     return {bus: (float(depth[bus]), height[bus]) for bus in order}
-
-
-def _depth_first(root: str, children: Mapping[str, list[str]]) -> list[str]:
-    order, waiting = [], [root]
-    while waiting:
-        bus = waiting.pop()
-        order.append(bus)
-        waiting += reversed(children[bus])
-    return order
 
 
 Points = NDArray[np.float64]
@@ -98,11 +92,12 @@ class Label(NamedTuple):
     size: float
     """Of its type (pt)."""
     place: tuple[float, float]
-    """Of the mark (pt)."""
+    """Of the mark (pt, or drawing units)."""
     gap: float
-    """From the middle of the mark to the label (pt)."""
+    """From the middle of its mark (pt)."""
     optional: bool = False
-    """Whether it is left out where it would cover anything."""
+    """True if it is left out where it would cover anything."""
+    bold: bool = False
 
 
 def label_sides(labels: Sequence[Label], lines: Points, marks: Points) -> list[tuple[int, int] | None]:
@@ -115,17 +110,12 @@ def label_sides(labels: Sequence[Label], lines: Points, marks: Points) -> list[t
     boxes = np.column_stack([marks[:, :2] - marks[:, 2:], marks[:, :2] + marks[:, 2:]])
     chosen: list[tuple[int, int] | None] = []
     for label in labels:
-        covered = []
-        for side in SIDES:
-            box = _box(label, side)
-            covered.append(_length_within(box, lines) + WORD * _common(box, words) + MARK * _common(box, boxes))
+        ways = [_box(label, side) for side in SIDES]
+        covered = [_length_within(box, lines) + WORD * _common(box, words) + MARK * _common(box, boxes) for box in ways]
         best = int(np.argmin(np.array(covered) + PREFERENCE * np.arange(len(SIDES))))
-        if label.optional and covered[best] > 0.0:
-            chosen.append(None)
-            continue
-        side = SIDES[best]
-        chosen.append(side)
-        words = np.vstack([words, _box(label, side)])
+        fits = not label.optional or covered[best] == 0.0
+        chosen.append(SIDES[best] if fits else None)
+        words = np.vstack([words, ways[best]]) if fits else words
     return chosen
 
 

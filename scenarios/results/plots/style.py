@@ -57,13 +57,7 @@ PAGE: Any = {
 
 
 def stacked_styles(count: int) -> list[Style]:
-    """Return styles of curves that are drawn one on top of the other: where they coincide, all of them are seen.
-
-    Examples
-    --------
-    >>> [width for _, _, width in stacked_styles(4)]
-    [3.0, 2.5, 2.0, 1.5]
-    """
+    """Return styles of curves that are drawn one on top of the other: where they coincide, all of them are seen."""
     step = min(0.5, 1.8 / max(count - 1, 1))
     widths = [1.5 + step * above for above in reversed(range(count))] if count > 1 else [2.0] * count
     return [(*STYLES[number % len(STYLES)], width) for number, width in enumerate(widths)]
@@ -188,14 +182,7 @@ class _Option(NamedTuple):
 
 
 def place_texts(marks: Sequence[Mark], inches_per_s: float) -> list[EventText]:
-    r"""Place texts so that none covers another: beside its line where need be, shorter, and at last left out.
-
-    Examples
-    --------
-    >>> found = place_texts([Mark("event1", 1.0, "13-152 opens"), Mark("leave", 1.1)], inches_per_s=1.0)
-    >>> [(text, side) for text, _, side in found]
-    [('event1\n13-152 opens', 'right'), ('leave', 'left')]
-    """
+    """Place texts so that none covers another: beside its line where need be, shorter, and at last left out."""
     options = [_options(mark, inches_per_s) for mark in sorted(marks, key=lambda mark: mark.t)]
     first = [*accumulate((min(one.start for one in each) for each in reversed(options)), min)][::-1]
     best: dict[float, tuple[float, tuple[EventText, ...]]] = {-inf: (0.0, ())}
