@@ -20,9 +20,9 @@ from gridpeers.plant.tables.feeder_columns import PART_CURRENT, power_of
 from gridpeers.plant.tables.read import FeederError
 from gridpeers.wire.wording import first_of
 
-BEYOND = 100.0
-"""Voltage (pu) that only a singular matrix gives."""
-
+BEYOND = 100.0  # voltage (pu) that only a singular matrix gives
+MATCH = 1e-6  # largest difference (pu of nominal voltage) of voltages that count as equal
+TOLERANCE = 1e-11  # largest change of any voltage (pu) in the last iteration of our power flow
 SHOWN_NAMES, SHOWN_BUSES = 5, 8
 """So many buses of a section, or loads, a sentence names; so many buses a note of other names."""
 
@@ -243,6 +243,23 @@ def _named(feeder: Feeder, section: Collection[Node], name_node: Callable[[str],
     buses = list(dict.fromkeys(bus for bus, _ in nodes))
     first = ", ".join(f"{bus}.{name_node(letter)}" for bus, letter in nodes if bus == buses[0])
     return f"bus{'es' if len(buses) > 1 else ''} {first_of(buses, SHOWN_NAMES)} (first {first})"
+
+
+def difference(feeder: Feeder, theirs: Mapping[Node, complex]) -> tuple[float, Node]:
+    """Return the largest difference (pu) between our voltages and another program's, `theirs` (V), and its node.
+
+    ArithmeticError if our power flow does not converge.
+    """
+    from gridpeers.plant.network import Network, solve_power_flow
+
+    network = Network(feeder)
+    V = solve_power_flow(network, network.closed0, tolerance=TOLERANCE).V
+    at = [k for k, node in enumerate(network.nodes) if node in theirs]
+    given = np.array([theirs[network.nodes[k]] for k in at])
+    # where the given voltage is far above the nominal one, the nominal one is not what the script means
+    off = np.abs(V[at] - given) / np.maximum(network.V_nom[at], np.abs(given))
+    worst = int(np.argmax(off))
+    return float(off[worst]), network.nodes[at[worst]]
 
 
 def with_plain_names(feeder: Feeder, added: Mapping[str, str]) -> Feeder:

@@ -7,7 +7,6 @@ closed loop each has its own agents.
 
 from __future__ import annotations
 
-import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from contextlib import closing
@@ -92,7 +91,7 @@ def _started(ours: Plant, feeder: Feeder, run: ComparedRun, config: PlantConfig)
         if run.single_phase:
             write_tables(feeder, Path(folder))
             settings = replace(settings, feeder=folder)
-        return GridlabdPlant(ours, settings, config.T_c, config.end, sys.executable)
+        return GridlabdPlant(ours, settings, config.T_c, config.end)
 
 
 class _PlantRun(NamedTuple):

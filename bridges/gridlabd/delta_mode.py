@@ -14,7 +14,7 @@ Requests are JSON objects, one a line on standard input, answered one a line on 
 
 A reading is f (Hz), P (W), Q (var), mean line-to-neutral V (V), the set-points as GridLAB-D holds them: `Pset` (pu)
 of a GFM or `Pref` (W) of a GFL, and `Vset` (pu); then the lowest and the highest phase voltage (V). What goes wrong is
-answered as {"error": text}, a package gridlabd that cannot be imported as {"not_importable": text, "installed": bool}.
+answered as {"error": text}, a package gridlabd that cannot be imported as {"not_importable": text}.
 The process ends with standard input, and with its parent, whose id is its argument.
 """
 
@@ -32,14 +32,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-STAY = 0
-"""Answer of a module that wants delta mode now; any other answer is the time (s) until it does."""
-
-SWITCH_STATES = {"open": 0, "close": 1}
-"""Values of a switch's property `status`."""
-
-PR_SET_PDEATHSIG = 1
-"""Request of Linux's prctl: a signal to this process when its parent has ended."""
+STAY = 0  # answer of a module that wants delta mode now; any other answer is the time (s) until it does
+SWITCH_STATES = {"open": 0, "close": 1}  # values of a switch's property `status`
+PR_SET_PDEATHSIG = 1  # request of Linux's prctl: a signal to this process when its parent has ended
 
 Reading = tuple[float, float, float, float, float, float, float, float]
 
@@ -129,11 +124,7 @@ class GridlabdInverter:
 
 
 class NotImportableError(Exception):
-    """The package gridlabd is missing, or damaged; `installed` tells which."""
-
-    def __init__(self, reason: Exception) -> None:
-        super().__init__(f"{type(reason).__name__}: {reason}")
-        self.installed = not (isinstance(reason, ModuleNotFoundError) and reason.name == "gridlabd")
+    """The package gridlabd is missing, or damaged."""
 
 
 def gridlabd_package() -> ModuleType:
@@ -143,7 +134,7 @@ def gridlabd_package() -> ModuleType:
         _ = package.DirectGridLabD, package.GLDErrorCode
         return package
     except Exception as error:  # a damaged package may raise anything
-        raise NotImportableError(error) from error
+        raise NotImportableError(f"{type(error).__name__}: {error}") from error
 
 
 class Simulation:
@@ -242,7 +233,7 @@ def main() -> None:
         for answer in answers(json.loads(line) for line in sys.stdin):
             print(json.dumps(answer), file=out, flush=True)
     except NotImportableError as error:
-        print(json.dumps({"not_importable": str(error), "installed": error.installed}), file=out, flush=True)
+        print(json.dumps({"not_importable": str(error)}), file=out, flush=True)
     except Exception as error:
         text = str(error) if isinstance(error, RuntimeError) else f"{type(error).__name__}: {error}"
         print(json.dumps({"error": text}), file=out, flush=True)

@@ -45,6 +45,20 @@ def inverter_blocks(
     return blocks
 
 
+GFM_KEYS = (
+    *(("Rfilter", "R_f"), ("Xfilter", "X_f"), ("Tp", "T_p"), ("Tq", "T_q"), ("Tv", "T_v"), ("Imax", "I_max")),
+    *(("Pmax", "P_max"), ("Pmin", "P_min"), ("kppmax", "k_pp"), ("kipmax", "k_ip"), ("w_lim", "w_lim")),
+    *(("Qmax", "Q_max"), ("Qmin", "Q_min"), ("kpqmax", "k_pq"), ("kiqmax", "k_iq"), ("kpv", "k_pv"), ("kiv", "k_iv")),
+    *(("E_min", "E_min"), ("E_max", "E_max")),
+)  # properties of GridLAB-D, and our parameters
+GFL_KEYS = (
+    *(("kpPLL", "k_pPLL"), ("kiPLL", "k_iPLL"), ("F_current", "F_current"), ("Tif", "T_if"), ("Tff", "T_ff")),
+    *(("Tpf", "T_pf"), ("Tvf", "T_vf"), ("Tqf", "T_qf")),
+    *(("db_UF", "db_UF"), ("db_OF", "db_OF"), ("db_UV", "db_UV"), ("db_OV", "db_OV")),
+)
+GFL_IMPEDANCES = (("Rfilter", "R_f"), ("Xfilter", "X_f"), ("kpc", "k_pc"), ("kic", "k_ic"))
+
+
 def _gfm(row: TableRow, gfm: GfmParameters) -> dict[str, str | float]:
     return {
         "control_mode": "GRID_FORMING",
@@ -52,25 +66,7 @@ def _gfm(row: TableRow, gfm: GfmParameters) -> dict[str, str | float]:
         "rated_power": float(row["P_rated_kW"]) * 1e3,
         "mp": float(row["m_p_pu"]) * 2 * pi * F_NOM,
         "mq": float(row["m_q_pu"]),
-        "Rfilter": gfm.R_f,
-        "Xfilter": gfm.X_f,
-        "Tp": gfm.T_p,
-        "Tq": gfm.T_q,
-        "Tv": gfm.T_v,
-        "Pmax": gfm.P_max,
-        "Pmin": gfm.P_min,
-        "kppmax": gfm.k_pp,
-        "kipmax": gfm.k_ip,
-        "w_lim": gfm.w_lim,
-        "Qmax": gfm.Q_max,
-        "Qmin": gfm.Q_min,
-        "kpqmax": gfm.k_pq,
-        "kiqmax": gfm.k_iq,
-        "kpv": gfm.k_pv,
-        "kiv": gfm.k_iv,
-        "E_min": gfm.E_min,
-        "E_max": gfm.E_max,
-        "Imax": gfm.I_max,
+        **{key: getattr(gfm, own) for key, own in GFM_KEYS},
     }
 
 
@@ -80,43 +76,24 @@ def _gfl(row: TableRow, gfl: GflParameters) -> dict[str, str | float]:
     There this limit is 1 pu of `rated_power`. With ours at S_max pu of the rating, `rated_power` is S_max ratings and
     everything per unit is converted to that base.
     """
-    base = gfl.S_max
-    voltage_source = gfl.model == "voltage_source"
+    base, i_max = gfl.S_max, gfl.i_max / gfl.S_max
     return {
-        "control_mode": "GRID_FOLLOWING" if voltage_source else "GFL_CURRENT_SOURCE",
+        "control_mode": "GRID_FOLLOWING" if gfl.model == "voltage_source" else "GFL_CURRENT_SOURCE",
         "grid_following_mode": gfl.mode.upper(),
         "rated_power": float(row["P_rated_kW"]) * 1e3 * base,
         "Rp": float(row["m_p_pu"]) * base,
         "Rq": float(row["m_q_pu"]) * base,
-        "Rfilter": gfl.R_f * base,
-        "Xfilter": gfl.X_f * base,
-        "kpPLL": gfl.k_pPLL,
-        "kiPLL": gfl.k_iPLL,
-        "kpc": gfl.k_pc * base,
-        "kic": gfl.k_ic * base,
-        "F_current": gfl.F_current,
-        "Tif": gfl.T_if,
+        **{key: getattr(gfl, own) * base for key, own in GFL_IMPEDANCES},
+        **{key: getattr(gfl, own) for key, own in GFL_KEYS},
         "frequency_watt": str(gfl.frequency_watt).lower(),
         "volt_var": str(gfl.volt_var).lower(),
-        "Tff": gfl.T_ff,
-        "Tpf": gfl.T_pf,
-        "Tvf": gfl.T_vf,
-        "Tqf": gfl.T_qf,
-        "db_UF": gfl.db_UF,
-        "db_OF": gfl.db_OF,
-        "db_UV": gfl.db_UV,
-        "db_OV": gfl.db_OV,
         "Pref_max": gfl.P_max / base,
         "Pref_min": gfl.P_min / base,
-        "igd_ref_max": gfl.i_max / base,
-        "igd_ref_min": -gfl.i_max / base,
-        "igq_ref_max": gfl.i_max / base,
-        "igq_ref_min": -gfl.i_max / base,
+        **{f"ig{axis}_ref_{end}": sign * i_max for axis in "dq" for end, sign in (("max", 1.0), ("min", -1.0))},
     }
 
 
-START = "2000-01-01 00:00:00"
-"""GridLAB-D's clock at the start; delta mode begins one second later."""
+START = "2000-01-01 00:00:00"  # GridLAB-D's clock at the start; delta mode begins one second later
 
 
 def write_glm(

@@ -17,11 +17,8 @@ from gridpeers.plant.equipment.imported_equipment import LinearElement, LoadPart
 Matrix = np.ndarray[Any, np.dtype[np.complex128]]
 
 LETTERS = "ABC"
-SPLIT = 0x80
-"""Bit of the solver's `phases`: split-phase."""
-
-STIFF = 1e7
-"""Admittance (S) between the substation's unbalanced voltages and the balanced ones that they are made of."""
+SPLIT = 0x80  # bit of the solver's `phases`: split-phase
+STIFF = 1e7  # admittance (S) between the substation's unbalanced voltages and the balanced ones that they are made of
 
 
 def letters_of(phases: int) -> str:
@@ -54,8 +51,7 @@ class GlmElements:
         self.rows: list[LinearElement] = []
         self.switches: list[Switch] = []
         self.used: set[str] = set()
-        self.added: dict[str, str] = {}
-        """Buses that are not in the model, and the bus before each."""
+        self.added: dict[str, str] = {}  # buses that are not in the model, and the bus before each
         self._phases: dict[str, str] = {}  # of added buses
 
     def add(self, branch: dict[str, Any]) -> None:
@@ -161,9 +157,7 @@ def _diagonal(branch: dict[str, Any], letters: str) -> Matrix:
 ANGLES = {"A": 0.0, "B": -2 * pi / 3, "C": 2 * pi / 3, "AB": pi / 6, "BC": -pi / 2, "CA": 5 * pi / 6}
 """Nominal angle (rad) of the voltage across a branch, to which GridLAB-D refers constant currents."""
 
-LEGS = {"1": ("A", ""), "2": ("B", ""), "12": ("A", "B")}
-"""Ends of the branches of a split-phase service."""
-
+LEGS = {"1": ("A", ""), "2": ("B", ""), "12": ("A", "B")}  # ends of the branches of a split-phase service
 EXPONENT = {"P": 0.0, "I": 1.0, "Y": 2.0}
 """Exponent of the voltage in the power of each part: constant power, current, admittance."""
 

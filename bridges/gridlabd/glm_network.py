@@ -10,12 +10,9 @@ import cmath
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from math import pi, sqrt
 
-TableRow = Mapping[str, str]
-"""A row of a table, by its columns."""
+TableRow = Mapping[str, str]  # A row of a table, by its columns
 
-F_NOM = 60.0
-"""Nominal frequency (Hz)."""
-
+F_NOM = 60.0  # nominal frequency (Hz)
 FOOT, MILE, FEET_PER_MILE = 0.3048e-3, 1.609344, 5280.0
 """Lengths (km): GridLAB-D takes lines in feet and impedances per mile."""
 

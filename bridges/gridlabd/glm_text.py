@@ -10,20 +10,13 @@ INCLUDE = re.compile(r'^\s*#include\s+["<]([^">]+)[">]', re.IGNORECASE)
 RUNNING = re.compile(r"^\s*(?:#(?:system|exec|start|wget|option)|script\s+\w+)|^link(?=\s)", re.IGNORECASE)
 """Commands that run a program, load one, or fetch a file."""
 
-COMMENT = re.compile(r'//(?=(?:[^"]*"[^"]*")*[^"]*$)')
-"""The mark of a comment, not within quotes."""
-
-OBJECT = re.compile(r"(?:^|[{};\s])object\s+(\w+)(?=[\s{:]|$)")
-"""The beginning of an object, with its class."""
-
-NAMED = re.compile(r"""(?:^|[{;\s])name\s+(?:"([^"]+)"|'([^']+)'|([^";\s]+))\s*;""")
-"""An object's name."""
-
+COMMENT = re.compile(r'//(?=(?:[^"]*"[^"]*")*[^"]*$)')  # the mark of a comment, not within quotes
+OBJECT = re.compile(r"(?:^|[{};\s])object\s+(\w+)(?=[\s{:]|$)")  # the beginning of an object, with its class
+NAMED = re.compile(r"""(?:^|[{;\s])name\s+(?:"([^"]+)"|'([^']+)'|([^";\s]+))\s*;""")  # an object's name
 UNNAMED = re.compile(r"(\w+)_auto_(\d+)")
 """The name that GridLAB-D gives an object without one: its class and its number among all objects."""
 
-DEEPEST = 40
-"""Models within models; more is one that includes itself."""
+DEEPEST = 40  # models within models; more is one that includes itself
 
 
 class GlmText:
@@ -33,8 +26,7 @@ class GlmText:
         self.problems: list[str] = []
         self._path = path
         self._places: dict[str, str] = {}
-        self._objects: list[tuple[str, str]] = []
-        """Class and place of each object."""
+        self._objects: list[tuple[str, str]] = []  # class and place of each object
         self._read(path, 0)
 
     def place(self, name: str) -> str:
@@ -77,20 +69,15 @@ CHILD_OF_BUS = ("node", "load", "meter", "triplex_node", "triplex_meter", "tripl
 SWITCHES = frozenset({"switch", "recloser", "sectionalizer"})
 """Classes that open and close: ideal switches before what they have of impedance."""
 
-LINES = frozenset({"overhead_line", "underground_line", "triplex_line", "line"})
-"""Classes of lines."""
-
-LINEAR = LINES | {"transformer", "regulator", "fuse", "series_reactor"}
-"""Classes that an admittance matrix describes."""
-
-DATA = frozenset(
+LINES = frozenset({"overhead_line", "underground_line", "triplex_line", "line"})  # classes of lines
+LINEAR = LINES | {"transformer", "regulator", "fuse", "series_reactor"}  # classes that an admittance matrix describes
+DATA = frozenset(  # classes that others refer to
     [
         *("line_configuration", "line_spacing", "overhead_line_conductor", "underground_line_conductor"),
         *("triplex_line_conductor", "triplex_line_configuration", "transformer_configuration"),
         "regulator_configuration",
     ]
 )
-"""Classes that others refer to."""
 
 WATCHING = frozenset(
     [
@@ -103,10 +90,9 @@ WATCHING = frozenset(
 )
 """Classes that measure, or act only later or on what is refused anyway: they have no part in the network."""
 
-GENERATION = frozenset(
+GENERATION = frozenset(  # classes whose place an inverter of ours can take
     [
         *("inverter", "inverter_dyn", "inverter_DYN", "solar", "battery", "energy_storage", "diesel_dg"),
         *("windturb_dg", "rectifier", "sync_ctrl", "controller_dg", "dc_dc_converter", "central_dg", "microturbine"),
     ]
 )
-"""Classes whose place an inverter of ours can take."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from math import isfinite
 from typing import Any
 
@@ -34,7 +33,7 @@ class GridlabdPlant(RecordedPlant):
 
     GridLAB-D's initialisation takes the powers of the inverters and chooses set-points that give them; a scenario gives
     the set-points. So GridLAB-D begins its initial power flow from the powers of `ours`, our plant of the same run at
-    its start; what comes out after `REST` is its own. Periods are in s; `python` is an interpreter that has the wheel.
+    its start; what comes out after `REST` is its own. Periods are in s.
     """
 
     def __init__(
@@ -43,14 +42,12 @@ class GridlabdPlant(RecordedPlant):
         settings: PlantSettings,
         T_c: float,
         end: float,
-        python: str = sys.executable,
         *,
         record_step: float | None = None,
         deadline: float = 60.0,
     ) -> None:
         self.inverters = ours.inverters
-        self.tick = 0
-        """k: the plant is at k T_c."""
+        self.tick = 0  # k: the plant is at k T_c
         self._T_c, self._h = T_c, settings.h
         self._steps, self._record = round(T_c / self._h), round((record_step or self._h) / self._h)
         network = self._network = ours.network
@@ -69,13 +66,11 @@ class GridlabdPlant(RecordedPlant):
         self._relays = Relays(settings.protection, len(self.inverters), self._h, network.feeder.f_nom)
         self._events = self._islands.report_dead(0.0, self._switchboard.closed, self._state)
         self._events += [event for event in ours.take_events() if event.kind == "warning"]
-        self._writes: list[tuple[str, str, Any]] = []
-        """Values for GridLAB-D's next step: object, property, value."""
+        self._writes: list[tuple[str, str, Any]] = []  # values for GridLAB-D's next step: object, property, value
         start = {name: complex(reading.P, reading.Q) for name, reading in ours.measure().items()}
         seconds = round(REST + end + 2.0)
         model = write_glm(DATA / settings.feeder, settings.load_set, start, self._parameters, self._h, seconds)
-        self.process = DeltaModeProcess(python, deadline)
-        """GridLAB-D."""
+        self.process = DeltaModeProcess(deadline)  # GridLAB-D
         try:
             units = [(unit.name, f"n{unit.bus}", unit.kind, unit.phases) for unit in self._units.values()]
             self.process.load(model, units)

@@ -25,8 +25,7 @@ import numpy as np
 from gridpeers.bridges.gridlabd.delta_mode import GridlabdCore, NotImportableError, end_with, gridlabd_package
 from gridpeers.bridges.gridlabd.glm_text import CHILD_OF_BUS, WATCHING
 
-STRIDE = 3
-"""Doubles of a complex number in GridLAB-D's arrays: real part, imaginary part, notation."""
+STRIDE = 3  # doubles of a complex number in GridLAB-D's arrays: real part, imaginary part, notation
 
 _pointer, _double, _byte = ctypes.c_void_p, ctypes.c_double, ctypes.c_ubyte
 
@@ -153,9 +152,7 @@ TOLERANCE = "1e-10"
 WRITTEN = ("file", "filename", "output_file", "outfile", "report_file", "base_file_name", "output_filename")
 """Properties that name a file which GridLAB-D would write into the folder of the model."""
 
-PHASE_D = 0x100
-"""Bit of an object's `phases`: delta-connected."""
-
+PHASE_D = 0x100  # bit of an object's `phases`: delta-connected
 PV, SWING = 1, 2
 """Values of `bustype`, and of the solver's `type`, of buses whose voltage is given, in magnitude or entirely."""
 
@@ -168,9 +165,7 @@ POSITIONS = {"regulator": "tap_", "capacitor": "switch"}
 DELAYS = ("time_delay", "dwell_time", "lockout_time", "regulator_delay", "capacitor_delay")
 """Properties (s) that let a control wait."""
 
-LONGEST_SETTLING = 3600
-"""Time (s) that GridLAB-D goes on at most."""
-
+LONGEST_SETTLING = 3600  # time (s) that GridLAB-D goes on at most
 KINDS = {"P": "power", "I": "current", "Y": "shunt"}
 """Kinds of a load's demand (VA, A, S), and the word in the names of GridLAB-D's properties."""
 

@@ -7,6 +7,7 @@ import os
 import pickle
 import re
 import subprocess
+import sys
 from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
@@ -20,15 +21,12 @@ from gridpeers.wire.wording import damaged, printable
 PLACED = re.compile(r"^(?P<file>\S[^()]*)\((?P<line>\d+)\)\s*: (?P<text>.*)$")
 """A message of the loader: file, line, text."""
 
-LEVELLED = re.compile(r"^(?:ERROR|FATAL)\s+\[[^\]]*\]\s*: (?P<text>.*)$")
-"""A message of the simulation that ends it."""
-
-FOLLOWING = re.compile(
+LEVELLED = re.compile(r"^(?:ERROR|FATAL)\s+\[[^\]]*\]\s*: (?P<text>.*)$")  # A message of the simulation that ends it
+FOLLOWING = re.compile(  # messages that only repeat that something failed
     r"load failed at or near|unable to load '|failed to load model file|model initialization failed"
     r"|run_preparation\(\) returned|shutdown after simulation|last (error|warning) message was repeated"
     r"|Failed to initialize simulation|initialization failed$|dump complete to|tzinfo\.txt|environment startup failed"
 )
-"""Messages that only repeat that something failed."""
 
 
 def messages(printed: str) -> list[str]:
@@ -55,21 +53,11 @@ def messages(printed: str) -> list[str]:
 
 
 DELTA_MODE = Path(__file__).with_name("delta_mode.py")
-
-SHOWN = 2
-"""So many of GridLAB-D's own errors are in an error of ours; the first ones are the cause, the others follow."""
-
-LONGEST = 600.0
-"""Longest time (s) until a model is loaded and its first power flow solved."""
-
+SHOWN = 2  # so many of GridLAB-D's own errors are in an error of ours; the first ones are the cause, the others follow
+LONGEST = 600.0  # longest time (s) until a model is loaded and its first power flow solved
 KEPT_MEMORY = {"MALLOC_MMAP_THRESHOLD_": str(32 * 2**20), "MALLOC_TRIM_THRESHOLD_": str(2**30)}
 """Lets glibc keep the memory of one power flow for the next: GridLAB-D's solver takes and returns its matrices in every
 iteration. Returned to the system each time, they take a quarter of the processor time. No number depends on it."""
-
-MISSING = (
-    "GridLAB-D is not there: {python} cannot import the package gridlabd ({error}); install it (Linux, x86-64): "
-    "pip install 'gridpeers[gridlabd]'"
-)
 
 
 class GridlabdError(RuntimeError):
@@ -79,15 +67,11 @@ class GridlabdError(RuntimeError):
 class DeltaModeProcess:
     """GridLAB-D in a process of its own, which ends with this one; `deadline` is the longest wait for an answer (s)."""
 
-    def __init__(self, python: str, deadline: float) -> None:
-        self._python, self._deadline = python, deadline
+    def __init__(self, deadline: float) -> None:
+        self._deadline = deadline
         self._folder = TransientFolder("gridpeers-gridlabd-")  # GridLAB-D writes files of its own where it stands
-        try:
-            command = [python, "-P", str(DELTA_MODE), str(os.getpid())]
-            self._process = RequestProcess(command, self._folder, KEPT_MEMORY)
-        except OSError as error:
-            self._folder.close()
-            raise GridlabdError(MISSING.format(python=python, error=error.strerror)) from error
+        command = [sys.executable, "-P", str(DELTA_MODE), str(os.getpid())]
+        self._process = RequestProcess(command, self._folder, KEPT_MEMORY)
 
     @property
     def pid(self) -> int:
@@ -120,10 +104,7 @@ class DeltaModeProcess:
         if answer is None:
             raise GridlabdError(f"GridLAB-D has not answered for {deadline:g} s, so it was ended{self._complaints()}")
         if "not_importable" in answer:
-            reason = answer["not_importable"]
-            if answer["installed"]:
-                raise GridlabdError(damaged("gridlabd", reason, "GridLAB-D as the plant"))
-            raise GridlabdError(MISSING.format(python=self._python, error=reason))
+            raise GridlabdError(damaged("gridlabd", answer["not_importable"], "GridLAB-D as the plant"))
         if "error" in answer:
             raise GridlabdError(f"GridLAB-D: {answer['error']}{self._complaints()}")
         return answer

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
-from collections.abc import Iterator
 from contextlib import closing
 
 from msgspec.structs import replace
 
-from gridpeers.bridges.gridlabd.glm import node_of
 from gridpeers.bridges.gridlabd.glm_network import F_NOM
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.equipment.connectivity import Node
@@ -22,7 +19,6 @@ from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.scenarios.schema.supply import supply_states
 
 _SHOWN = 4
-
 _OTHERWISE = 'or use simulator = "gridpeers"'
 
 
@@ -161,13 +157,14 @@ def unrepresentable(feeder: Feeder) -> list[str]:
                 f'bus "{bus}" has {", ".join(there)}; GridLAB-D takes one inverter a bus: give each a bus behind a line'
             )
             problems.append(text)
-    names = [(kind, name, in_model.replace("{}", name)) for kind, name, forms in _names(feeder) for in_model in forms]
-    taken = Counter(in_model for _, _, in_model in names)
-    for kind, name, in_model in names:
-        if not GLM_NAME.fullmatch(in_model):
-            problems.append(f'{kind} "{name}": GridLAB-D takes letters, digits, _ and - for a name; rename it')
-        elif taken[in_model] > 1:
-            problems.append(f'{kind} "{name}": another object of the model has its name {in_model}; rename it')
+    for kind, rows, prefix in (
+        *(("bus", feeder.buses, "n"), ("line", feeder.lines, "l"), ("kind of line", feeder.line_configs, "c")),
+        *(("switch", feeder.switches, "s"), ("transformer", feeder.transformers, "t")),
+        *(("regulator", feeder.regulators, ""), ("inverter", feeder.inverters, "")),
+    ):
+        for name in dict.fromkeys(row.name for row in rows):
+            if not GLM_NAME.fullmatch(prefix + name):
+                problems.append(f'{kind} "{name}": GridLAB-D takes letters, digits, _ and - for a name; rename it')
     return problems
 
 
@@ -191,20 +188,3 @@ def beyond_gridlabd(own: InverterParameters) -> dict[str, str]:
             if getattr(own, key) != getattr(GflParameters(), key):
                 found[f"{key}_pu"] = f"{getattr(own, key):g}"
     return found
-
-
-def _names(feeder: Feeder) -> Iterator[tuple[str, str, list[str]]]:
-    """Yield what each object is, its name, and the forms of its names in the model (`glm`, `glm_network`)."""
-    for kind, rows, forms in (
-        ("bus", feeder.buses, ["n{}"]),
-        ("line", feeder.lines, ["l{}"]),
-        ("kind of line", feeder.line_configs, ["c{}"]),
-        ("switch", feeder.switches, ["s{}", "m{}", "z{}"]),
-        ("transformer", feeder.transformers, ["t{}", "ct{}"]),
-        ("regulator", feeder.regulators, ["{}", "c{}", "m{}", "z{}"]),
-        ("inverter", feeder.inverters, ["{}"]),
-    ):
-        yield from ((kind, name, forms) for name in dict.fromkeys(row.name for row in rows))
-    single = [row for row in feeder.inverters if len(row.phases) == 1]
-    yield from (("node of inverter", row.name, [node_of(row.bus, row.phases)]) for row in single)
-    yield from (("object", name, ["{}"]) for name in ("islands", "ticker", "minus_switch", "minus_regulator"))

@@ -30,30 +30,26 @@ from gridpeers.bridges.gridlabd.gridlabd_power_flow import PV, SWING
 from gridpeers.bridges.gridlabd.gridlabd_process import solved_model
 from gridpeers.bridges.import_checks import (
     BEYOND,
+    MATCH,
     checked,
+    difference,
     left_out_by,
     path_problems,
     refuse_if,
     report_powers,
     with_plain_names,
 )
-from gridpeers.bridges.import_comparison import MATCH, difference
 from gridpeers.plant.equipment import Feeder, Source
 from gridpeers.plant.equipment.imported_equipment import LinearElement, LoadPart
 from gridpeers.plant.tables.read import FeederError
 from gridpeers.wire.wording import suggestion
 
-FAR = 1.3
-"""Ratio of a voltage to the nominal one that is no voltage drop: line-to-line voltages are 1.7 times as high."""
-
+FAR = 1.3  # ratio of a voltage to the nominal one that is no voltage drop: line-to-line voltages are 1.7 times as high
 LIVE = 0.5
 """Part of a bus's highest phase voltage below which a phase is de-energised, and has what others induce in it."""
 
-BALANCED = 1e-7
-"""Largest unbalance (pu) of the substation's voltage that is rounding."""
-
-OBJECT = re.compile(r"\(obj=\d+;([^)]+)\)")
-"""An object in a message of GridLAB-D's."""
+BALANCED = 1e-7  # largest unbalance (pu) of the substation's voltage that is rounding
+OBJECT = re.compile(r"\(obj=\d+;([^)]+)\)")  # an object in a message of GridLAB-D's
 
 
 def read_glm(
@@ -287,7 +283,7 @@ class _GlmReader:
             )
             return
         try:
-            worst, (bus, phase), _ = difference(feeder, theirs)
+            worst, (bus, phase) = difference(feeder, theirs)
         except ArithmeticError as error:
             self._problems.append(f"{self._path.name}: {error}")
             return

@@ -14,22 +14,12 @@ from gridpeers.plant.request_process import ProcessEndedError, RequestProcess
 from gridpeers.wire.wording import damaged
 
 PROCESS = Path(__file__).with_name("federate_process.py")
-
 USER = "a HELICS federate"
-
-IMPORT = 60.0
-"""Longest time (s) until the process has imported HELICS, on a machine that is busy."""
-
-FAREWELL = 3.0
-"""Longest wait (s) for the process to leave the federation."""
-
+IMPORT = 60.0  # longest time (s) until the process has imported HELICS, on a machine that is busy
+FAREWELL = 3.0  # longest wait (s) for the process to leave the federation
 BEFORE = "before t = 0"
-
-ASK = 5.0
-"""Longest wait (s) for the answer where the others are; it comes at once, but for a busy machine."""
-
-LATER = 3.0
-"""Time (s) for which the process is heard out once its own wait for the broker is over."""
+ASK = 5.0  # longest wait (s) for the answer where the others are; it comes at once, but for a busy machine
+LATER = 3.0  # time (s) for which the process is heard out once its own wait for the broker is over
 
 
 class HelicsError(RuntimeError):
@@ -42,8 +32,7 @@ class HelicsFederate:
     def __init__(self, settings: HelicsSettings, deadline: float) -> None:
         self._settings, self._deadline = settings, deadline
         self._when = BEFORE
-        self._others = "nobody"
-        """Names of the other federates."""
+        self._others = "nobody"  # names of the other federates
         self._process = RequestProcess([sys.executable, str(PROCESS)])
         ready = self._take(IMPORT, f"its process did not start within {IMPORT:g} s")
         if "not_importable" in ready:

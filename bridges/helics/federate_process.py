@@ -25,23 +25,12 @@ import threading
 import time
 from typing import Any
 
-GLOBAL_ERROR = 1
-"""HELICS's error code of a federation that we end."""
-
-BROKER_LEAVES = 3000
-"""Longest time (ms) that an own broker waits for the others after the end."""
-
-FAREWELL = 0.3
-"""Time (s) for the word of an abort to reach the others."""
-
-NOBODY = "any"
-"""Type of a topic that nobody publishes."""
-
-PROBE = 0.1
-"""Time (s) between two attempts to reach a broker."""
-
-GONE = ("disconnected", "finalized", "error")
-"""States of a federate that publishes no more."""
+GLOBAL_ERROR = 1  # HELICS's error code of a federation that we end
+BROKER_LEAVES = 3000  # longest time (ms) that an own broker waits for the others after the end
+FAREWELL = 0.3  # time (s) for the word of an abort to reach the others
+NOBODY = "any"  # type of a topic that nobody publishes
+PROBE = 0.1  # time (s) between two attempts to reach a broker
+GONE = ("disconnected", "finalized", "error")  # states of a federate that publishes no more
 
 
 class RefusedError(Exception):
@@ -60,8 +49,7 @@ class Federate:
         self.name = ""
         self.publications: dict[str, tuple[Any, str]] = {}
         self.subscriptions: dict[str, tuple[Any, str]] = {}
-        self.publishers: dict[str, set[str]] = {}
-        """By federate: our subscriptions that it publishes."""
+        self.publishers: dict[str, set[str]] = {}  # by federate: our subscriptions that it publishes
 
     def join(self, request: dict[str, Any]) -> dict[str, Any]:
         """Start the broker if asked for, and connect to it."""

@@ -21,8 +21,7 @@ from gridpeers.wire.messages import LoadSetting, PlantEvent
 from gridpeers.wire.timing import time_of
 from gridpeers.wire.wording import first_of
 
-SHOWN = 4
-"""Topics that an error names."""
+SHOWN = 4  # topics that an error names
 
 
 class HelicsPlant(RecordedPlant):
@@ -46,8 +45,7 @@ class HelicsPlant(RecordedPlant):
         needed = topics(prefix, self.inverters, SENSORS)
         self._needed = [topic.key for topic in needed]
         self._values: dict[str, Value] = {}
-        self._came: set[str] = set()
-        """Topics that the outside plant has published."""
+        self._came: set[str] = set()  # topics that the outside plant has published
         for row in feeder.inverters:  # held until somebody says otherwise
             self._hold(row.name, settings.P_set0 * row.P_rated, settings.V_set0 * row.V_nom)
         self._outgoing: dict[str, Value] = {}
@@ -176,10 +174,8 @@ class BridgedPlant(RecordedPlant):
         own = topics(prefix, plant.inverters, SENSORS, HELD)
         where = topics(prefix, plant.inverters, WHERE)
         self._row_keys, self._where_keys = [topic.key for topic in own], [topic.key for topic in where]
-        self._where: dict[str, Value] = {}
-        """Flags and names that were published last: they go out when they change."""
-        self._outgoing: dict[str, Value] = {}
-        """Values to publish with the next step."""
+        self._where: dict[str, Value] = {}  # flags and names that were published last: they go out when they change
+        self._outgoing: dict[str, Value] = {}  # values to publish with the next step
         try:
             asked = topics(prefix, outside, SET_POINTS)
             publish = self._measured() | self._as_value(self._events)

@@ -16,9 +16,7 @@ from gridpeers.wire.bounds import NAME
 from gridpeers.wire.schema.plausible import Plausible, Unit
 from gridpeers.wire.schema.table_schema import Example, Problem
 
-BROKER = "tcp://127.0.0.1:23404"
-"""Address of a HELICS broker that was started without options on this machine."""
-
+BROKER = "tcp://127.0.0.1:23404"  # address of a HELICS broker that was started without options on this machine
 _ADDRESS = re.compile(r"(tcp://)?([A-Za-z0-9_.-]+)(:(?P<port>\d{1,5}))?")
 
 

@@ -14,8 +14,7 @@ ACT = 1e-6
 """Time (s) by which a controller follows the plant: shorter than any step of a plant, and a thousand times HELICS's
 own resolution."""
 
-Value = float | bool | str
-"""Value of a topic."""
+Value = float | bool | str  # value of a topic
 
 
 class Topic(NamedTuple):
@@ -23,17 +22,15 @@ class Topic(NamedTuple):
 
     key: str
     type: Literal["double", "boolean", "string"]
-    unit: str
-    """Unit as HELICS knows it: it converts from a publisher's other one. "" for none."""
+    unit: str  # unit as HELICS knows it: it converts from a publisher's other one. "" for none.
 
 
-SENSORS = (
+SENSORS = (  # measurements that a plant publishes of every inverter, in the order of a recorded row
     Topic("f", "double", "Hz"),
     Topic("P", "double", "W"),
     Topic("Q", "double", "var"),
     Topic("V", "double", "V"),
 )
-"""Measurements that a plant publishes of every inverter, in the order of a recorded row."""
 
 HELD = (Topic("P_set_held", "double", "W"), Topic("V_set_held", "double", "V"))
 """Set-points that an inverter follows, after its bounds; in the order of a recorded row, behind the sensors."""

@@ -21,11 +21,10 @@ from gridpeers.wire.wording import suggestion
 LINEAR = frozenset({"line", "transformer", "autotrans", "reactor", "capacitor", "fault", "gictransformer"})
 """Classes that a primitive admittance matrix describes."""
 
-NOTED = {
+NOTED = {  # classes that change others by themselves, and what becomes of these
     **dict.fromkeys(("invcontrol", "expcontrol"), "what it controls stays as in the snapshot"),
     **dict.fromkeys(("fuse", "recloser", "relay", "swtcontrol"), "what it controls stays as it is"),
 }
-"""Classes that change others by themselves, and what becomes of these."""
 
 SILENT = METERS | {"regcontrol", "capcontrol", "load"}
 """Classes without anything to do or to say: controls that have acted in the snapshot, and loads, which come apart."""
@@ -47,14 +46,10 @@ class DssCircuit(NamedTuple):
     """What the engine made of a script: a feeder, not yet checked as a network."""
 
     feeder: Feeder
-    problems: list[str]
-    """What cannot be represented."""
-    left_out: bool
-    """Whether something was left out, so that the engine's voltages are those of another circuit."""
-    V: dict[Node, complex]
-    """The engine's voltages (V)."""
-    added: dict[str, str]
-    """Buses that are not in the script, and the bus before each."""
+    problems: list[str]  # what cannot be represented
+    left_out: bool  # whether something was left out, so that the engine's voltages are those of another circuit
+    V: dict[Node, complex]  # the engine's voltages (V)
+    added: dict[str, str]  # buses that are not in the script, and the bus before each
 
 
 def read_circuit(request: ImportRequest, tell: Callable[[str], None]) -> DssCircuit:

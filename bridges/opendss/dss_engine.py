@@ -6,8 +6,7 @@ The commands come one by one, so that each problem has a file and a line, and no
 from __future__ import annotations
 
 import re
-from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -23,48 +22,30 @@ from gridpeers.wire.schema.table_schema import named
 from gridpeers.wire.text_file import script_of
 from gridpeers.wire.wording import printable
 
-RESULTS = (
+RESULTS = (  # commands that show or write results, or leave the engine
     *("comparecases", "di_plot", "doscmd", "dump", "export", "fileedit", "helpform", "panel", "plot", "quit", "save"),
     *("show", "uuids", "vdiff", "visualize", "yearlycurves"),
 )
-"""Commands that show or write results, or leave the engine."""
 
 INCLUDING = ("redirect", "compile")
-
-COORDINATES = ("buscoords", "latlongcoords")
-"""Commands that name a file without saying so."""
-
+COORDINATES = ("buscoords", "latlongcoords")  # commands that name a file without saying so
 ABBREVIATED = (*INCLUDING, *RESULTS, *COORDINATES, "solve")
 """Commands that may be written by three or more of their first letters, unless these are in `WHOLE`."""
 
 WHOLE = frozenset({"set", "help", "sel", "select", "reset"})
-
 ABOUT_AN_ELEMENT = frozenset({"new", "edit", "~", "m", "more"})
-
-METERS = frozenset({"energymeter", "monitor", "sensor"})
-"""Classes that measure: they have no part in the network."""
-
+METERS = frozenset({"energymeter", "monitor", "sensor"})  # classes that measure: they have no part in the network
 ASIDE = METERS | {"loadshape", "tshape", "priceshape", "spectrum", "tcc_curve"}
 """Classes that a snapshot does without: one that fails is a note."""
 
-FREQUENCY = "the circuit's frequency"
-"""Begins a problem with what `set frequency` or `set defaultbasefrequency` says."""
-
-HUNTING = "Max Control Iterations Exceeded"
-"""In the engine's warning on controls that move on and on."""
-
+FREQUENCY = "the circuit's frequency"  # Begins a problem with what `set frequency` or `set defaultbasefrequency` says
+HUNTING = "Max Control Iterations Exceeded"  # in the engine's warning on controls that move on and on
 FILE = re.compile(r"""(\b\w*file\s*=\s*)("[^"]+"|'[^']+'|\([^()]+\)|\[[^\[\]]+\]|[^\s,"'()\[\]]+)""", re.IGNORECASE)
 """A file that a property names."""
 
-DEEPEST = 40
-"""Scripts within scripts; more is a script that includes itself."""
-
-MOST, FEW = 50, 3
-"""So many problems are told of a script, and of one that makes no circuit."""
-
-SNAPSHOT = 0
-"""The engine's number of the mode that solves one moment."""
-
+DEEPEST = 40  # scripts within scripts; more is a script that includes itself
+MOST, FEW = 50, 3  # so many problems are told of a script, and of one that makes no circuit
+SNAPSHOT = 0  # the engine's number of the mode that solves one moment
 SETTLE = ("set mode=snapshot", "set maxcontroliter=1000", "set maxiterations=1000", "solve")
 """Solves with controls, which set taps and capacitor steps."""
 
@@ -120,7 +101,7 @@ class DssEngine:
                 )
             elif message:
                 return [f"{path.name}: the engine cannot solve the circuit: {message}"]
-        if problems := [*impossible_values(self.circuit), *repeated_names(self.circuit)]:
+        if problems := impossible_values(self.circuit):
             return problems
         if not self.circuit.Solution.Converged:
             return [f"{path.name}: the engine's power flow does not converge; it would not in OpenDSS either"]
@@ -246,11 +227,8 @@ def found_file(path: Path) -> Path | None:
     return here if here.is_file() else None
 
 
-FAR = 1.5
-"""Ratio of two voltages that only a lost factor explains, such as that between phases and to ground."""
-
-DEAD = 0.01
-"""Voltage (pu) below which nothing feeds a node, so that nothing can be said of it."""
+FAR = 1.5  # ratio of two voltages that only a lost factor explains, such as that between phases and to ground
+DEAD = 0.01  # voltage (pu) below which nothing feeds a node, so that nothing can be said of it
 
 
 def impossible_values(circuit: Any) -> list[str]:
@@ -279,48 +257,38 @@ def impossible_values(circuit: Any) -> list[str]:
     ]
 
 
-def repeated_names(circuit: Any) -> list[str]:
-    """Return a problem for each name that several elements have: the engine finds one of them alone by it."""
-    names = Counter(str(name).lower() for name in circuit.AllElementNames)
-    return [
-        f"{name}: {count} elements have this name; names must differ (set AllowDuplicates=no tells where they stand)"
-        for name, count in names.items()
-        if count > 1 and not name.startswith("load.")  # loads are read one after the other, not by name
-    ]
-
-
 def unusual_voltages(circuit: Any, parts: Sequence[LoadPart], V: Mapping[Node, complex]) -> list[str]:
     """Return notes on loads whose `kv`, and buses whose voltage base, is far from the voltage that they have (V)."""
-    strange: dict[str, str] = {}
+    loads: list[tuple[str, float, float]] = []
     for part in parts:
-        V_part = abs(V.get((part.bus, part.ends[0]), 0j) - V.get((part.bus, part.ends[1]), 0j))
-        if _is_far(V_part, part.V_nom):
-            text = f"has {V_part / 1e3:.3g} kV across a part that kv makes {part.V_nom / 1e3:.3g} kV"
-            strange.setdefault(part.name, text)
-    based: dict[str, str] = {}
-    unbased: dict[str, str] = {}
+        one, other = (V.get((part.bus, letter), 0j) for letter in part.ends)
+        loads.append((part.name, abs(one - other), part.V_nom))
+    buses: list[tuple[str, float, float]] = []
     for bus in dict.fromkeys(bus for bus, _ in V):
         circuit.SetActiveBus(bus)
-        V_base = 1e3 * float(circuit.ActiveBus.kVBase)
-        V_bus = max(abs(V.get((bus, letter), 0j)) for letter in PHASES)
-        if V_base <= 0.0:
-            unbased[f"bus {bus}"] = "without a voltage base, so that the voltage there counts as nominal"
-        elif _is_far(V_bus, V_base):
-            based[f"bus {bus}"] = f"has {V_bus / V_base:.2g} times its voltage base"
+        highest = max(abs(V.get((bus, letter), 0j)) for letter in PHASES)
+        buses.append((f"bus {bus}", highest, 1e3 * float(circuit.ActiveBus.kVBase)))
     notes = []
-    for found, remedy in (
-        (strange, "beyond Vminpu and Vmaxpu a load does not take its kw; correct kv, or what feeds it"),
-        (based, "correct Set VoltageBases, or the kvs of a transformer"),
-        (unbased, "write Set VoltageBases=[...] and CalcVoltageBases"),
+    for rows, meant, remedy in (
+        (loads, "kv, and beyond Vminpu and Vmaxpu a load does not take its kw", "correct kv, or what feeds it"),
+        (buses, "voltage base", "correct Set VoltageBases, or the kvs of a transformer"),
     ):
-        for name, text in [*found.items()][:1]:
-            more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
-            notes.append(f"{name}{more}: {text}; {remedy}")
+        ratios = {name: V / V_nom for name, V, V_nom in rows if V > DEAD * V_nom > 0.0}
+        far = {name: ratio for name, ratio in ratios.items() if not 1.0 / FAR <= ratio <= FAR}
+        if far:
+            notes.append(f"{_first(far)}: has {next(iter(far.values())):.2g} times its {meant}; {remedy}")
+    if unbased := [name for name, _, V_base in buses if V_base <= 0.0]:
+        notes.append(
+            f"{_first(unbased)}: without a voltage base, so that the voltage there counts as nominal; "
+            "write Set VoltageBases=[...] and CalcVoltageBases"
+        )
     return notes
 
 
-def _is_far(V: float, V_nom: float) -> bool:
-    return DEAD * V_nom < V and not 1.0 / FAR <= V / V_nom <= FAR
+def _first(names: Collection[str]) -> str:
+    """Return the first of several names, and how many more there are."""
+    more = len(names) - 1
+    return f"{next(iter(names))} (and {more} more)" if more else next(iter(names))
 
 
 def complexes(values: Any) -> np.ndarray[Any, np.dtype[np.complex128]]:

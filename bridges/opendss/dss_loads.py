@@ -14,8 +14,7 @@ from gridpeers.plant.equipment import NODES
 from gridpeers.plant.equipment.imported_equipment import LoadPart, cut_off
 from gridpeers.plant.network.loads import law_row
 
-Law = dict[str, Any]
-"""How power goes with the voltage, by the fields of `LoadPart`."""
+Law = dict[str, Any]  # how power goes with the voltage, by the fields of `LoadPart`
 
 CONSTANT: Law = {"exponents": (0.0, 0.0)}
 IMPEDANCE: Law = {"exponents": (2.0, 2.0)}
@@ -25,12 +24,9 @@ class Branches(NamedTuple):
     """The branches of an element, between its conductors."""
 
     bus: str
-    letters: list[str]
-    """Letter of the node that each conductor leads to; empty for ground."""
-    conductors: list[tuple[int, int]]
-    """The two conductors of each branch."""
-    V_nom: float
-    """Nominal voltage across each (V)."""
+    letters: list[str]  # letter of the node that each conductor leads to; empty for ground
+    conductors: list[tuple[int, int]]  # the two conductors of each branch
+    V_nom: float  # nominal voltage across each (V)
 
     def across(self, V: Any) -> Any:
         """Return the voltage across each branch, from those of the conductors (V)."""
@@ -77,14 +73,9 @@ def branches_of(element: Any, kV: float, *, is_delta: bool) -> Branches:
 EXPONENTS = {1: (0.0, 0.0), 2: (2.0, 2.0), 3: (0.0, 2.0), 5: (1.0, 1.0)}
 """With what power of the voltage P and Q go, by the load's `model`."""
 
-CVR, FIXED_Q, FIXED_X, ZIP = 4, 6, 7, 8
-"""Models that need more than exponents."""
-
-ADMITTANCE = 2
-"""Load model of a solution that makes an impedance of every load."""
-
-VARIABLE = 0
-"""Status of a load that the circuit's load multiplier scales."""
+CVR, FIXED_Q, FIXED_X, ZIP = 4, 6, 7, 8  # models that need more than exponents
+ADMITTANCE = 2  # load model of a solution that makes an impedance of every load
+VARIABLE = 0  # status of a load that the circuit's load multiplier scales
 
 
 def read_loads(engine: DssEngine, left_out: set[str], notes: list[str], problems: list[str]) -> list[LoadPart]:
@@ -163,8 +154,7 @@ GENERATION = frozenset({"generator", "pvsystem", "storage"})
 GENERATOR_LAWS = {2: "impedance", 3: "no limits", 4: "own Q", 5: "own X", 7: "limited current"}
 """Laws of a Generator by its model; those of the others are constant power within limits."""
 
-CLOSE = 1e-6
-"""Largest difference between the engine's current and that of the parts, beside the largest current."""
+CLOSE = 1e-6  # largest difference between the engine's current and that of the parts, beside the largest current
 
 
 def read_generation(engine: DssEngine, name: str, notes: list[str], problems: list[str]) -> list[LoadPart]:

@@ -27,17 +27,12 @@ from gridpeers.plant.tables.read import FeederError
 from gridpeers.wire.wording import damaged, printable
 
 MISSING = "reading .dss files needs the OpenDSS engine; install it: pip install 'gridpeers[opendss]'"
-
 USER = "the import of .dss files"
-
 CIRCUIT, PLACE = "circuit.pickle", "place"
 """Files in the folder of the process: its answer, and what the engine is about to do."""
 
-LONGEST = 600.0
-"""Time (s) after which a script that does not end is given up."""
-
-SHOWN = 100
-"""Letters of a command that an error shows."""
+LONGEST = 600.0  # time (s) after which a script that does not end is given up
+SHOWN = 100  # letters of a command that an error shows
 
 _lock = threading.Lock()  # the engine reads one script at a time
 _processes: dict[int, tuple[RequestProcess, TransientFolder]] = {}

@@ -20,8 +20,7 @@ from gridpeers.plant.network import Network
 from gridpeers.plant.network.powerflow import solve_power_flow
 from gridpeers.plant.tables.feeder_columns import RATED_CURRENT, power_of
 
-ENOUGH = 0.5
-"""Part of the feeder's load that the switch must cut off, to be worth islanding."""
+ENOUGH = 0.5  # part of the feeder's load that the switch must cut off, to be worth islanding
 LINES = {"line": "Line", "overhead_line": "overhead_line", "underground_line": "underground_line"}
 """Classes of lines in OpenDSS and GridLAB-D, as a line that is to be a switch is written."""
 
@@ -131,10 +130,8 @@ def most_rated(V_nom: float) -> float:
 
 GROUP = 3
 """Inverters of a group, a microgrid of its own: one leader and its followers. A section has one group or several."""
-GROUP_LOAD = 2e6
-"""Load (W) beyond which a section has more groups: one leader does not hold the ends of a long feeder."""
-MOST_GROUPS = 12
-"""Groups that are proposed without being told how many inverters, those of most load first."""
+GROUP_LOAD = 2e6  # load (W) beyond which a section has more groups: one leader does not hold the ends of a long feeder
+MOST_GROUPS = 12  # groups that are proposed without being told how many inverters, those of most load first
 
 
 def group_sizes(loads: Sequence[float], places: Sequence[int], count: int | None) -> list[list[int]]:
@@ -270,28 +267,20 @@ class TooLargeError(NoProposalError):
 
 RATING = 1.3
 """Rating of all inverters of a section beside its load at nominal voltage, were all phases loaded as the heaviest."""
-IMPORTED = 0.1
-"""Part of the load, less the fixed generation, that comes over the islanding switch before it opens."""
-LEADER = 0.4
-"""Part of a group's rating that its leader, the grid-forming inverter, has."""
-SMALLEST = 20e3
-"""Load (W) below which a section has no inverters of its own."""
-DROOPS = 0.01, 0.05
-"""P-f and Q-V droop (pu)."""
+IMPORTED = 0.1  # part of the load, less the fixed generation, that comes over the islanding switch before it opens
+LEADER = 0.4  # part of a group's rating that its leader, the grid-forming inverter, has
+SMALLEST = 20e3  # load (W) below which a section has no inverters of its own
+DROOPS = 0.01, 0.05  # P-f and Q-V droop (pu)
 
 
 class Proposal(NamedTuple):
     """A first islanding of a feeder: the switch, the inverters, their set-points."""
 
-    switch: str
-    """The switch to island at, by its alias or name."""
+    switch: str  # the switch to island at, by its alias or name
     inverters: tuple[InverterRow, ...]
-    P_set0: float
-    """First P_set of every inverter (pu of its rating)."""
-    load: float
-    """Load (W) beyond the switch."""
-    heaviest: float
-    """Load of the heaviest phase in relation to the mean of the phases."""
+    P_set0: float  # first P_set of every inverter (pu of its rating)
+    load: float  # load (W) beyond the switch
+    heaviest: float  # load of the heaviest phase in relation to the mean of the phases
 
 
 def propose(feeder: Feeder, count: int | None = None) -> Proposal:

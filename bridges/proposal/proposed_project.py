@@ -28,14 +28,11 @@ from gridpeers.wire.driver.command_line import command_line
 from gridpeers.wire.messages import OFF
 from gridpeers.wire.wording import counted
 
-SETTLE = 1.2
-"""Time (s) given to the transient after the last event; the swings after it are judged."""
-
+SETTLE = 1.2  # time (s) given to the transient after the last event; the swings after it are judged
 WINDOW = 0.4
 """Length (s) of each of the two windows that are compared: an oscillation of 3 Hz or more is there with a period."""
 
-SWING = 0.02
-"""Swing of a frequency (Hz) that is at rest."""
+SWING = 0.02  # swing of a frequency (Hz) that is at rest
 
 
 class Unrest(NamedTuple):
@@ -43,8 +40,7 @@ class Unrest(NamedTuple):
 
     text: str
     """"its frequencies swing by 0.35 Hz, and do not calm down", or what tripped, after which limit of a current."""
-    limited: bool
-    """Whether grid-forming inverters were at their current limit."""
+    limited: bool  # whether grid-forming inverters were at their current limit
 
 
 def unsteady(scenario: ScenarioModel, feeder: Tables, case: str) -> Unrest | None:
@@ -108,21 +104,18 @@ MORE_CURRENT = """
 [plant.gfm]
 I_max_pu = 3.0  # 2.0 as a rule: here a phase would stay at the limit, with too low a voltage to recover
 """
-REMEDIES = {
+REMEDIES = {  # settings with which the plant of a proposed scenario may come to rest on droop alone, and their words
     SLOW_VOLT_VAR: "[plant.gfl] has a slower volt-var droop, T_vf_s = 0.2",
     MORE_CURRENT: "[plant.gfm] allows more current, I_max_pu = 3",
     SLOW_VOLT_VAR + MORE_CURRENT: "[plant.gfl] has T_vf_s = 0.2, and [plant.gfm] I_max_pu = 3",
 }
-"""Settings with which the plant of a proposed scenario may come to rest on droop alone, and their words."""
 
 BETA = """
 [gains]
 beta_GFM = {beta}  # 1 as a rule: here the vars would stay unequal where voltages differ along the feeder
 beta_GFL = {beta}
 """
-BETAS = 4.0, 16.0, 64.0
-"""Weights of var sharing, beside that of the voltage error, to try where vars stay unequal."""
-
+BETAS = 4.0, 16.0, 64.0  # weights of var sharing, beside that of the voltage error, to try where vars stay unequal
 GRAPHS = {"ring": "agents in a ring", "clustered": "agents of each microgrid and all leaders"}
 """Graphs of a proposed scenario, and their words."""
 

@@ -119,7 +119,24 @@ RANGES = {
 }
 
 
-LOAD_CASES = [
-    (model, limits) for model in MODELS for limits in RANGES if model not in (6, 7) or not limits.startswith("far")
-]
-"""Models 6 and 7 jump at vlowpu in the engine, and do not here, as docs/feeders.md says."""
+def loads_of_all_models(limits: str) -> str:
+    """A load of each model in this range of voltage; 6 and 7 jump at vlowpu in the engine, and not here."""
+    models = [model for model in MODELS if model not in (6, 7) or not limits.startswith("far")]
+    return "\n".join(
+        f"New Load.l{model} bus1=c phases=3 conn=wye kv=0.48 kw=19 kvar=8 {MODELS[model]} {RANGES[limits]}"
+        for model in models
+    )
+
+
+def loads_of_all_connections(model: int) -> str:
+    """A load of this model in each connection."""
+    return "\n".join(
+        f"New Load.l{k} {connection} kw=15 kvar=5 {MODELS[model]} vminpu=0.8 vmaxpu=1.2"
+        for k, connection in enumerate(CONNECTIONS.values())
+    )
+
+
+LOAD_SCRIPTS = {
+    **{f"loads {limits}": loads_of_all_models(limits) for limits in RANGES},
+    **{f"connections, model {model}": loads_of_all_connections(model) for model in (1, 5, 6, 8)},
+}

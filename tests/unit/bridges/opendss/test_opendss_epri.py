@@ -8,16 +8,7 @@ import pytest
 from bench.validation.opendss_engines import solve_scripts
 from bench.validation.write_opendss import write_opendss
 from gridpeers.plant.tables import read_feeder
-from tests.unit.bridges.opendss.opendss_scripts import (
-    CONNECTIONS,
-    ELEMENTS,
-    LINES,
-    LOAD_CASES,
-    LOADS,
-    MODELS,
-    RANGES,
-    TRANSFORMERS,
-)
+from tests.unit.bridges.opendss.opendss_scripts import ELEMENTS, LINES, LOAD_SCRIPTS, LOADS, TRANSFORMERS
 from tests.unit.bridges.opendss.opendss_solutions import LINE, STEP_DOWN, TOLERANCE, largest_difference, write
 
 pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")
@@ -28,17 +19,11 @@ FEEDERS = Path(__file__).parents[3] / "feeders"
 
 FEEDER_NAMES = ("ieee13", "ieee34", "standard123")
 
-LOAD = "New Load.l bus1=c phases=3 conn=wye kv=0.48 kw=150 kvar=60"
-
 SCRIPTS: dict[str, tuple[str, ...]] = {
     **{f"transformer, {name}": (TRANSFORMERS[name],) for name in TRANSFORMERS},
     **{f"line, {name}": (STEP_DOWN, LOADS, LINES[name]) for name in LINES},
     **{name: (STEP_DOWN, LOADS, ELEMENTS[name]) for name in ELEMENTS},
-    **{
-        f"load model {model}, {name}": (STEP_DOWN, f"{LOAD} {MODELS[model]} {RANGES[name]}")
-        for model, name in LOAD_CASES
-    },
-    **{name: (STEP_DOWN, f"New Load.l {CONNECTIONS[name]} kw=90 kvar=30 vminpu=0.8") for name in CONNECTIONS},
+    **{name: (STEP_DOWN, script) for name, script in LOAD_SCRIPTS.items()},
 }
 
 

@@ -65,7 +65,7 @@ BEYOND = {
 """Generation of each law; that of the Generator's model 7 beyond its limit has its vars reversed in the engine."""
 
 
-@pytest.mark.parametrize("pu", [0.6, 0.8, 1.16])
+@pytest.mark.parametrize("pu", [0.7, 1.16])
 @pytest.mark.parametrize("kind", BEYOND)
 def test_generation_beyond_its_limits_is_that_of_the_engine(tmp_path: Path, kind: str, pu: float) -> None:
     """A snapshot at 1.02 pu, taken to a voltage below Vminpu or above Vmaxpu, has the engine's voltages there."""
@@ -84,7 +84,7 @@ def test_generation_beyond_its_limits_is_that_of_the_engine(tmp_path: Path, kind
         assert abs(V[node] - theirs) < TOLERANCE * network.V_nom[node]
 
 
-@pytest.mark.parametrize("kind", BEYOND)
+@pytest.mark.parametrize("kind", ["fixed kvar, delta", "limited current"])
 def test_tables_have_generation_of_each_law(tmp_path: Path, kind: str) -> None:
     """What is read from the tables of an imported feeder is what was imported."""
     feeder = read_opendss(write(tmp_path, LINE, STEP_DOWN, BEYOND[kind]))

@@ -6,27 +6,16 @@ import pytest
 
 from gridpeers.bridges.opendss import read_opendss
 from gridpeers.plant.network import Network, solve_power_flow
-from tests.unit.bridges.opendss.opendss_scripts import CONNECTIONS, LOAD_CASES, MODELS, RANGES
+from tests.unit.bridges.opendss.opendss_scripts import LOAD_SCRIPTS, RANGES
 from tests.unit.bridges.opendss.opendss_solutions import LINE, STEP_DOWN, TOLERANCE, largest_difference, write
 
 pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")
 
 
-@pytest.mark.parametrize(("model", "limits"), LOAD_CASES)
-def test_a_load_draws_what_the_engine_says(tmp_path: Path, model: int, limits: str) -> None:
-    """A load of each model agrees with the engine within its voltage limits, above them, and below them."""
-    load = f"New Load.l bus1=c phases=3 conn=wye kv=0.48 kw=150 kvar=60 {MODELS[model]} {RANGES[limits]}"
-
-    assert largest_difference(write(tmp_path, LINE, STEP_DOWN, load)) < TOLERANCE
-
-
-@pytest.mark.parametrize("model", [1, 5, 6, 8])
-@pytest.mark.parametrize("connection", CONNECTIONS)
-def test_a_load_is_connected_as_the_engine_connects_it(tmp_path: Path, connection: str, model: int) -> None:
-    """Wye and delta loads of one, two and three phases agree with the engine."""
-    load = f"New Load.l {CONNECTIONS[connection]} kw=90 kvar=30 {MODELS[model]} vminpu=0.8 vmaxpu=1.2"
-
-    assert largest_difference(write(tmp_path, LINE, STEP_DOWN, load)) < TOLERANCE
+@pytest.mark.parametrize("loads", LOAD_SCRIPTS)
+def test_loads_draw_what_the_engine_says(tmp_path: Path, loads: str) -> None:
+    """Loads of each model, within, above and below their limits, and of each connection, agree with the engine."""
+    assert largest_difference(write(tmp_path, LINE, STEP_DOWN, LOAD_SCRIPTS[loads])) < TOLERANCE
 
 
 def test_a_load_uses_its_neutral_node(tmp_path: Path) -> None:
@@ -38,30 +27,14 @@ def test_a_load_uses_its_neutral_node(tmp_path: Path) -> None:
     assert largest_difference(write(tmp_path, LINE, STEP_DOWN, grounding, load, uneven)) < TOLERANCE
 
 
-def test_the_neutral_impedance_of_a_load_has_no_part_in_the_engine(tmp_path: Path) -> None:
-    """`rneut` and `xneut` change nothing in the engine's power flow, nor in ours."""
-    grounding = "New Reactor.ground bus1=c.4 bus2=c.0 phases=1 r=0.05 x=0.02"
-    load = "New Load.l bus1=c.1.4 phases=1 kv=0.277 kw=40 kvar=5 rneut=0.2 xneut=0.1 vminpu=0.7"
-
-    assert largest_difference(write(tmp_path, LINE, STEP_DOWN, grounding, load)) < TOLERANCE
-
-
 def test_the_load_multiplier_scales_variable_loads_alone(tmp_path: Path) -> None:
-    """`set loadmult` scales a variable load, and neither a fixed one nor one that is exempt."""
+    """`set loadmult` scales neither fixed and exempt loads nor the reactive power of models 6 and 7."""
     loads = [
-        f"New Load.{status} bus1=c phases=3 kv=0.48 kw=80 kvar=30 status={status}"
-        for status in ("variable", "fixed", "exempt")
+        f"New Load.l{k} bus1=c phases=3 kv=0.48 kw=50 kvar=20 status={status} vminpu=0.8"
+        for k, status in enumerate(("variable", "fixed", "exempt", "variable model=6", "variable model=7"))
     ]
 
     assert largest_difference(write(tmp_path, LINE, STEP_DOWN, *loads, "Set LoadMult=0.4")) < TOLERANCE
-
-
-@pytest.mark.parametrize("model", [6, 7])
-def test_fixed_reactive_power_is_not_scaled(tmp_path: Path, model: int) -> None:
-    """The load multiplier scales the active power of models 6 and 7, not their fixed reactive power."""
-    load = f"New Load.l bus1=c phases=3 kv=0.48 kw=150 kvar=60 model={model} vminpu=0.8"
-
-    assert largest_difference(write(tmp_path, LINE, STEP_DOWN, load, "Set LoadMult=0.6")) < TOLERANCE
 
 
 @pytest.mark.parametrize(("cut_off", "part"), [(0.98, 1.0), (1.0195, 0.5), (1.05, 0.0), (1.3, 0.0)])
@@ -93,17 +66,10 @@ def test_the_admittance_model_of_loads_is_an_impedance(tmp_path: Path) -> None:
     assert largest_difference(write(tmp_path, LINE, STEP_DOWN, load, "Set LoadModel=Admittance")) < TOLERANCE
 
 
-def test_a_load_may_take_reactive_power_alone(tmp_path: Path) -> None:
-    """A load without active power is a load: the engine's voltages show its reactive power."""
-    load = "New Load.q bus1=c phases=3 kv=0.48 kw=0 kvar=60"
-
-    assert largest_difference(write(tmp_path, LINE, STEP_DOWN, load)) < TOLERANCE
-
-
-def test_loads_may_generate(tmp_path: Path) -> None:
-    """A load of negative power feeds in, in the engine and in ours."""
-    loads = (
-        "New Load.l bus1=c phases=3 kv=0.48 kw=-90 kvar=30\nNew Load.z bus1=c.1 phases=1 kv=0.277 kw=20 pf=-0.9 model=2"
-    )
+def test_loads_may_generate_and_take_reactive_power_alone(tmp_path: Path) -> None:
+    """Loads of negative power, and without active power, are in the engine's power flow and in ours."""
+    loads = """New Load.l bus1=c phases=3 kv=0.48 kw=-90 kvar=30
+New Load.z bus1=c.1 phases=1 kv=0.277 kw=20 pf=-0.9 model=2
+New Load.q bus1=c phases=3 kv=0.48 kw=0 kvar=60"""
 
     assert largest_difference(write(tmp_path, LINE, STEP_DOWN, loads)) < TOLERANCE

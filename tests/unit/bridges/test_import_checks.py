@@ -1,8 +1,15 @@
-"""Names of an imported feeder that its tables cannot hold have others, each bus its own."""
+"""An import is held against the other program, and its buses have names that tables can hold."""
 
-from gridpeers.bridges.import_checks import with_plain_names
+from pathlib import Path
+
+import pytest
+
+from gridpeers.bridges.import_checks import difference, with_plain_names
+from gridpeers.bridges.opendss import read_opendss
 from gridpeers.plant.equipment import Bus, Feeder, Source, Switch
 from gridpeers.plant.equipment.imported_equipment import LinearElement, LoadPart, bus_behind
+from gridpeers.plant.network import Network, solve_power_flow
+from tests.unit.bridges.opendss.opendss_solutions import LINE, STEP_DOWN, write
 
 
 def feeder_of(*names: str, switched: str = "") -> tuple[Feeder, dict[str, str]]:
@@ -63,3 +70,16 @@ def test_plain_names_stay() -> None:
     feeder = Feeder(**{name: getattr(feeder, name) for name in feeder.__struct_fields__} | {"elements": (element,)})
 
     assert with_plain_names(feeder, added) is feeder
+
+
+def test_a_difference_is_found_where_it_is(tmp_path: Path) -> None:
+    """A voltage that is off by a thousandth is found at its node; equal ones do not differ."""
+    pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")
+    feeder = read_opendss(write(tmp_path, LINE, STEP_DOWN, "New Load.l bus1=c phases=3 kv=0.48 kw=90 kvar=20"))
+    network = Network(feeder)
+    theirs = dict(zip(network.nodes, solve_power_flow(network, network.closed0).V.tolist(), strict=True))
+
+    assert difference(feeder, theirs)[0] < 1e-9
+    worst, node = difference(feeder, theirs | {("c", "B"): theirs["c", "B"] * 1.001})
+    assert node == ("c", "B")
+    assert worst == pytest.approx(1e-3, rel=0.05)
