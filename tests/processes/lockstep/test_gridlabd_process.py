@@ -6,7 +6,6 @@ import os
 import re
 import select
 import signal
-import sys
 from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
