@@ -11,7 +11,6 @@ from tests.fuzz.fuzzing import SEED, fuzz
 
 
 def main() -> None:
-    """Fuzz, and print a table: a line for each receiver, with its kinds of rejection."""
     parser = argparse.ArgumentParser(prog="python -m tests.fuzz", description=__doc__)
     parser.add_argument("count", nargs="?", type=int, default=1_000_000, help="number of messages")
     parser.add_argument("--seed", type=int, default=SEED, help=f"of the messages (default {SEED})")

@@ -26,7 +26,6 @@ T_END = 1.0
 
 
 def info(*, clock: str) -> RecordInfo:
-    """What was recorded: a toy run."""
     plant, agents = toy_configs(3, end=T_END)
     names = tuple(agent.name for agent in agents)
     return RecordInfo(
@@ -44,7 +43,6 @@ class JournalFile:
         self._parts, self._reports = parts, reports
 
     def messages(self, topics: object) -> Iterator[RecordMessage]:
-        """Yield the parts of journals, then the reports."""
         for number, (sender, data) in enumerate(self._parts):
             journal = Journal(sender=sender, epoch=1, seq=number, t=T_END, data=data)
             yield RecordMessage("journal", int(T_END * 1e9), number, bytes(encode(journal)))
@@ -53,7 +51,6 @@ class JournalFile:
 
 
 def link_report(receiver: str, *traces: LinkTrace) -> LinkReport:
-    """Return a report of the links into one receiver."""
     (data,) = report_data(traces, {}, "")
     return LinkReport(sender=receiver, epoch=1, seq=0, t=T_END, data=data)
 
@@ -61,14 +58,12 @@ def link_report(receiver: str, *traces: LinkTrace) -> LinkReport:
 def judged(
     parts: Iterable[tuple[str, bytes]], reports: Iterable[LinkReport] = (), *, clock: str
 ) -> tuple[SummaryPass, int]:
-    """Return what a pass over these parts of journals and reports finds, and how much of them it cannot read."""
     file = JournalFile(parts, reports, clock=clock)
     sums = SummaryPass(file.info, file.t_end)
     return sums, read_into(cast(RecordFile, file), sums).unreadable
 
 
 def entries(payload: bytes) -> list[list[Any]]:
-    """Sound entries about a message, of each kind that checks look at."""
     state = bytes(encode(State(sender="inv1", epoch=1, seq=3, t=0.06, P_set=0.0, V_set=1.0, Q=0.0)))
     return [
         ["exchange", 3, [], [payload, state]],
@@ -83,7 +78,6 @@ class Journals:
     """The pass of the checks over a record in which one journal, and reports of links, are made up."""
 
     def take(self, payload: bytes, rng: random.Random) -> str:
-        """Take the bytes as a journal, or as a message or value of sound entries."""
         made = entries(payload)
         for _ in range(rng.randrange(3)):
             entry = rng.choice(made)
@@ -101,7 +95,6 @@ class Journals:
 
 
 def _verdicts(rng: random.Random) -> LinkTrace:
-    """Return verdicts on messages of any numbers and times that a report can have."""
     numbers = [int(value) for value in NUMBERS if 0 <= value <= MOST_COUNT]
     times = [float(value) for value in NUMBERS if 0 <= value <= LATEST]
     count = rng.randrange(5)

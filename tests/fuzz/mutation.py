@@ -47,7 +47,6 @@ class Made(NamedTuple):
 
 
 def _corpus() -> list[bytes]:
-    """Sound messages of all types and senders, and each field at its bounds."""
     found = [packed(sound(kind, sender=name, epoch=EPOCH)) for kind in MESSAGES for name in SENDERS[:4]]
     return found + [case.payload for kind in MESSAGES for case in cases(kind, epoch=EPOCH) if len(case.payload) < 2_000]
 
@@ -82,7 +81,6 @@ class Mutation:
         self._make = {way: make for way, (_, make) in ways.items()}
 
     def make(self) -> Made:
-        """Make a message."""
         (way,) = self.rng.choices(self._ways, self._weights)
         return Made(way, self._make[way]())
 
@@ -154,7 +152,6 @@ class Mutation:
         return tree
 
     def _alike(self, held: Any) -> Any:
-        """Return another value of the same type, which may be believed."""
         rng = self.rng
         match held:
             case bool():

@@ -58,16 +58,13 @@ TICK = 200
 class Receiver(Protocol):
     """What takes bytes."""
 
-    def take(self, payload: bytes, rng: random.Random) -> str:
-        """Take bytes; return the kind of their rejection, empty if they were used."""
-        ...
+    def take(self, payload: bytes, rng: random.Random) -> str: ...
 
 
 class Codec:
     """Decode, and encode again what was decoded."""
 
     def take(self, payload: bytes, rng: random.Random) -> str:
-        """Take bytes; a message that is believed is the same once encoded and decoded."""
         try:
             message = decode(payload)
         except RejectedError as rejected:
@@ -90,7 +87,6 @@ class Core:
         self._counts: Counter[str] = self._scene.side.rejects.counts
 
     def take(self, payload: bytes, rng: random.Random) -> str:
-        """Take bytes on one of its keys; now and then its peers go on, and tokens come and go."""
         side, before = self._scene.side, self._counts.total()
         kinds = self._counts.copy()
         side.received(self._key(payload, rng), payload, self._scene.now)
@@ -110,7 +106,6 @@ class Core:
         return next(iter((self._counts - kinds) or {"": 1}))
 
     def _key(self, payload: bytes, rng: random.Random) -> str:
-        """Return any of its keys, or one on which a message of this type and sender belongs."""
         try:
             message = decode(payload)
         except RejectedError:
@@ -129,7 +124,6 @@ class Core:
         (self._scene.side.appeared if rng.random() < 0.8 else self._scene.side.vanished)(token, self._scene.now)
 
     def _check(self) -> None:
-        """Check that whatever it says fits on a terminal, and into a message."""
         self._scene.take()
         lines = self._scene.side.rejects.take_lines()
         assert not self._counts["failed"], lines
@@ -155,7 +149,6 @@ class LinkedAgentScene(RealtimeAgentScene):
         self.join()
 
     def join(self) -> None:
-        """Meet the plant and the others."""
         self.side.appeared(KEYS.alive_plant(EPOCH), self.now)
         for name in NAMES[1:]:
             self.side.appeared(KEYS.alive_agent(name, INSTANCES[name]), self.now)
@@ -176,7 +169,6 @@ class Recording:
         self._keys, self._taken = [*self._endpoint.routes], 0
 
     def take(self, payload: bytes, rng: random.Random) -> str:
-        """Take bytes, record what is sound, and ask again as a recorder does."""
         counts = self._endpoint.rejects.counts
         before = counts.copy()
         now = self._taken * 0.01
@@ -207,7 +199,6 @@ class View:
         self._view.presence(plant=True, agents=NAMES, now=0.0)
 
     def take(self, payload: bytes, rng: random.Random) -> str:
-        """Take bytes on a key of those that a client hears, and make a page of them now and then."""
         keys = (KEYS.telemetry, KEYS.answer("visitor"), *(KEYS.status(name) for name in NAMES))
         now = self._taken * 0.01
         message = RunClient.read(self._client, rng.choice(keys), payload)  # type: ignore[arg-type]
@@ -240,7 +231,6 @@ class Readers:
     """Readers of what cores pass on unread, and of configurations: each has one error for bad input."""
 
     def take(self, payload: bytes, rng: random.Random) -> str:
-        """Give the bytes to one of them."""
         body = payload[:-CRC]
         text = body.decode("latin-1")
         readers: tuple[tuple[Callable[[], Any], tuple[type[Exception], ...]], ...] = (
@@ -262,7 +252,6 @@ class Readers:
 
 
 def receivers() -> dict[str, Receiver]:
-    """Return all receivers by name."""
     return {
         "codec": Codec(),
         "agent, real time": Core(RealtimeAgentScene),

@@ -13,7 +13,6 @@ THREE = ("inv1", "inv2", "inv3")
 
 @pytest.fixture(scope="session")
 def lab(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A site with agents inv1 to inv3; nobody changes it."""
     pytest.importorskip("cryptography", reason="certificates need the extra keys")
     from gridpeers.wire.trust.site_authority import issue, make_site, revoke
 
@@ -29,7 +28,6 @@ def lab(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def town(lab: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Town]:
-    """A plant and agents inv1 and inv2 with certificates; inv3 is a spare inverter, whose certificate intruders use."""
     folder = tmp_path_factory.mktemp("town")
     with Town(3, folder, keys_folder=lab, spares=("inv3",)).all() as made:
         yield made

@@ -41,7 +41,6 @@ class Intruder:
 
     @property
     def raw(self) -> Any:
-        """Zenoh's own session, for what ours does not do."""
         return self.session._session  # noqa: SLF001  # a test may say anything
 
     def __enter__(self) -> Intruder:
@@ -53,7 +52,6 @@ class Intruder:
         self.session.close()
 
     def linked(self, least: int = 2) -> Intruder:
-        """Wait until it has links: to the plant, and to others of whom gossip tells."""
         end = monotonic() + PATIENCE
         while self.session.peers() < least:
             assert monotonic() < end, f"{self.session.peers()} links after {PATIENCE:g} s"
@@ -61,7 +59,6 @@ class Intruder:
         return self
 
     def until(self, key: str, say: Callable[[], object]) -> None:
-        """Say something, again and again, until a message comes on a key."""
         end = monotonic() + PATIENCE
         while True:
             say()
@@ -70,7 +67,6 @@ class Intruder:
             assert monotonic() < end, f"nothing on {key} after {PATIENCE:g} s"
 
     def says(self, *messages: tuple[str, Message]) -> None:
-        """Publish messages on keys, in this order."""
         for key, message in messages:
             self.session.publish(key, encode(message))
 
@@ -79,12 +75,10 @@ class Unruly(Credentials, frozen=True, kw_only=True):
     """Credentials of somebody who has switched off the access rules of the own process: those of others stop him."""
 
     def zenoh_settings(self, *, star: bool) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Return the settings of links, and no access rules."""
         return super().zenoh_settings(star=star)[0], {"enabled": False}
 
 
 def credentials(folder: Path, name: str) -> Credentials:
-    """Return what a member shows, whatever its role."""
     return Unruly(**structs.asdict(open_credentials(folder, ROLES, name)[0]))
 
 
@@ -110,19 +104,3 @@ def handshake(endpoint: str, certificate: Path | None, key: Path | None = None) 
         except ConnectionResetError:
             return ""
     return ""
-
-
-def answered(endpoint: str, data: bytes) -> str:
-    """Return whether the other end closes a connection on which these bytes come: "closed", or "open" after seconds."""
-    parsed = parse_endpoint(endpoint)
-    assert parsed is not None
-    with socket.create_connection((parsed.host, parsed.port), PATIENCE) as raw:
-        try:
-            raw.sendall(data)
-            while raw.recv(65536):
-                pass
-        except TimeoutError:
-            return "open"
-        except OSError:
-            pass
-    return "closed"

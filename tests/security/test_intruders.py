@@ -13,8 +13,7 @@ from msgspec.structs import replace
 
 from gridpeers.wire.messages import Command, Measurement, Message, State
 from tests.processes.terminals import wait_for
-from tests.security.intruder import Intruder, answered, credentials, handshake
-from tests.security.recording import Recording
+from tests.security.intruder import Intruder, credentials, handshake
 from tests.toy.town import Town
 
 pytest.importorskip("cryptography", reason="certificates need the extra keys")
@@ -24,7 +23,6 @@ LIE = 12345.0
 
 
 def state_of(town: Town, name: str, seq: int = 0, sender: str = "") -> State:
-    """Return a state in the epoch of an agent, as of now, with a lie in it."""
     seen = town.t
     town.until(lambda: town.t > seen, "a newer time of the run")
     status = town.status[name]
@@ -73,7 +71,6 @@ def test_with_an_expired_certificate_nobody_gets_a_link(town: Town, lab: Path, t
 
 
 def many(state: State) -> list[State]:
-    """Return a state with many rising numbers: one alone could be too far ahead to be believed."""
     return [replace(state, seq=state.seq + k) for k in range(60)]
 
 
@@ -92,7 +89,6 @@ def attack(town: Town, intruder: Intruder, key: str, *lies: Message) -> None:
 
 
 def lies_in(town: Town) -> list[tuple[float, ...]]:
-    """Return the rows of the plant with a set-point that the intruder has sent."""
     return [row for row in town.rows if LIE in row]
 
 
@@ -124,7 +120,6 @@ def test_a_viewer_cannot_command(town: Town, lab: Path) -> None:
 
 
 def asks(intruder: Intruder, question: str, key: str, lies: Sequence[Message]) -> None:
-    """Publish lies, then query a key."""
     intruder.says(*((key, lie) for lie in lies))
     intruder.session.fetch(question)
 
@@ -174,17 +169,3 @@ def test_a_revoked_member_gets_a_link_and_nothing_on_it(town: Town, lab: Path) -
 
     assert len(town.answers) == before
     town.until(lambda: "operator:eve, whose certificate was revoked" in town.log("plant"), "the plant's line")
-
-
-def test_old_bytes_of_a_link_are_worth_nothing(town: Town, lab: Path) -> None:
-    """What an honest member sent over TLS, sent again by somebody who recorded it: the plant closes the connection."""
-    with Recording(town.endpoint) as between, Intruder(between.endpoint, credentials(lab, "operator")) as operator:
-        operator.linked(1)
-        stop = Command(sender="visitor", epoch=0, seq=1, t=0.0, verb="stop", argument="inv1", reply_to="observer")
-        operator.says((town.keys.request, stop))
-        town.until(lambda: len(between.bytes) > 2000, "a handshake and more")
-        recorded = bytes(between.bytes)
-
-    assert answered(town.endpoint, recorded) == "closed"
-    assert stop.verb.encode() not in recorded
-    assert b"gridpeers/" not in recorded

@@ -21,7 +21,6 @@ WIDE = ("**", "gridpeers/**", "gridpeers/*/*/inv1", "gridpeers/toy/measurement/*
 
 
 def overheard(town: Town, intruder: Intruder, own: str) -> set[str]:
-    """Return the keys of all that others send a curious member, until a message on one key has come."""
     heard: set[str] = set()
     inbox = intruder.session.inbox
 

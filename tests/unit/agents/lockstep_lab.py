@@ -19,7 +19,6 @@ KEYS = Keys("toy")
 
 
 def nameplate(name: str, epoch: int = 1) -> Nameplate:
-    """Nameplate of an agent of the toy."""
     return Agent(replace(agent_config(name), epoch=epoch)).nameplate
 
 
@@ -37,7 +36,6 @@ class Lab:
         self.do()
 
     def do(self) -> None:
-        """Take the actions."""
         for action in self.node.take_actions():
             if isinstance(action, Listen):
                 self.done.append(("listen", KEYS.parts(action.key)[1]))
@@ -51,35 +49,29 @@ class Lab:
                     self.decided.append(message)
 
     def hear(self, key: str, message: Message, now: float = 0.0) -> None:
-        """A message comes in."""
         self.node.received(key, encode(message), now)
         self.do()
 
     def token(self, name: str, instance: str = "", *, gone: bool = False) -> None:
-        """A token comes or goes."""
         key = KEYS.alive_agent(name, instance or name)
         (self.node.vanished if gone else self.node.appeared)(key, 0.0)
         self.do()
 
     def answer(self, name: str, instance: str = "", *, epoch: int = 1, **changes: Any) -> None:
-        """A process answers for its nameplate."""
         self.hear(KEYS.nameplate(name, instance or name), replace(nameplate(name, epoch), **changes))
 
     def meet(self, *names: str) -> None:
-        """Agents come, are met, and prove that they hear the subscription to them."""
         for name in names:
             self.token(name)
             self.answer(name)
             self.answer(name)
 
     def prepare(self, number: int, *names: str, **instances: str) -> None:
-        """A roster of inv1 and these."""
         processes = {"inv1": "me"} | {name: name for name in names} | instances
         roster, ids = tuple(processes), tuple(processes.values())
         self.hear(KEYS.control, Prepare(sender="plant", epoch=1, seq=number, t=0.0, roster=roster, instances=ids))
 
     def measure(self, k: int, t: float | None = None) -> None:
-        """The grant of tick k, at its time or another (s)."""
         t = round(0.02 * k, 9) if t is None else t
         message = Measurement(
             sender="plant", epoch=1, seq=k, t=t, to="inv1", P=5e4, Q=0.0, V=277.0, f=59.9,
@@ -88,23 +80,19 @@ class Lab:
         self.hear(KEYS.measurement("inv1"), message)
 
     def state(self, name: str, k: int, P_set: float = 5e4) -> None:
-        """A neighbour's state of tick k."""
         state = State(sender=name, epoch=1, seq=k, t=round(0.02 * k, 9), P_set=P_set, V_set=277.0, Q=0.0)
         self.hear(KEYS.state(name), state)
 
     def take(self) -> list[tuple[str, str]]:
-        """Actions since the last call."""
         done, self.done = self.done, []
         return done
 
     @property
     def missing(self) -> list[tuple[str, str]]:
-        """Missing messages: their kind and sender."""
         return [(what, who) for what, who in self.node.missing_messages()]
 
 
 def ticking(*names: str, tick: int = 0) -> Lab:
-    """An agent with these neighbours that has done the tick before this one."""
     lab = Lab()
     lab.meet(*names)
     lab.prepare(0, *names)

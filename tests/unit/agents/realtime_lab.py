@@ -36,7 +36,6 @@ class Lab:
         self.do()
 
     def do(self) -> None:
-        """Take the actions."""
         for action in self.side.take_actions():
             if isinstance(action, Publish):
                 self.published.append(decode(action.payload))
@@ -50,30 +49,25 @@ class Lab:
                 self.said.append(action.text)
 
     def token(self, name: str, instance: str = "a", *, gone: bool = False, epoch: int = 1) -> None:
-        """A token comes or goes; that of the plant has an epoch."""
         key = KEYS.alive_plant(epoch) if name == "plant" else KEYS.alive_agent(name, instance)
         (self.side.vanished if gone else self.side.appeared)(key, self.now)
         self.do()
 
     def plate(self, name: str, instance: str = "a", *, life: int = 1) -> None:
-        """Answer the query for a nameplate."""
         key = KEYS.nameplate(name, instance)
         assert key in self.fetched
         self.hear(key, replace(Agent(agent_config(name)).nameplate, epoch=life))
 
     def hear(self, key: str, message: Message) -> None:
-        """A message comes in."""
         self.side.received(key, encode(message), self.now)
         self.do()
 
     def meet(self, *names: str) -> None:
-        """Agents are there, and known."""
         for name in names:
             self.token(name)
             self.plate(name)
 
     def measure(self, k: int, **changes: Any) -> None:
-        """The plant's measurement of tick k comes in."""
         values: dict[str, Any] = dict(
             sender="plant", epoch=1, seq=k, t=round(k * T_C, 9), to="inv1", P=50e3, Q=0.0, V=277.0, f=60.0,
             P_set=50e3, V_set=277.0, grid_connected=False, island="inv1", roster=(),
@@ -81,33 +75,27 @@ class Lab:
         self.hear(KEYS.measurement("inv1"), Measurement(**values | changes))
 
     def state(self, name: str, seq: int, t: float = 0.0, **changes: Any) -> None:
-        """A neighbour's state comes in."""
         values: dict[str, Any] = dict(sender=name, epoch=1, seq=seq, t=t, P_set=80e3, V_set=277.0, Q=0.0, island="inv1")
         self.hear(KEYS.state(name), State(**values | changes))
 
     def go(self, seconds: float) -> None:
-        """Time passes; the agent is woken only now."""
         self.now += seconds + 1e-9  # sums of periods are not to fall short of their products
         self.side.expire(self.now)
         self.do()
 
     def age(self, name: str) -> float:
-        """Age (s) of a neighbour's last state."""
         return self.side.states.age(name, self.now)
 
     def decided(self) -> list[State]:
-        """States published since last asked."""
         states = [message for message in self.published if isinstance(message, State)]
         self.published = [message for message in self.published if not isinstance(message, State)]
         return states
 
     def status(self) -> AgentStatus:
-        """The latest status."""
         return [message for message in self.published if isinstance(message, AgentStatus)][-1]
 
 
 def running(*neighbours: str, **changes: Any) -> Lab:
-    """An agent that ticks, with these neighbours."""
     lab = Lab(**changes)
     lab.token("plant")
     lab.meet(*neighbours)

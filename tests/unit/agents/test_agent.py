@@ -17,7 +17,6 @@ ROSTER = ("inv1", "inv2", "inv3")
 
 
 def measurement(k: int = 0, **changes: Any) -> Measurement:
-    """Measurement of inv1 in an island at 59.7 Hz."""
     values: dict[str, Any] = {
         "sender": "plant",
         "epoch": 1,
@@ -38,17 +37,14 @@ def measurement(k: int = 0, **changes: Any) -> Measurement:
 
 
 def state(sender: str, k: int = 0, *, P_set: float = 60e3, Q: float = 10e3, epoch: int = 1) -> State:
-    """State of a neighbour."""
     return State(sender=sender, epoch=epoch, seq=k, t=0.02 * k, P_set=P_set, V_set=277.0, Q=Q)
 
 
 def plate(name: str, *, epoch: int = 1, P_rated: float = 100e3) -> Nameplate:
-    """Nameplate of one of the toy's inverters."""
     return replace(Agent(agent_config(name)).nameplate, epoch=epoch, P_rated=P_rated)
 
 
 def met(control: Control = ALL_FULL, name: str = "inv1") -> Agent:
-    """An agent that has seen everybody's nameplate."""
     agent = Agent(agent_config(name, control))
     for other in ROSTER:
         if other != name:
@@ -104,16 +100,6 @@ def test_only_who_takes_part_moves(secondary: Any, name: str, moves: bool) -> No
     decided = agent.tick(measurement(0))
 
     assert ((decided.P_set, decided.V_set) != (50e3, 277.0)) == moves
-
-
-def test_another_life_of_a_name_begins_anew() -> None:
-    """After a restart the new nameplate counts, and the last state of the life before is forgotten, later or not."""
-    for life in (2, 0):
-        agent, fresh = met(), met()
-        agent.hear(state("inv2", 7))
-        agent.meet(plate("inv2", epoch=life))
-
-        assert agent.tick(measurement(8), ("inv2",)) == fresh.tick(measurement(8), ("inv2",))
 
 
 def test_out_of_service_an_agent_stands_still_and_begins_again_from_what_the_plant_holds() -> None:

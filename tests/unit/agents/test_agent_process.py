@@ -38,11 +38,9 @@ class Played:
         self._plant_is_there = True
 
     def __getattr__(self, name: str) -> Callable[..., Any]:
-        """Do nothing with keys and tokens."""
         return lambda *words: ()
 
     def take(self, needed: int, timeout: float | None) -> list[Stamped]:
-        """Return the next event."""
         event = self._events.pop(0) if self._events else ("word", "over", b"", monotonic())
         if isinstance(event, BaseException):
             raise event
@@ -50,7 +48,6 @@ class Played:
         return [event]
 
     def publish(self, key: str, payload: bytes) -> None:
-        """Have the plant, if it is there, acknowledge that the agent leaves."""
         if key == LEAVE and self._plant_is_there:
             self.left += 1
             stop = encode(Stop(sender="plant", epoch=1, seq=0, t=0.0, reason="it has left"))
@@ -58,7 +55,6 @@ class Played:
 
 
 def ended(*events: Stamped | BaseException) -> Played:
-    """The session of an agent that was asked to end."""
     agent = RealtimeAgent(replace(agent_config("inv1"), clock="wall"), "me")
     session = Played(("appeared", PLANT_TOKEN, b"", monotonic()), *events)
     with pytest.raises(StoppedError):
@@ -100,19 +96,3 @@ def test_a_session_in_place_of_a_broken_one_is_tried_again(
     with pytest.raises(SessionError, match="inv1: no key"):
         _opened(agent_config("inv1"), None, again=False)
     assert len(opened) == 1
-
-
-def test_a_session_that_cannot_be_opened_again_ends_the_agent(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It does not try for ever: whoever has started it learns that the agent is gone, and why."""
-    clock = [0.0]
-
-    def refusing(name: str, **words: Any) -> str:
-        raise SessionError(f"{name}: no key")
-
-    monkeypatch.setattr(agent_process, "monotonic", lambda: clock[0])
-    monkeypatch.setattr(agent_process, "sleep", lambda s: clock.__setitem__(0, clock[0] + s))
-    monkeypatch.setattr(agent_process, "Session", refusing)
-
-    with pytest.raises(SessionError, match="inv1: no key"):
-        _opened(agent_config("inv1"), None, again=True)
-    assert 59.0 <= clock[0] <= 61.0

@@ -29,19 +29,15 @@ class Deciding:
         self.journal = DecisionJournal(cast(Agent, self), JournalBuffer())
 
     def shares_island(self, name: str) -> bool:
-        """Whether a neighbour is in its island."""
         return name in self.here
 
     def hear(self, number: int, *names: str) -> None:
-        """States of this number were heard."""
         self.heard |= {name: SimpleNamespace(seq=number) for name in names}
 
     def use(self, *names: str, weight: float = 1.0) -> None:
-        """These are in the sums."""
         self.around = [SimpleNamespace(name=name, weight=weight) for name in names]
 
     def noted(self) -> list[Decision]:
-        """Entries since last asked."""
         entries = [entry for part in self.journal.journal.take_parts() for entry in entries_of(part)]
         return [entry for entry in entries if isinstance(entry, Decision)]
 
@@ -69,21 +65,6 @@ def test_in_ticks_each_change_is_noted(what: str) -> None:
         agent.saturated,
         list(names),
     )
-
-
-def test_in_ticks_each_reason_is_its_own() -> None:
-    """Nothing was heard of the one, the other's state is stale, the third is in another island."""
-    agent = Deciding()
-    agent.hear(4, "inv2")
-    agent.hear(1, "inv4", "inv5")
-    agent.here -= {"inv5"}
-    agent.use("inv2")
-
-    agent.journal.tick(5, 0, NEIGHBOURS)
-
-    (entry,) = agent.noted()
-    assert entry.states == [1, None, 4, 4]
-    assert entry.unused == ["", "silent", "stale", "island"]
 
 
 def test_in_real_time_each_decision_is_noted_with_its_reasons() -> None:

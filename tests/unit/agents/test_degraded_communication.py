@@ -13,12 +13,10 @@ from msgspec.structs import replace
 from gridpeers.agents.agent import Agent
 from gridpeers.agents.agent_config import Control, DegradedCommunication, Gains
 from gridpeers.agents.degraded_communication import IslandDetector, SaturationDetector
-from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.sweep.sweep_case import run_one
-from gridpeers.wire.codec import decode, encode
+from gridpeers.wire.codec import encode
 from gridpeers.wire.messages import Measurement, State
-from gridpeers.wire.node import Publish
 from tests.toy.toy_configs import agent_config
 
 T, M_P, M_Q, ALPHA = 0.02, 0.01, 0.05, 1.0
@@ -27,7 +25,6 @@ ROSTER = ("inv1", "inv2", "inv3")
 
 
 def agent(name: str = "inv1", **degraded_communication: Any) -> Agent:
-    """An agent of the toy that knows the two others; inv1 is a leader."""
     control = Control(
         secondary="all", graph="full", degraded_communication=DegradedCommunication(**degraded_communication)
     )
@@ -38,12 +35,10 @@ def agent(name: str = "inv1", **degraded_communication: Any) -> Agent:
 
 
 def state(sender: str, k: int, *, P_set: float = 80e3, Q: float = 10e3) -> State:
-    """State of a neighbour at tick k."""
     return State(sender=sender, epoch=1, seq=k, t=T * k, P_set=P_set, V_set=277.0, Q=Q)
 
 
 def measured(k: int, **changes: Any) -> Measurement:
-    """Measurement in an island at nominal frequency and voltage, on the droop characteristic."""
     values: dict[str, Any] = dict(
         sender="plant", epoch=1, seq=k, t=T * k, to="inv1", P=50e3, Q=0.0, V=277.0, f=60.0, P_set=50e3,
         V_set=277.0, grid_connected=False, island="", roster=ROSTER,
@@ -52,7 +47,6 @@ def measured(k: int, **changes: Any) -> Measurement:
 
 
 def moved(P_set: float, P_bar: float, rate: float) -> float:
-    """P_set (pu) a tick later, at nominal frequency, where `rate` (1/s) is gain times the sum of weights."""
     return P_set + 0.5 * (1.0 - exp(-2.0 * rate * T)) * (P_bar - P_set)
 
 
@@ -106,7 +100,6 @@ def test_degree_normalised_weights_have_a_gain_of_their_own() -> None:
 
 
 def overloaded(ticks: int, **degraded_communication: Any) -> list[float]:
-    """P_set (pu) of a lone leader that gives 0.9 pu and not more, at 59.88 Hz."""
     it = agent(**degraded_communication)
     P_set, held = [], 90e3
     for k in range(ticks):
@@ -154,25 +147,6 @@ def test_a_slow_inverter_is_not_saturated(lag: float, up: bool) -> None:
 
     assert {follows.saturated_side(float(sign), y, k * T) for k, y in enumerate(does)} == {0}
     assert [follows.saturated_side(2.0 * sign, does[-1], (300 + k) * T) for k in range(27)] == [0] * 25 + [sign] * 2
-
-
-@pytest.mark.parametrize(("max_age", "pulls"), [(0.0, False), (0.5, True)])
-def test_in_wall_clock_time_the_age_is_that_on_the_own_clock(max_age: float, pulls: bool) -> None:
-    """A state that came 0.3 s ago is out by default, and counts where max_age is more; its own time is no matter."""
-    control = Control(secondary="all", graph="full", degraded_communication=DegradedCommunication(max_age=max_age))
-    side = RealtimeAgent(replace(agent_config("inv1", control), clock="wall"), "me")
-    keys = side.keys
-    side.start(0.0)
-    side.appeared(keys.alive_plant(1), 0.0)
-    side.appeared(keys.alive_agent("inv2", "a"), 0.0)
-    side.received(keys.nameplate("inv2", "a"), encode(Agent(agent_config("inv2")).nameplate), 0.0)
-    side.received(keys.state("inv2"), encode(state("inv2", 0)), 0.0)
-    side.received(keys.measurement("inv1"), encode(measured(0)), 0.2)
-    side.expire(0.3)
-
-    published = [action for action in side.take_actions() if isinstance(action, Publish)]
-    decided = [decode(action.payload) for action in published if action.key == keys.state("inv1")]
-    assert [message.P_set > 50e3 for message in decided if isinstance(message, State)] == [pulls]
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,6 @@ T, F_NOM, SLIP_MAX = 0.02, 60.0, 0.01
 
 
 def pair(slip_max: float = SLIP_MAX) -> tuple[IslandDetector, IslandDetector]:
-    """One inverter and its neighbour."""
     return IslandDetector(F_NOM, slip_max), IslandDetector(F_NOM, slip_max)
 
 
@@ -67,21 +66,3 @@ def test_whoever_was_apart_is_tried_again_ever_more_rarely() -> None:
     gaps = [b - a for a, b in pairwise(left)]
     assert gaps[:7] == pytest.approx([10, 20, 40, 80, 160, 320, 600], abs=1.0)
     assert gaps[-1] == pytest.approx(LONGEST_RETRY, abs=1.0)
-
-
-def test_nothing_is_known_of_whom_nothing_was_heard_and_on_the_grid() -> None:
-    """A neighbour without angle, one that was forgotten, and all at a restart: none of them is left out."""
-    here, there = pair()
-    for k in range(100):
-        here.sensed(k * T, 60.0)
-        there.sensed(k * T, 60.1)
-        for name, angle in (("inv4", there.angle), ("inv5", there.angle), ("inv6", None)):
-            here.heard(name, k * T, angle)
-    before = [here.apart(name, 2.0) for name in ("inv4", "inv5", "inv6", "inv7")]
-    here.forget("inv4")
-    after = here.apart("inv4", 2.0), here.apart("inv5", 2.0)
-    here.restart()
-
-    assert before == [True, True, False, False]
-    assert after == (False, True)
-    assert not here.apart("inv5", 2.0)

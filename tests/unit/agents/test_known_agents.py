@@ -17,12 +17,10 @@ RING = Control(secondary="all", graph="ring")
 
 
 def roster(number: int, *names: str) -> Prepare:
-    """A roster whose processes have the names of the inverters."""
     return Prepare(sender="plant", epoch=1, seq=number, t=0.0, roster=names, instances=names)
 
 
 def introduced(*names: str) -> KnownAgents:
-    """Agents on a ring that share what they know."""
     known = KnownAgents(RING)
     for name in names:
         known.introduce(name, name, Agent(agent_config(name, RING)).nameplate)

@@ -31,12 +31,10 @@ class Unshown:
 
 
 def shares(shared: Any) -> SetPoints:
-    """A decision with these values for the neighbours."""
     return SetPoints(0.5, 1.0, shared)
 
 
 def raises(error: BaseException) -> Any:
-    """Raise it."""
     raise error
 
 

@@ -27,7 +27,6 @@ VARIANTS: dict[str, tuple[dict[str, float | str], ...]] = {
 
 @st.composite
 def owns(draw: st.DrawFn) -> Own:
-    """An inverter at any plausible point, saturated or not."""
     m_q = draw(st.floats(0.01, 0.1))
     Q = draw(st.floats(-1.0, 1.0))
     return Own(
@@ -40,7 +39,6 @@ def owns(draw: st.DrawFn) -> Own:
 
 @st.composite
 def neighbours(draw: st.DrawFn, name: str) -> Neighbour:
-    """A neighbour at any plausible point, which shares what a centre does, or nothing."""
     shared = draw(
         st.sampled_from(({}, {"V": 1.02}, {"omega": 0.006, "E": 0.01}, {"V": 0.97, "omega": -0.001, "E": -0.02}))
     )
@@ -54,7 +52,6 @@ def neighbours(draw: st.DrawFn, name: str) -> Neighbour:
 
 @st.composite
 def inputs(draw: st.DrawFn) -> tuple[Own, tuple[Neighbour, ...], float]:
-    """What a law is called with."""
     count = draw(st.integers(0, 4))
     return draw(owns()), tuple(draw(neighbours(f"inv{k + 2}")) for k in range(count)), draw(st.floats(1e-3, 0.1))
 

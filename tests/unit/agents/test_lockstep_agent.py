@@ -8,13 +8,11 @@ from itertools import permutations
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from msgspec.structs import replace
 
 from gridpeers.agents.agent import Agent
 from gridpeers.agents.agent_config import Control, GraphRule
-from gridpeers.wire.messages import State
 from tests.toy.toy_configs import agent_config
-from tests.unit.agents.lockstep_lab import KEYS, Lab, nameplate, ticking
+from tests.unit.agents.lockstep_lab import Lab, nameplate, ticking
 
 NAMES = ("inv1", "inv2", "inv3", "inv4")
 
@@ -49,30 +47,6 @@ def test_a_prepare_that_comes_again_is_answered_again() -> None:
     assert lab.node.rejects.counts == {}
     lab.measure(0)
     assert [state.seq for state in lab.decided] == [0]
-
-
-def test_a_lost_nameplate_is_asked_for_again_when_the_prepare_comes_again() -> None:
-    """First as a nameplate, then as the proof of a subscription; not while answers still come."""
-    lab = Lab()
-    lab.token("inv2")
-    lab.token("inv3")
-    lab.prepare(0, "inv2", "inv3")
-    lab.take()
-    lab.answer("inv3")
-    lab.take()
-    lab.prepare(0, "inv2", "inv3")
-    assert lab.take() == []
-
-    lab.prepare(0, "inv2", "inv3")
-    assert lab.take() == [("ask", "inv2")]
-    lab.answer("inv2")
-    lab.answer("inv3")
-    lab.take()
-    lab.prepare(0, "inv2", "inv3")
-    lab.prepare(0, "inv2", "inv3")
-    assert lab.take() == [("ask", "inv2")]
-    lab.answer("inv2")
-    assert lab.take() == [("ready", "0")]
 
 
 @pytest.mark.parametrize(
@@ -208,30 +182,6 @@ def test_a_first_measurement_whose_time_is_not_that_of_its_tick_is_refused() -> 
     assert lab.node.rejects.counts == {"implausible": 1}
     lab.measure(25, t=0.5)
     assert [state.seq for state in lab.decided] == [25]
-
-
-@pytest.mark.parametrize("granted", [False, True])
-def test_a_state_is_checked_alike_before_and_after_the_measurement(granted: bool) -> None:
-    """The shorter way of a state that comes before has the checks of the usual one: sender, epoch, number, idle."""
-    lab = ticking("inv2", "inv3", tick=5)
-    if granted:
-        lab.measure(5)
-    right = State(sender="inv2", epoch=1, seq=4, t=0.08, P_set=5e4, V_set=277.0, Q=0.0)
-    lab.hear(KEYS.state("inv2"), replace(right, sender="inv3"))
-    lab.hear(KEYS.state("inv2"), replace(right, epoch=2))
-    assert lab.node.rejects.counts == {"foreign": 1, "ghost": 1}
-
-    lab.hear(KEYS.state("inv2"), right)
-    lab.hear(KEYS.state("inv2"), replace(right, P_set=9e4))  # its number again
-    lab.hear(KEYS.state("inv3"), replace(right, sender="inv3", P_set=9e4, idle=True))
-    if not granted:
-        lab.measure(5)
-    (state,) = lab.decided
-
-    alone = ticking("inv2", tick=5)
-    alone.state("inv2", 4)
-    alone.measure(5)
-    assert state == alone.decided[0]
 
 
 def test_a_state_of_a_later_tick_is_left_alone() -> None:

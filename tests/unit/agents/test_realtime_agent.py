@@ -6,7 +6,6 @@ import pytest
 from msgspec.structs import replace
 
 from gridpeers.wire.messages import Leave, Stop
-from gridpeers.wire.node import MOST_PLANTS
 from tests.unit.agents.realtime_lab import KEYS, T_C, Lab, running
 
 
@@ -200,23 +199,6 @@ def test_a_nameplate_that_does_not_come_is_asked_for_again() -> None:
     assert lab.listened == [KEYS.state("inv2")]
 
 
-def test_nobody_but_the_plant_that_is_followed_stops_an_agent() -> None:
-    """A ghost's Stop, or one in an epoch that no token has, is dropped under either key."""
-    lab = running()
-    for key in (KEYS.control, KEYS.stop_request("inv1", "me")):
-        for epoch in (0, 2):
-            lab.hear(key, Stop(sender="plant", epoch=epoch, seq=0, t=0.0, reason="enough", refused=True))
-        lab.hear(key, Stop(sender="inv2", epoch=1, seq=0, t=0.0, reason="enough", refused=True))
-    lab.go(T_C)
-
-    assert not lab.side.finished
-    assert lab.side.rejects.counts == {
-        "ghost": 4,
-        "foreign": 2,
-    }
-    assert len(lab.decided()) == 1
-
-
 def test_a_message_on_which_the_agent_fails_costs_only_itself() -> None:
     """The last line of defence: an error of ours is counted and logged once, with its traceback; the agent goes on."""
     lab = running("inv2")
@@ -237,19 +219,3 @@ def test_a_message_on_which_the_agent_fails_costs_only_itself() -> None:
     assert "in broken" in line
     assert "\x1b" not in line
     assert len(lab.decided()) == 1
-
-
-def test_the_plant_that_is_followed_stays_whoever_else_claims_to_be_one() -> None:
-    """A bounded number of others is noted, the rest counted; the run goes on, and ends with its own plant's token."""
-    lab = running("inv2")
-    for epoch in range(1_000, 2_000):
-        lab.side.appeared(KEYS.alive_plant(epoch), lab.now)
-    noted = [epoch for epoch in range(1_000, 2_000) if lab.side.is_noted(KEYS.alive_plant(epoch))]
-    lab.measure(1)
-    lab.go(T_C)
-
-    assert len(noted) == MOST_PLANTS - 1
-    assert lab.side.rejects.counts == {"excess": 1_000 - len(noted)}
-    assert lab.side.phase == "running"
-    lab.token("plant", gone=True)
-    assert lab.side.phase == "waiting"

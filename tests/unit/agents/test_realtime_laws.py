@@ -13,11 +13,9 @@ class Quiet(Law):
     """Counts up, and tells nobody after the first step; shares its count."""
 
     def start(self, own: Own) -> None:
-        """Count from zero."""
         self.steps = 0
 
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
-        """Count."""
         self.steps += 1
         return SetPoints(0.5, 1.0, {"steps": float(self.steps)}, send=self.steps == 1)
 
@@ -26,11 +24,9 @@ class Divides(Law):
     """Fails at its second step."""
 
     def start(self, own: Own) -> None:
-        """Count from zero."""
         self.steps = 0
 
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
-        """Divide by what is left."""
         self.steps += 1
         return SetPoints(0.5 / (2 - self.steps), 1.0)
 
@@ -68,7 +64,7 @@ def test_a_law_that_fails_is_told_once_and_the_agent_says_nothing_more() -> None
 
     step = "step at t = 0.02 s raised ZeroDivisionError: float division by zero"
     assert [state.idle for state in said] == [True]
-    assert said[0].fault == f"law consensus (test_realtime_laws.py:35): {step}"
+    assert said[0].fault == f"law consensus (test_realtime_laws.py:31): {step}"
     assert lab.said[-1].startswith(f"inv1: {said[0].fault}")
     assert not lab.side.finished
     assert not lab.side.session_broken

@@ -19,23 +19,19 @@ T = 0.02
 
 
 def own(P_set: float = 0.5, Q: float = 0.0, *, t: float = 1.0, e: float = 0.0, name: str = "inv1") -> Own:
-    """A follower."""
     return Own(name, False, t, P_set, Q, 1.0, e, 0.05 * Q, P_set, 1.0, 0.01, 0.05, 6e5, 277.0, 60.0)
 
 
 def neighbour(name: str, P_set: float = 0.5, Q: float = 0.0) -> Neighbour:
-    """A neighbour with these values."""
     return Neighbour(name, False, T, 1.0, P_set, 1.0, Q, 0.01, 0.05, 6e5)
 
 
 def graph_of(rng: np.random.Generator, n: int, links: float) -> np.ndarray:
-    """A random undirected graph."""
     A = np.triu(rng.random((n, n)) < links, 1).astype(float)
     return np.asarray(A + A.T)
 
 
 def spread_after(A: np.ndarray, start: np.ndarray, liars: set[int], F: int, said: np.ndarray) -> list[np.ndarray]:
-    """Return P_set of all honest agents, step by step; liar i says said[k, i, j] to agent j at step k."""
     n = len(A)
     laws = [Resilient(F=F) for _ in range(n)]
     P = start.copy()
@@ -115,18 +111,6 @@ def test_a_rate_limit_holds_back_what_jumps() -> None:
     assert fast > slow
 
 
-def test_asking_why_changes_nothing() -> None:
-    """Terms may be asked for at any time: trust ages by steps alone."""
-    asked, law = (Resilient(F=0, tolerance=0.1, T_out=0.2) for _ in range(2))
-    for k in range(5):
-        for each in (asked, law):
-            each.step(own(t=k * T), [neighbour("a", 5.0)], T)
-        asked.terms(own(t=k * T), [neighbour("a", 5.0)], T)
-
-    later = own(t=5 * T), [neighbour("a", 0.6)], T
-    assert asked.step(*later) == law.step(*later)
-
-
 def test_who_is_implausible_ages_out_and_comes_back_slowly() -> None:
     """After three times T_out its weight is e^-3; a start forgets it."""
     law, T_out = Resilient(F=0, tolerance=0.1, T_out=0.2), 0.2
@@ -141,12 +125,6 @@ def test_who_is_implausible_ages_out_and_comes_back_slowly() -> None:
     assert weighed < 0.1 * full
     law.start(own())
     assert law.step(own(t=1.0), [neighbour("a", 0.6)], T).P_set - 0.5 == pytest.approx(full)
-
-
-def test_distrust_without_a_tolerance_is_refused() -> None:
-    """Nobody would ever be implausible, so that T_out did nothing."""
-    with pytest.raises(ValueError, match=r"has T_out = 0\.5 s and no tolerance, so that nobody is ever implausible"):
-        Resilient(T_out=0.5, rate=1.0)
 
 
 def test_why_names_the_trimmed_and_the_implausible() -> None:

@@ -11,7 +11,6 @@ NAMES = tuple(f"inv{i}" for i in range(1, 10))
 
 
 def lasted(own: str, silent: tuple[str, ...], names: tuple[str, ...] = NAMES) -> float:
-    """Time (s) after which an agent gives its session up, of which some senders never say anything."""
     health = SessionHealth(own)
     others = tuple(name for name in names if name != own)
     for k in range(2000):

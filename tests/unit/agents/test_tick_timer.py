@@ -11,7 +11,6 @@ T = 0.020
 
 
 def phases(timer: TickTimer, first: float, count: int, *, drift: float = 0.0, jitter: float = 0.0) -> list[float]:
-    """Where between two measurements each of so many ticks is (periods); the first measurement comes at `first`."""
     rng, seen, k = random.Random(1), [], 0
     at = first
     while len(seen) < count:

@@ -7,7 +7,6 @@ from gridpeers.wire.journal import LOT, ROOM, Entry, Exchange, JournalBuffer, Pr
 
 
 def read(parts: list[bytes]) -> list[Entry]:
-    """Return the entries of all parts."""
     return [entry for part in parts for entry in entries_of(part)]
 
 

@@ -27,50 +27,39 @@ class Node:
 
     @property
     def subscriptions(self) -> tuple[str, ...]:
-        """Keys of the routes."""
         return tuple(self.routes)
 
     def note_siblings(self, names: frozenset[str]) -> None:
-        """Keep them."""
         self.siblings = names
 
     def start(self, now: float) -> None:
-        """Count."""
         self.starts += 1
         self.session_broken = False
 
     def take_actions(self) -> list[Action | Log]:
-        """Take out what the test put in."""
         actions, self.to_do = self.to_do, []
         return actions
 
     def appeared(self, key: str, now: float) -> None:
-        """Keep the token."""
         self.known.add(key)
 
     def vanished(self, key: str, now: float) -> None:
-        """Drop the token."""
         self.known.discard(key)
 
     def is_noted(self, key: str) -> bool:
-        """Whether it knows the token."""
         return key in self.known
 
     def received(self, key: str, payload: bytes, now: float) -> None:
-        """Keep the message."""
         self.heard.append((key, payload))
 
     def work(self, now: float) -> bool:
-        """Have nothing to do."""
         return False
 
     def expire(self, now: float) -> None:
-        """Finish."""
         self.finished = True
 
 
 def group(*nodes: Node) -> NodeGroup:
-    """A started group."""
     made = NodeGroup(nodes)
     made.start(0.0)
     assert made.subscriptions == tuple(dict.fromkeys(key for node in nodes for key in node.routes))
@@ -112,22 +101,6 @@ def test_a_query_is_shared_unless_a_subscription_was_declared_in_between() -> No
     b.to_do = [Fetch("nameplate/c")]
     assert both.take_actions() == []
     assert len(b.heard) == 3
-
-
-def test_a_node_that_asks_again_has_a_query_of_its_own() -> None:
-    """The answer to the first is lost; another node that asks again shares the second query."""
-    first, second = Node("inv1"), Node("inv2")
-    made = group(first, second)
-    for node in (first, second):
-        node.to_do = [Fetch("nameplate/inv9")]
-    assert len(made.take_actions()) == 1
-    for node in (first, second):
-        node.to_do = [Fetch("nameplate/inv9")]
-    (again,) = made.take_actions()
-    assert isinstance(again, Fetch)
-    made.received(again.reply_key, b"I am inv9", 1.0)
-
-    assert first.heard == second.heard == [("nameplate/inv9", b"I am inv9")]
 
 
 def test_nodes_inside_meet_without_the_session() -> None:

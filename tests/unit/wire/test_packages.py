@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import subprocess
 import sys
 from pathlib import Path
 
@@ -10,7 +9,6 @@ from gridpeers.wire.wording import not_importable
 
 
 def error_of(folder: Path, statement: str) -> ImportError:
-    """Return the error of an import in a module of ours."""
     file = folder / "module_of_ours.py"
     file.write_text(statement)
     with pytest.raises(ImportError) as caught:
@@ -55,16 +53,3 @@ def test_a_package_that_does_not_load_is_named_with_its_reason(
 
     assert said.startswith(f"broken_package is installed, but cannot be imported ({reason}")
     assert said.endswith("gridpeers needs it: pip install --force-reinstall broken_package")
-
-
-@pytest.mark.parametrize("package", ["typer", "msgspec"])
-def test_a_command_without_a_package_that_it_starts_with_ends_in_one_line(package: str) -> None:
-    """The command line itself, or the checks of a scenario, cannot be imported."""
-    code = f"import sys; sys.modules['{package}'] = None; sys.argv = ['gridpeers', 'check', 'islanding']\n"
-    code += "from gridpeers.cli.app import main; main()"
-
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
-
-    assert done.returncode == 2
-    assert done.stderr.startswith(f"gridpeers: {package} is not installed; gridpeers needs it: pip install '{package}")
-    assert done.stderr.count("\n") == 1

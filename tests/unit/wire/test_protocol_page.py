@@ -30,7 +30,6 @@ NEEDED = (Nameplate, Ready, State, Leave, LinkAcknowledgement, Prepare, Measurem
 
 
 def words(text: str) -> set[str]:
-    """Words in backticks, without blocks of code."""
     return set(re.findall(r"`([^`]+)`", re.sub(r"```.*?```", "", text, flags=re.DOTALL)))
 
 

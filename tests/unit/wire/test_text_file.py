@@ -60,10 +60,3 @@ def test_a_number_with_two_meanings_is_refused_in_one_line(rows: str, said: str)
     """1,500 is 1.5 in Germany and 1500 in England; a wrong load would be silent."""
     with pytest.raises(TextFileError, match=said):
         read_table_text(f"bus;kW\n{rows}\n".encode(), ["bus", "kW"], ["kW"])
-
-
-def test_empty_rows_and_columns_of_a_spreadsheet_are_left_out() -> None:
-    """Excel writes cells that once had something: rows of separators, and columns without a name."""
-    data = b"\n,,,\nbus,kW,,\n48,1,,\n,,,\n49,2\n,,,\n,,,\n"
-
-    assert read_table_text(data, ["bus", "kW"], ["kW"]) == (["bus", "kW"], [(4, ["48", "1"]), (6, ["49", "2"])])

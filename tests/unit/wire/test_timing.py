@@ -12,21 +12,9 @@ from gridpeers.wire.timing import STOOD_STILL, RateLimit, TickBarrier
 
 
 def barrier() -> TickBarrier:
-    """One that waits for two states since t = 5 s, at most 10 s."""
     made = TickBarrier("plant", 10.0)
     made.wait_for({"inv1": "State(4)", "inv2": "State(4)"}, now=5.0)
     return made
-
-
-def test_the_deadline_counts_from_the_last_progress() -> None:
-    """A rest has none."""
-    made = barrier()
-    until = [made.deadline]
-    made.renew(7.0)
-    until.append(made.deadline)
-    made.rest()
-
-    assert [*until, made.deadline] == [15.0, 17.0, None]
 
 
 def test_the_complaint_names_what_and_whom_and_the_last_sign_of_life() -> None:
@@ -55,7 +43,6 @@ def test_who_looks_long_after_the_deadline_has_stood_still_itself() -> None:
 
 
 def counted(lines: list[str]) -> int:
-    """Lines that were said and those that they tell of."""
     left = sum(int(found[1]) for line in lines if (found := re.search(r"(\d+) more of this kind", line)))
     return left + sum(not line[0].isdigit() for line in lines)
 

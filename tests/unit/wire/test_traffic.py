@@ -33,12 +33,10 @@ NOISE = b"\x00" * (SHOWN_PAYLOAD + 7)
 
 
 def noted(journal: JournalBuffer) -> list[Entry]:
-    """Entries since last asked."""
     return [entry for part in journal.take_parts() for entry in entries_of(part)]
 
 
 def timed(**options: Any) -> tuple[TimedTraffic, JournalBuffer]:
-    """Traffic of a node in real time, and its journal."""
     journal = JournalBuffer()
     return TimedTraffic(KEYS, journal, **options), journal
 

@@ -25,10 +25,3 @@ def test_a_program_that_is_not_found_by_its_name_has_its_path(tmp_path: Path, mo
     assert command_line("run", "a b") == "gridpeers run 'a b'"
     monkeypatch.setattr(sys, "argv", ["/somewhere/notebook.py"])
     assert command_line("down") == "gridpeers down"
-
-
-def test_a_module_that_python_runs_is_run_so_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    """`python -m gridpeers` prints commands with the same python, as no program gridpeers need be there."""
-    monkeypatch.setattr(sys, "argv", ["/somewhere/gridpeers/__main__.py"])
-
-    assert command_line("down") == f"{sys.executable} -m gridpeers down"

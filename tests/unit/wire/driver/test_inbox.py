@@ -15,17 +15,14 @@ LONG = bytes(LONGEST_MESSAGE)
 
 
 def state(epoch: int, seq: int = 0) -> bytes:
-    """Bytes of a state of inv2."""
     return encode(State(sender="inv2", epoch=epoch, seq=seq, t=0.0, P_set=0.0, V_set=0.0, Q=0.0))
 
 
 def of_inv2(key: str, payload: bytes) -> bool:
-    """Whether a message is of the process of inv2 that is believed."""
     return is_marked(payload, "inv2", 7)
 
 
 def events(inbox: Inbox) -> list[tuple[str, str]]:
-    """Kind and key of all that waits."""
     return [(kind, key) for kind, key, _, _ in inbox.take(1, 0.0)]
 
 
@@ -71,21 +68,6 @@ def test_a_known_sender_that_floods_has_its_own_room_and_no_more() -> None:
 
     assert keys.count("state/inv2") == ROOM + MOST_OF_ONE
     assert keys.count("set_points/inv2") == 1
-
-
-def test_long_messages_are_bounded_by_their_bytes() -> None:
-    """Strangers have a quarter of the room, the known ones the rest; once taken out, there is room again."""
-    inbox = Inbox()
-    inbox.is_known = lambda key, payload: key == "telemetry"
-    for key in ("command", "telemetry"):
-        for _ in range(2 * BYTES // LONGEST_MESSAGE):
-            inbox.put(("message", key, LONG))
-    taken = inbox.take(1, 0.0)
-    inbox.put(("message", "command", LONG))
-
-    assert BYTES - LONGEST_MESSAGE <= sum(len(payload) for _, _, payload, _ in taken) <= BYTES
-    assert sum(key == "command" for _, key, _, _ in taken) == BYTES // 4 // LONGEST_MESSAGE
-    assert len(inbox.take(1, 0.0)) == 1
 
 
 def test_in_simulated_time_no_message_of_a_known_sender_is_lost() -> None:

@@ -13,7 +13,6 @@ with_policies = pytest.mark.skipif(not hasattr(os, "SCHED_BATCH"), reason="this 
 
 
 def policies(before: int) -> tuple[int, int]:
-    """Policy of a thread that had one before, and of a thread that it starts."""
     found: list[int] = []
 
     def thread() -> None:

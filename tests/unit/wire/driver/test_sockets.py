@@ -59,7 +59,6 @@ ZENOH = struct.pack("ii", 1, 10)
 
 @pytest.fixture
 def pair() -> Iterator[tuple[socket.socket, socket.socket]]:
-    """Both ends of a connection."""
     with ExitStack() as stack:
         server = stack.enter_context(socket.create_server(("127.0.0.1", 0)))
         link = stack.enter_context(socket.create_connection(server.getsockname()))
@@ -90,7 +89,6 @@ def test_a_connection_that_is_not_zenohs_stays(pair: tuple[socket.socket, socket
 
 
 def lingers(connection: socket.socket) -> bool:
-    """Whether closing it may block."""
     return struct.unpack("ii", connection.getsockopt(socket.SOL_SOCKET, socket.SO_LINGER, 8))[0] != 0
 
 

@@ -12,7 +12,6 @@ from gridpeers.wire.plugins.plugin import Plugin, made, plugin_problems
 
 @pytest.fixture
 def entry_points(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Two entry points in the group of graphs, one of which leads nowhere."""
     points = (
         metadata.EntryPoint("round", "gridpeers.agents.graphs:ring", "gridpeers.graphs"),
         metadata.EntryPoint("broken", "gridpeers.agents.graphs:nowhere", "gridpeers.graphs"),
