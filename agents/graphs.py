@@ -233,13 +233,3 @@ def without_missing(control: Control, name: str, heard: tuple[str, ...]) -> tupl
     """Return an agent's in-neighbours by the rule without those whose links to it the case takes out."""
     missing = {pair[0] if pair[1] == name else pair[1] for pair in control.without if name in pair}
     return tuple(other for other in heard if other not in missing) if missing else heard
-
-
-def adjacency(control: Control, members: Mapping[str, Member]) -> list[list[float]]:
-    """Return the adjacency matrix c_ij (1): row i is the receiver, in the order of `members`."""
-    names = list(members)
-    rows = []
-    for name in names:
-        heard = set(in_neighbours(control, name, members))
-        rows.append([1.0 if other in heard else 0.0 for other in names])
-    return rows

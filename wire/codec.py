@@ -55,8 +55,7 @@ _decoder: msgspec.msgpack.Decoder[AnyMessage] = msgspec.msgpack.Decoder(AnyMessa
 class RejectedError(Exception):
     def __init__(self, kind: str, text: str) -> None:
         super().__init__(text)
-        self.kind = kind
-        self.text = text
+        self.kind, self.text = kind, text
 
 
 def encode(message: Message) -> bytes:
@@ -167,11 +166,7 @@ T = TypeVar("T")
 
 
 def decode_foreign(decode: Callable[[Text], T], data: Text) -> T:
-    """Return the value that bytes or a text encode; raise `msgspec.DecodeError` in one printable line if there is none.
-
-    msgspec itself has other errors for a text that is no UTF-8 and for brackets a thousand deep, and repeats the name
-    of a field that it does not know as it came.
-    """
+    """Return the value of bytes or a text; raise `msgspec.DecodeError` in one printable line if there is none."""
     try:
         return decode(data)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:

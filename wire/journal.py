@@ -263,12 +263,6 @@ def sender_of(key: str) -> str:
 
 
 def stream_of(key: str) -> str:
-    """Return the stream to which measurements or states on a key belong: all states of an agent are one.
-
-    Examples
-    --------
-    >>> stream_of("set_points/inv1"), stream_of("state/inv1"), stream_of("measurement/inv1")
-    ('state/inv1', 'state/inv1', 'measurement/inv1')
-    """
+    """Return the stream to which measurements or states on a key belong: all states of an agent are one."""
     kind, _, name = key.partition("/")
     return f"{'measurement' if kind == 'measurement' else 'state'}/{name}"

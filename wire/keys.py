@@ -165,13 +165,11 @@ KEY_SPECS = (
     ),
     KeySpec(
         "alive/agent/<inverter>/<instance>", "token", "-", "agent", "plant, other agents",
-        "while the agent's session lives; declared after its subscribers and its queryable",
-        _BY_AGENT, ROLES,
+        "while the agent's session lives; declared after its subscribers and its queryable", _BY_AGENT, ROLES,
     ),
     KeySpec(
         "alive/recorder/<recorder>", "token", "-", "recorder", "plant",
-        "until the final telemetry is in; declared after its subscriber",
-        ("plant", "operator"), ROLES,
+        "until the final telemetry is in; declared after its subscriber", ("plant", "operator"), ROLES,
     ),
     KeySpec(
         "nameplate/<inverter>/<instance>", "queryable", "Nameplate", "agent", "plant, other agents",
@@ -180,8 +178,7 @@ KEY_SPECS = (
     ),
     KeySpec(
         "control", "publication", "Prepare, Waiting, Stop", "plant", "agents",
-        "before tick 0; at the end; while the plant waits",
-        _BY_PLANT, _BY_AGENT,
+        "before tick 0; at the end; while the plant waits", _BY_PLANT, _BY_AGENT,
     ),
     KeySpec(
         "stop_request/<inverter>/<instance>", "publication", "Stop", "plant", "the one instance",
@@ -190,8 +187,7 @@ KEY_SPECS = (
     ),
     KeySpec(
         "ready/<inverter>", "publication", "Ready", "agent", "plant",
-        "when it has proof to hear every in-neighbour on the roster",
-        _BY_AGENT, _BY_PLANT,
+        "when it has proof to hear every in-neighbour on the roster", _BY_AGENT, _BY_PLANT,
     ),
     KeySpec(
         "measurement/<inverter>", "publication", "Measurement", "plant", "agent", "at every tick: it is the grant",
@@ -209,13 +205,11 @@ KEY_SPECS = (
     ),
     KeySpec(
         "telemetry", "publication", "Telemetry, LinkReport, Journal, LinkRequest", "plant", "recorders",
-        "at tick 0, every tenth tick (wall-clock: every 0.2 s), and at the end",
-        _BY_PLANT, _PEOPLE,
+        "at tick 0, every tenth tick (wall-clock: every 0.2 s), and at the end", _BY_PLANT, _PEOPLE,
     ),
     KeySpec(
         "report/<inverter>", "publication", "LinkReport", "agent", "plant, which publishes it on telemetry",
-        "in a run with emulated links: every 100 ticks, and when it ends",
-        _BY_AGENT, _BY_PLANT,
+        "in a run with emulated links: every 100 ticks, and when it ends", _BY_AGENT, _BY_PLANT,
     ),
     KeySpec(
         "journal/<inverter>", "publication", "Journal", "agent", "plant, which publishes it on telemetry",
@@ -225,13 +219,11 @@ KEY_SPECS = (
     KeySpec(
         "link_request/<inverter>", "publication", "LinkRequest", "plant", "agent",
         "wall-clock: at each link command, and all of them to an agent that joins; again "
-        "every second, until it is acknowledged",
-        _BY_PLANT, _BY_AGENT,
+        "every second, until it is acknowledged", _BY_PLANT, _BY_AGENT,
     ),
     KeySpec(
         "link_acknowledgement/<inverter>", "publication", "LinkAcknowledgement", "agent",
-        "plant, which publishes it on the client's key",
-        "wall-clock: one for every LinkRequest, in their order",
+        "plant, which publishes it on the client's key", "wall-clock: one for every LinkRequest, in their order",
         _BY_AGENT, _BY_PLANT,
     ),
     KeySpec(
@@ -246,8 +238,7 @@ KEY_SPECS = (
     ),
     KeySpec(
         "config/<inverter>", "queryable", "-", "plant", "an agent of a live run",
-        "wall-clock: asked once the plant's token is there; its AgentConfig as JSON",
-        _BY_PLANT, ROLES,
+        "wall-clock: asked once the plant's token is there; its AgentConfig as JSON", _BY_PLANT, ROLES,
     ),
     KeySpec(
         "feeder_map", "queryable", "-", "plant", "a client that draws the feeder",
@@ -256,20 +247,17 @@ KEY_SPECS = (
     ),
     KeySpec(
         "command", "publication", "Command", "command line", "plant",
-        "wall-clock: once the plant's token is there, to change something",
-        ("operator",), _BY_PLANT,
+        "wall-clock: once the plant's token is there, to change something", ("operator",), _BY_PLANT,
     ),
     KeySpec(
         "request", "publication", "Command", "command line, recorder", "plant",
         "wall-clock: once the plant's token is there, to learn something (status, links, telemetry); "
-        "simulated: by the recorder, after each Telemetry and every second",
-        ROLES, _BY_PLANT,
+        "simulated: by the recorder, after each Telemetry and every second", ROLES, _BY_PLANT,
     ),
     KeySpec(
         "answer/<id>", "publication", "Answer, LinkAcknowledgement", "plant", "the command line that asked",
         "wall-clock: one Answer for every command; to a link command every LinkAcknowledgement, too; "
-        "simulated: to a recorder that asks again",
-        _BY_PLANT, ROLES,
+        "simulated: to a recorder that asks again", _BY_PLANT, ROLES,
     ),
 )  # fmt: skip
 """Every kind of key with its message, its two ends and its time; `gridpeers doc keys` prints it."""

@@ -34,10 +34,7 @@ class CommandEffect(NamedTuple):
 
 
 class Links(Protocol):
-    """All links into one receiver. Times are run time (s), on whichever clock the receiver uses throughout.
-
-    Without any (None), a node takes messages as they come.
-    """
+    """All links into one receiver. Times are run time (s), on whichever clock the receiver uses throughout."""
 
     @property
     def clear(self) -> Set[str]:
@@ -47,11 +44,7 @@ class Links(Protocol):
     def dropped(self) -> int: ...
 
     def offer(self, message: State | Measurement, payload: bytes, at: float) -> bool:
-        """Take a message off the wire at this time (s) and return True; return False if no fault ever acts on its link.
-
-        The number of the message finds its random numbers; its time decides which faults act on it. A link uses the
-        size of the payload, and may corrupt it.
-        """
+        """Take a message off the wire at this time (s); return False if no fault ever acts on its link."""
 
     def due(self, now: float) -> Sequence[Arrival]:
         """Take out the messages that have arrived by now, in the order of arrival."""
@@ -59,10 +52,7 @@ class Links(Protocol):
     def stalled(self, t: float) -> bool: ...
 
     def command(self, tree: Mapping[str, Any], t: float) -> CommandEffect:
-        """Apply a link command to messages sent at t (s of run time) or later.
-
-        Raise ValueError if the tree is no link command, or a value is wrong; then nothing has changed.
-        """
+        """Apply a link command to messages sent at t (s of run time) or later; raise ValueError if it is none."""
 
     def node_events(self, t: float) -> Sequence[tuple[str, str]]:
         """Take out what nodes with faults began or ended by t (s of run time): the agent and a sentence each."""

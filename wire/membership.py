@@ -23,7 +23,7 @@ from gridpeers.wire.codec import RejectedError
 from gridpeers.wire.messages import AnyMessage, Nameplate
 
 AHEAD = 50
-"""Numbers by which a sender may be ahead of its run time, because it may send several at once."""
+"""Numbers by which a sender may be ahead of its run time."""
 
 FASTER = 2.0
 """Highest plausible rate of a sender in wall-clock time, as a multiple of the receiver's own."""

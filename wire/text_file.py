@@ -30,10 +30,7 @@ class TextFileError(ValueError):
 
 
 def text_of(data: bytes) -> str:
-    """Return the text of a file, with line ends as Python has them.
-
-    Raise TextFileError if its bytes do not tell the encoding.
-    """
+    """Return the text of a file, with line ends as Python has them; TextFileError if its encoding is not known."""
     encoding = _encoding(data)
     try:
         text = data.decode(encoding)
@@ -79,12 +76,9 @@ class TextTable(NamedTuple):
 def read_table_text(data: bytes, known: Collection[str], numbers: Collection[str]) -> TextTable:
     """Return the table of a CSV file as programs and spreadsheets write it.
 
-    The separator is the one by which the header has most of the known columns. Decimal commas become points where no
-    number can be read in two ways. Empty rows, and empty cells beyond the header, as Excel leaves them, are left out.
-
-    `known` are the columns that the table may have, `numbers` those of them that have numbers.
-
-    Raise TextFileError if it is no text, no table, or a number has two meanings.
+    `known` are the columns that the table may have, `numbers` those of them that have numbers. The separator is the one
+    by which the header has most of the known columns. Decimal commas become points. Empty rows, and empty cells beyond
+    the header, are left out. Raise TextFileError if it is no text, no table, or a number has two meanings.
     """
     text = text_of(data)
     first = next((line for line in text.splitlines() if line.strip()), "")
@@ -99,8 +93,7 @@ def read_table_text(data: bytes, known: Collection[str], numbers: Collection[str
     for _, cells in rows:
         while len(cells) > len(header) and not cells[-1]:
             cells.pop()
-    at = [i for i, name in enumerate(header) if name in numbers]
-    _replace_commas(rows, at)
+    _replace_commas(rows, [i for i, name in enumerate(header) if name in numbers])
     return TextTable(header, rows)
 
 

@@ -79,7 +79,6 @@ class TickBarrier:
         return max(1, self._from_outside)
 
     def wait_for(self, awaited: dict[str, str], now: float) -> None:
-        """Start a new wait for a message of each of these senders; the dict goes to the barrier."""
         self._awaited = awaited
         self._from_outside = len(self._awaited.keys() - self.siblings) if self.siblings else len(self._awaited)
         self.renew(now)
@@ -112,11 +111,10 @@ class TickBarrier:
     def complaint(self, missing: tuple[Awaited, ...], now: float) -> str:
         parts = []
         for message, sender in missing:
+            sign = f"nothing was ever heard from {sender}"
             if sender in self.last_heard:
                 tick, at = self.last_heard[sender]
                 sign = f"last heard of {sender}: tick {tick}, {now - at:.1f} s ago"
-            else:
-                sign = f"nothing was ever heard from {sender}"
             parts.append(f"no {message} from {sender} within {self._timeout:g} s; {sign}")
         return f"{self._name}: " + ". ".join(parts)
 

@@ -17,17 +17,9 @@ _UNPRINTABLE = re.compile(f"[{UNPRINTABLE}\ud800-\udfff]")
 
 
 def printable(text: str, limit: int = 4000) -> str:
-    r"""Return a text with its unprintable characters spelt out, cut to a length.
+    r"""Return a text with its unprintable characters spelt out, as \x0a, cut to a length.
 
-    Pass every text from an error or a file through this before you send it: receivers reject a text with a control
-    character.
-
-    Examples
-    --------
-    >>> print(printable("no solution:\n\x1b[31mred", 60))
-    no solution:\x0a\x1b[31mred
-    >>> printable("abcdef", 5)
-    'ab...'
+    Pass every text from an error or a file through this before you send it: receivers reject a control character.
     """
     text = _UNPRINTABLE.sub(lambda match: f"\\x{ord(match[0]):02x}", text)
     return text if len(text) <= limit else text[: limit - 3] + "..."

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gridpeers.agents.agent_config import Control, Gains
-from gridpeers.agents.graphs import adjacency
+from gridpeers.agents.graphs import in_neighbours
 from gridpeers.plant.equipment import F_NOM, Feeder
 from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters, InverterParameters
 from gridpeers.scenarios.results.history import Flags, Floats
@@ -24,7 +24,7 @@ class InverterGroup:
     GFM: Flags
     """Which are grid-forming: the leaders, g_i = 1."""
     A: Floats
-    """Adjacency c_ij (1), row = receiver, as `gridpeers.agents.graphs.adjacency` gives it."""
+    """Adjacency c_ij (1), row = receiver."""
     acts: Flags = field(default_factory=lambda: np.zeros(0, bool))
     """Which run the secondary law; the others keep their set-points. All, if left out."""
     shares: Flags = field(default_factory=lambda: np.zeros(0, bool))
@@ -123,7 +123,9 @@ def inverter_group_of(
     without = without_agent(scenario, case)
     A = np.zeros((len(rows), len(rows)))
     at = [i for i, name in enumerate(rows) if name not in without]
-    A[np.ix_(at, at)] = np.array(adjacency(control, {name: rows[name] for name in rows if name not in without}))
+    members = {name: rows[name] for name in rows if name not in without}
+    heard = {name: in_neighbours(control, name, members) for name in members}
+    A[np.ix_(at, at)] = np.array([[float(other in heard[name]) for other in members] for name in members])
     inverters = InverterGroup(
         names=tuple(rows),
         GFM=np.array([row.kind == "GFM" for row in rows.values()], bool),

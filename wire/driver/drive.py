@@ -28,10 +28,7 @@ class LogLimit(logging.Filter):
 
 def limit_log(log: logging.Logger) -> LogLimit:
     """Let a log omit repeated lines; a second call changes nothing."""
-    for filter_ in log.filters:
-        if isinstance(filter_, LogLimit):
-            return filter_
-    limit = LogLimit()
+    limit = next((each for each in log.filters if isinstance(each, LogLimit)), None) or LogLimit()
     log.addFilter(limit)
     return limit
 
@@ -64,9 +61,8 @@ def perform(actions: Sequence[Action | Log], session: Session, log: logging.Logg
 def drive(core: Core, session: Session, log: logging.Logger) -> None:
     """Start a core, declare its keys and serve it until it has finished, as `serve` does.
 
-    The start comes first, because a restarted core needs fewer keys than at the end of its last session. The inbox
-    learns of the core before any key is declared: a newcomer gets its history of tokens at once, strangers' included.
-    The token is declared last: whoever sees it may rely on the rest.
+    The inbox learns of the core before any key is declared: a newcomer gets its history of tokens at once, strangers'
+    included. The token is declared last: whoever sees it may rely on the rest.
     """
     core.start(monotonic())
     session.inbox.is_known, session.inbox.is_noted = core.is_known, core.is_noted
@@ -79,10 +75,7 @@ def drive(core: Core, session: Session, log: logging.Logger) -> None:
 
 
 def serve(core: Core, session: Session, log: logging.Logger) -> None:
-    """Serve a started core, whose queryables are declared, until it has finished.
-
-    Raise StoppedError if another thread asks the process to stop.
-    """
+    """Serve a started core until it has finished; raise StoppedError if another thread asks the process to stop."""
     session.inbox.is_known, session.inbox.is_noted = core.is_known, core.is_noted
     take = session.take
     limit = limit_log(log)

@@ -54,10 +54,7 @@ class StopSignal:
 
 
 def stop_at_signals(error: Callable[[str], BaseException]) -> StopSignal:
-    """Have SIGINT and SIGTERM raise in the main thread; return their handler.
-
-    A SIGINT that is ignored stays so: a shell ignores that of a program in the background.
-    """
+    """Have SIGINT, unless a shell ignores it, and SIGTERM raise in the main thread; return their handler."""
     stop = StopSignal(error)
     signal.signal(signal.SIGTERM, stop)
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:

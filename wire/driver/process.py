@@ -71,11 +71,7 @@ def no_links(name: str, tree: Mapping[str, Any]) -> None:
 
 
 def main(module: str, what: str, config_type: type[C] | UnionType, run: Callable[[C], str]) -> int:
-    """Read the configuration, run, and return the exit status.
-
-    The module's name and what it runs are for the usage message, which names the first type of a union. `run` returns
-    why the run broke, or an empty text.
-    """
+    """Read the configuration, run, and return the exit status; `run` returns why the run broke, or an empty text."""
     status = _main(module, what, config_type, run) + (IN_ORDER if LEASH in sys.argv[1:2] else 0)
     leave(status, logging.getLogger(module).warning)
     return status
@@ -113,13 +109,10 @@ def _main(module: str, what: str, config_type: type[C] | UnionType, run: Callabl
 
 def _read_line() -> bytes:
     """Return the first line of standard input, unbuffered: the thread that waits for its end reads the rest."""
-    line = bytearray()
-    while not line.endswith(b"\n"):
-        piece = os.read(0, 65536)
-        if not piece:
-            break
+    line = b""
+    while not line.endswith(b"\n") and (piece := os.read(0, 65536)):
         line += piece
-    return bytes(line)
+    return line
 
 
 def _end_with_parent() -> None:

@@ -44,11 +44,6 @@ def at_addresses(listen: Collection[str], addresses: Collection[str]) -> tuple[s
     """Return endpoints to listen on, with the addresses of this host in place of any address with any port.
 
     Zenoh then tells others these addresses. Without any address the endpoints stay.
-
-    Examples
-    --------
-    >>> at_addresses(("tcp/0.0.0.0:0", "tcp/[::]:0", "tcp/0.0.0.0:7447"), ("10.9.0.2", "fd00::2"))
-    ('tcp/10.9.0.2:0', 'tcp/[fd00::2]:0', 'tcp/0.0.0.0:7447')
     """
     found: list[str] = []
     for endpoint in listen:

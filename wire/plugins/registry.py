@@ -67,19 +67,6 @@ class Registry(Generic[T]):
     `kind` and `plural` are the words for it, `objection` says why an object is none of this kind, as the end of a
     sentence, and `own` has the references of those that come with gridpeers, imported when they are asked for. Names of
     entry points that are `reserved` no decorator takes over.
-
-    Examples
-    --------
-    >>> greetings = Registry("greeting", "greetings", lambda it: "" if callable(it) else "it cannot be called",
-    ...     own={"print": "builtins:print"})
-    >>> @greetings.register("hello")
-    ... def hello(): return "hello"
-    >>> greetings.resolve("hello") is hello, greetings.resolve("print") is print, greetings.names
-    (True, True, ('print', 'hello'))
-    >>> greetings.resolve("helo")
-    Traceback (most recent call last):
-        ...
-    gridpeers.wire.plugins.registry.PluginError: there is no greeting "helo"; did you mean "hello"? The greetings ...
     """
 
     def __init__(

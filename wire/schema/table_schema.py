@@ -148,15 +148,6 @@ def fields_of(cls: type) -> tuple[Field, ...]:
     """Return the fields of a class in their order, those of its base classes first.
 
     Raise TypeError if an annotation of a class that is no struct cannot be read.
-
-    Examples
-    --------
-    >>> class Filter(msgspec.Struct):
-    ...     T: Annotated[float, Unit("s")] = 0.01
-    ...     delay_s: Annotated[float, Unit("s")] = 0.0
-    ...     k: Annotated[float, Unit("1/s")] = 1.0
-    >>> [field.key for field in fields_of(Filter)]
-    ['T_s', 'delay_s', 'k']
     """
     return tuple((_of_struct if issubclass(cls, msgspec.Struct) else _of_class)(cls))
 

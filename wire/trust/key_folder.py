@@ -2,7 +2,7 @@
 
 ``ca.pem`` is the certificate of the site's authority and ``ca.key`` its private key, which stays where certificates are
 issued. ``NAME.pem`` and ``NAME.key`` are those of a member. ``members.json`` lists all members, signed by the
-authority. A host needs ``ca.pem``, ``members.json`` and the two files of its own members, and no more.
+authority. A host needs all but ``ca.key`` and the files of other hosts' members.
 
 The package cryptography is imported where it is used: a run without certificates does without.
 """
@@ -231,9 +231,8 @@ _EXPIRED = 10
 def tls_refusal(host: str, port: int, credentials: Credentials | None, timeout: float) -> str:
     """Return why the other end and this one do not agree on a link; empty if they do, or if it is not known.
 
-    It is the end of a sentence that begins with the other end. Zenoh tries again and again and says nothing, so the
-    handshake is done once here; each of its steps may take as long as `timeout` (s). In TLS 1.3 the end that connects
-    verifies first, and the other end's alert comes with the first bytes that it reads.
+    Zenoh tries again and again and says nothing, so the handshake is done once here; each of its steps may take as long
+    as `timeout` (s). In TLS 1.3 the other end's alert comes with the first bytes that this one reads.
     """
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
     context.check_hostname, context.verify_mode = False, ssl.CERT_NONE  # a member is known by its name alone
