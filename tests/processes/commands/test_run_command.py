@@ -7,7 +7,6 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -70,30 +69,16 @@ def test_an_ended_command_ends_its_processes(tmp_path: Path) -> None:
             os.kill(int(child), 0)
 
 
-@pytest.fixture
-def closed_pipe() -> Iterator[int]:
-    """The end to write to of a pipe without reader."""
+def test_a_command_that_nobody_reads_ends_without_a_word() -> None:
+    """Exit status 141, as of a command that SIGPIPE has ended."""
     reading, writing = os.pipe()
     os.close(reading)
-    yield writing
-    os.close(writing)
-
-
-@pytest.mark.parametrize(
-    "words",
-    [["list"], ["run", "calm.toml", "--driver", "inprocess", "--out", "here"]],
-    ids=lambda words: words[0],
-)
-def test_a_command_that_nobody_reads_ends_without_a_word(words: list[str], closed_pipe: int, tmp_path: Path) -> None:
-    """Exit status 141, as of a command that SIGPIPE has ended; a run's folder says why it is not whole."""
-    (tmp_path / "calm.toml").write_text('[time]\nend_s = 0.1\n[case.calm]\nsecondary = "all"\ngraph = "ring"\n')
-    done = subprocess.run(
-        command(*words), cwd=tmp_path, stdout=closed_pipe, stderr=subprocess.PIPE, text=True, timeout=DEADLINE
-    )
+    try:
+        done = subprocess.run(command("list"), stdout=writing, stderr=subprocess.PIPE, text=True, timeout=DEADLINE)
+    finally:
+        os.close(writing)
 
     assert (done.returncode, done.stderr) == (141, "")
-    if words[0] == "run":
-        assert (tmp_path / "here" / "status.txt").read_text() == "broken: nobody reads its output any more\n"
 
 
 FULL = Path("/dev/full")
