@@ -3,19 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import nullcontext
 from pathlib import Path
 
-import msgspec
 import pytest
 
 import gridpeers as gp
-from gridpeers.lab.chaos.campaign import Campaign, run_campaign
-from gridpeers.lab.chaos.chaos_folder import ChaosFolder
-from gridpeers.lab.chaos.chaos_run import ChaosRow
 from gridpeers.scenarios.sweep import workers
 from tests.command_line import invoke
-from tests.unit.lab.chaos.bases import base_in
 from tests.unit.lab.chaos.small_campaign import small
 
 SHORT = {"time.end_s": 1.5, "event": [{"label": "event1", "t_s": 1.0, "open": ["13-152"]}], "paper": ""}
@@ -41,22 +35,6 @@ def test_a_sweep_in_python_gives_the_table_of_this_machine(scheduler: str) -> No
 
     assert there.drop(columns="history").equals(here.drop(columns="history"))
     assert all(a.equals(b) for a, b in zip(there["history"], here["history"], strict=True))
-
-
-def test_a_campaign_of_chaos_gives_the_runs_of_this_machine(scheduler: str, tmp_path: Path) -> None:
-    """Their schedules, verdicts and bytes, and the failures that they are shrunk to."""
-    base = base_in(small(tmp_path))
-
-    def rows(name: str, dask: str) -> tuple[dict[int, ChaosRow], list[ChaosRow]]:
-        (tmp_path / name).mkdir()
-        folder = ChaosFolder(tmp_path / name, base, 3, "gridpeers chaos small")
-        done = run_campaign(
-            Campaign(base=base, seed=3, runs=2, dask=dask), folder, lambda of: nullcontext(lambda what, done: None)
-        )
-        untimed = {n: msgspec.structs.replace(row, took_s=0.0) for n, row in done.rows.items()}
-        return untimed, [msgspec.structs.replace(it.simplest, took_s=0.0) for it in done.failures]
-
-    assert rows("there", scheduler) == rows("here", "")
 
 
 @pytest.mark.parametrize("words", [("experiment", "topology"), ("chaos", "small.toml")])
