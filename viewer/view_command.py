@@ -10,8 +10,9 @@ from urllib.parse import quote
 
 import typer
 
-from gridpeers.cli.commands.options import RUN, LiveRun, of_live_run, usage_errors
+from gridpeers.cli.commands.options import LiveRun, of_live_run, usage_errors
 from gridpeers.cli.usage import BAD_INPUT, INTERRUPTED, TERMINATED, fail, require
+from gridpeers.scenarios.live.run_address import RUN
 from gridpeers.viewer.page_beside import HERE, PORT, require_page
 from gridpeers.wire.driver.ending import watch_readers
 

@@ -8,10 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
 from contextlib import suppress
-from pathlib import Path
-from typing import Literal
 
 from gridpeers.wire.driver.ending import leave, speaking
 from gridpeers.wire.driver.machine import raise_limit, too_few_files
@@ -43,7 +40,7 @@ def _main() -> None:
     # It must be said before numpy is imported; the processes that are started inherit it.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     raise_limit()
-    _start_ahead(driver_of(sys.argv[1:]))  # what servers import takes longer than all that comes before them here
+    _start_ahead(sys.argv[1:])
     with speaking("gridpeers"):
         from gridpeers.cli.root import app
         from gridpeers.cli.usage import BROKEN, INTERRUPTED, fail
@@ -53,40 +50,22 @@ def _main() -> None:
         except KeyboardInterrupt:
             fail(["interrupted; everything that was started has ended"], INTERRUPTED)
         except OSError as error:  # the machine refuses something: no memory for a process, no room on a disk
-            fail([too_few_files(error) or _without_folder(error) or str(error)], BROKEN)
+            fail([too_few_files(error) or str(error)], BROKEN)
 
 
-def _without_folder(error: OSError) -> str:
-    """Return what is wrong if the present folder is gone, as a sentence; empty if it is there."""
-    try:
-        Path.cwd()
-    except FileNotFoundError:
-        if error.filename is None:
-            return "the present folder is gone; change to one that is there (cd), and give the command again"
-    return ""
+def _start_ahead(words: list[str]) -> None:
+    """Start the servers of a run, whose imports take longer than all that comes before them here.
 
-
-def _start_ahead(driver: Literal["processes", "inprocess", ""]) -> None:
-    """Start the servers of a run; where that fails, the run starts them when it needs them, and says what is wrong."""
+    Where that fails, the run starts them when it needs them, and says what is wrong.
+    """
+    if words[:1] != ["run"] or len(words) == 1 or not {"-h", "--help"}.isdisjoint(words):
+        return
     with suppress(OSError):
-        if driver == "processes":
-            from gridpeers.scenarios.drivers.forking import prepare
-
-            prepare()
-        elif driver == "inprocess":
+        if any(word.endswith("inprocess") for word in words):
             from gridpeers.scenarios.results.figure_processes import prepare_figures
 
             prepare_figures()
+        else:
+            from gridpeers.scenarios.drivers.forking import prepare
 
-
-def driver_of(words: Sequence[str]) -> Literal["processes", "inprocess", ""]:
-    """Return the driver of a command line that looks like a run; if it is none, what was started ends with it.
-
-    >>> driver_of(["run", "islanding"]), driver_of(["run", "islanding", "--driver=inprocess"])
-    ('processes', 'inprocess')
-    >>> driver_of(["run", "--help"]), driver_of(["check", "islanding"])
-    ('', '')
-    """
-    if words[:1] != ["run"] or len(words) == 1 or not {"-h", "--help"}.isdisjoint(words):
-        return ""
-    return "inprocess" if any(word.endswith("inprocess") for word in words) else "processes"
+            prepare()

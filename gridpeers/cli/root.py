@@ -6,88 +6,75 @@ Installed distributions add commands by entry points of the group "gridpeers.com
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import typer
 
 from gridpeers.cli.suggestions import Commands
+from gridpeers.cli.usage import BAD_INPUT, fail
 from gridpeers.wire.plugins.registry import PluginError, Registry
 
+_PAPER = "gridpeers.papers.singhal2022"
 
-class OwnCommand(NamedTuple):
-    """One command, without its module."""
+_OWN = (
+    ("run", "run_command:run", "Run a scenario and show its results, beside published ones."),
+    ("list", "show:list_", "List the scenarios that come with gridpeers."),
+    ("check", "show:check", "Check a scenario file and its feeder for problems."),
+    ("doc", "show:doc", "Print a reference page that is made from the code."),
+    ("sweep", "sweep_command:sweep", "Run a scenario many times over values of its keys."),
+    ("chaos", "", "Disturb a scenario at random; judge and shrink what fails."),
+    ("predict", "", "Predict from theory how a scenario will go."),
+    ("compare", "show:compare", "Compare two runs: scenarios, metrics, and one figure of both."),
+    ("metrics", "show:metrics", "Measure a run from its record, also one that was killed."),
+    ("replay", "", "Replay a recorded run, or show what would have been."),
+    ("init", "init:init", "Make a project of your own, or an islanding of your feeder."),
+    (
+        "reproduce",
+        f"{_PAPER}.reproduce.reproduce_command:reproduce",
+        "Run all experiments of the paper, and write one report.",
+    ),
+    ("experiment", f"{_PAPER}.experiment_command:experiment", "Run an experiment on late, lossy or broken links."),
+    ("plant", "start_commands:plant", "Run the plant of a scenario in this terminal, in real time."),
+    ("agent", "live_commands:agent", "Run the agent of an inverter, or of several, in this terminal."),
+    ("up", "start_commands:up", "Run the plant and all its agents at once, in real time."),
+    ("down", "live_commands:down", "End a run: its agents leave, its plant ends."),
+    ("status", "live_commands:status", "Look once at a run: time, pacing, agents, latest events."),
+    ("watch", "live_commands:watch", "Watch a run as a live table; q quits."),
+    ("stop", "live_commands:stop", "Have an agent leave properly: its inverter is switched off."),
+    ("event", "live_commands:event", "Open or close a switch of a running plant."),
+    ("load", "live_commands:load", "Set a load of a running plant."),
+    ("link", "link:link", "Hurt and heal links while a run goes on."),
+    ("keys", "keys_command:app", "Make, issue and revoke the certificates of a site."),
+    ("feeder", "feeder_commands:app", "Import, check, solve, draw and export feeders."),
+    ("bridge", "", "Offer our plant to simulators of others."),
+    ("trace", "", "Write a run's messages as a Perfetto trace, or draw them."),
+    ("why", "", "Explain why an agent decided as it did."),
+    ("view", "", "Show a run in the browser: feeder, links, strips and agents."),
+)
+"""Commands in the order of the help: name, function (none where a room brings it), first sentence of its docstring."""
 
-    reference: str
-    """`module:name` of a function that typer can read, or of a `typer.Typer`; empty where a room brings it."""
-    summary: str
-    """Its line in the help of `gridpeers`: the first sentence of its docstring."""
-
-
-_HERE = "gridpeers.cli.commands"
-
-OWN_COMMANDS = {
-    name: OwnCommand(reference if not reference or "." in reference else f"{_HERE}.{reference}", summary)
-    for name, reference, summary in (
-        ("run", "run_command:run", "Run a scenario and show its results, beside published ones."),
-        ("list", "show:list_", "List the scenarios that come with gridpeers."),
-        ("check", "show:check", "Check a scenario file and its feeder for problems."),
-        ("doc", "show:doc", "Print a reference page that is made from the code."),
-        ("sweep", "sweep_command:sweep", "Run a scenario many times over values of its keys."),
-        ("chaos", "", "Disturb a scenario at random; judge and shrink what fails."),
-        ("predict", "", "Predict from theory how a scenario will go."),
-        ("compare", "show:compare", "Compare two runs: scenarios, metrics, and one figure of both."),
-        ("metrics", "show:metrics", "Measure a run from its record, also one that was killed."),
-        ("replay", "", "Replay a recorded run, or show what would have been."),
-        ("init", "init:init", "Make a project of your own, or an islanding of your feeder."),
-        (
-            "reproduce",
-            "gridpeers.papers.singhal2022.reproduce.reproduce_command:reproduce",
-            "Run all experiments of the paper, and write one report.",
-        ),
-        (
-            "experiment",
-            "gridpeers.papers.singhal2022.experiment_command:experiment",
-            "Run an experiment on late, lossy or broken links.",
-        ),
-        ("plant", "start_commands:plant", "Run the plant of a scenario in this terminal, in real time."),
-        ("agent", "start_commands:agent", "Run the agent of an inverter, or of several, in this terminal."),
-        ("up", "start_commands:up", "Run the plant and all its agents at once, in real time."),
-        ("down", "live_commands:down", "End a run: its agents leave, its plant ends."),
-        ("status", "live_commands:status", "Look once at a run: time, pacing, agents, latest events."),
-        ("watch", "live_commands:watch", "Watch a run as a live table; q quits."),
-        ("stop", "live_commands:stop", "Have an agent leave properly: its inverter is switched off."),
-        ("event", "live_commands:event", "Open or close a switch of a running plant."),
-        ("load", "live_commands:load", "Set a load of a running plant."),
-        ("link", "link:link", "Hurt and heal links while a run goes on."),
-        ("keys", "keys_command:app", "Make, issue and revoke the certificates of a site."),
-        ("feeder", "feeder_commands:app", "Import, check, solve, draw and export feeders."),
-        ("bridge", "", "Offer our plant to simulators of others."),
-        ("trace", "", "Write a run's messages as a Perfetto trace, or draw them."),
-        ("why", "", "Explain why an agent decided as it did."),
-        ("view", "", "Show a run in the browser: feeder, links, strips and agents."),
-    )
-}
-"""All of them, in the order of the help, which imports none."""
+SUMMARIES = {name: summary for name, _, summary in _OWN}
 
 COMMANDS: Registry[Callable[..., None]] = Registry(
     "command",
     "commands",
     lambda it: "" if callable(it) else "it is no function",
-    own={name: command.reference for name, command in OWN_COMMANDS.items() if command.reference},
+    own={
+        name: reference if "." in reference else f"gridpeers.cli.commands.{reference}"
+        for name, reference, _ in _OWN
+        if reference
+    },
 )
 """Functions of all commands, or a `typer.Typer`, by name."""
 
 
 class LazyCommands(Commands):
-    """All commands by their names; the help reads the line of each from `OWN_COMMANDS`."""
+    """All commands by their names; the help has the line of each of ours without its module."""
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names: gridpeers' own first."""
         there = COMMANDS.names
-        return [
-            *(name for name in OWN_COMMANDS if name in there),
-            *(name for name in there if name not in OWN_COMMANDS),
-        ]
+        return [name for name in dict.fromkeys((*SUMMARIES, *there)) if name in there]
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Import a command, one that says so when it is called if it cannot be; None if there is none of this name."""
@@ -101,19 +88,18 @@ class LazyCommands(Commands):
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write the names and what each command does."""
-        rows = []
-        for name in self.list_commands(ctx):
-            own = OWN_COMMANDS.get(name)
-            rows.append((name, own.summary if own else self.get_command(ctx, name).get_short_help_str(60)))
         with formatter.section("Commands"):
-            formatter.write_dl(rows)
+            formatter.write_dl(
+                [
+                    (name, SUMMARIES.get(name) or self.get_command(ctx, name).get_short_help_str(60))
+                    for name in self.list_commands(ctx)
+                ]
+            )
 
 
 def _broken(why: str) -> Callable[..., None]:
     def command() -> None:
         """Cannot be imported."""
-        from gridpeers.cli.usage import BAD_INPUT, fail
-
         fail([why], BAD_INPUT)
 
     return command
@@ -143,7 +129,7 @@ app = typer.Typer(
 
 def _version(asked: bool) -> None:
     if asked:
-        from importlib.metadata import version
+        from importlib.metadata import version  # it brings a mail reader; starts need none of this
 
         typer.echo(f"gridpeers {version('gridpeers')}")
         raise typer.Exit

@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import re
 import signal
+import subprocess
 import sys
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
-from types import MappingProxyType
+from importlib import util
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
 from gridpeers.scenarios.console import terminal as terminal
+from gridpeers.scenarios.results.run_files import TerminatedError
+from gridpeers.wire.driver.command_line import command_line
+from gridpeers.wire.driver.ending import StopSignal
+from gridpeers.wire.wording import DISTRIBUTIONS, damaged, printable, requirement, suggestion
 
 if TYPE_CHECKING:
     from gridpeers.plant.equipment import Feeder
@@ -27,10 +32,8 @@ Dask = Annotated[
 ScenarioName = Annotated[
     str, typer.Argument(metavar="SCENARIO", help="A name that `gridpeers list` shows, or the path of a file.")
 ]
-"""Argument of every command that takes a scenario."""
 
 PASSED, CLAIM_FAILED, BAD_INPUT, BROKEN, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 130, 143
-
 
 OPTIONS = {
     "plant.simulator": "--plant",
@@ -42,22 +45,20 @@ OPTIONS = {
 """Options that change a key of the scenario, by this key."""
 
 
-def load(name: str, changes: Mapping[str, Any] = MappingProxyType({})) -> tuple[ScenarioModel, Feeder]:
-    """Read and check a scenario, with keys changed by the command line, and its feeder; or end with every problem."""
+def load(name: str, changes: Mapping[str, Any] | None = None) -> tuple[ScenarioModel, Feeder]:
+    """Return a checked scenario, with keys changed by the command line, and its feeder; or end with every problem."""
     from gridpeers.scenario import load as load_face
     from gridpeers.scenarios.schema import ScenarioError
-    from gridpeers.wire.driver.command_line import command_line
 
     if not name:
         fail([f"no scenario was named; `{command_line('list')}` shows those of the catalogue"], BAD_INPUT)
-
     try:
         scenario = load_face(name)
         if changes:
             scenario = scenario.replace(changes)
-        return scenario.spec, scenario.feeder
     except ScenarioError as error:
         refuse(error)
+    return scenario.spec, scenario.feeder
 
 
 def refuse(error: ScenarioError | FeederError) -> NoReturn:
@@ -71,56 +72,41 @@ def refuse(error: ScenarioError | FeederError) -> NoReturn:
 
 def check_choice(option: str, kind: str, value: str, known: Collection[str]) -> None:
     """End with the nearest word if a value is none of those that an option takes."""
-    from gridpeers.wire.wording import suggestion
-
     if value not in known:
         fail([f'{option}no {kind} "{value}"; {suggestion(value, tuple(known), f"{kind}s")}'], BAD_INPUT)
 
 
 def chosen(spec: ScenarioModel, case: str | None, seed: int | None) -> ScenarioModel:
     """Return the scenario with the cases and the seed of the command line."""
-    import msgspec
+    from msgspec.structs import replace
 
     from gridpeers.runs.choices import with_cases
     from gridpeers.scenarios.schema import ScenarioError
 
-    if case is not None:
-        names = [name.strip() for name in case.split(",") if name.strip()]
-        try:
-            spec = with_cases(spec, names or [case], option="--case: ")
-        except ScenarioError as error:
-            refuse(error)
-    return spec if seed is None else msgspec.structs.replace(spec, seed=seed)
+    names = None if case is None else [name.strip() for name in case.split(",") if name.strip()] or [case]
+    try:
+        spec = with_cases(spec, names, option="--case: ")
+    except ScenarioError as error:
+        refuse(error)
+    return spec if seed is None else replace(spec, seed=seed)
 
 
-RUN = {
-    **dict.fromkeys(("numpy", "scipy", "numba", "threadpoolctl"), "the plant"),
-    **dict.fromkeys(("mcap", "lz4", "zstandard", "msgpack"), "the record of a run"),
-    "matplotlib": "the figures",
-}
-"""Packages that a run needs in any driver, and what for."""
+def require(modules: Mapping[str, str], install: str = "") -> None:
+    """End with advice if a package of an extra is missing, given with its use.
 
-
-def require(modules: dict[str, str], install: str = "") -> None:
-    """End with a clear line, and with advice, if a package that is needed is missing."""
-    from importlib.util import find_spec
-
-    from gridpeers.wire.wording import DISTRIBUTIONS, requirement
-
-    missing = [name for name in modules if find_spec(name) is None]
-    if missing:
-        packages = {name: DISTRIBUTIONS.get(name, name) for name in missing}
-        lines = [f"{packages[name]} is not installed; it is needed for {modules[name]}" for name in missing]
-        again = f"install what is missing: pip install {' '.join(map(requirement, missing))}"
+    A missing package of the core ends any command with its name (`gridpeers.cli.app`), and needs no such check.
+    """
+    lacking = [name for name in modules if util.find_spec(name) is None]
+    if lacking:
+        lines = [
+            f"{DISTRIBUTIONS.get(name, name)} is not installed; it is needed for {modules[name]}" for name in lacking
+        ]
+        again = f"install what is missing: pip install {' '.join(map(requirement, lacking))}"
         fail([*lines, install or again], BAD_INPUT)
 
 
 def require_loadable(module: str, user: str) -> None:
     """End with a clear line if a package with a library of its own, an extra by its name, is missing or damaged."""
-    import subprocess
-
-    from gridpeers.wire.wording import damaged
-
     require({module: user}, f"install it: pip install 'gridpeers[{module}]'")
     done = subprocess.run([sys.executable, "-P", "-c", f"import {module}"], capture_output=True, text=True, check=False)
     if done.returncode:
@@ -130,8 +116,6 @@ def require_loadable(module: str, user: str) -> None:
 
 def fail(lines: list[str], code: int) -> NoReturn:
     """End the command with lines on standard error; characters that cannot be printed are escaped."""
-    from gridpeers.wire.wording import printable
-
     for line in lines:
         print("gridpeers: " + "\n".join(map(printable, line.split("\n"))), file=sys.stderr)
     raise SystemExit(code)
@@ -143,9 +127,6 @@ def interruptible() -> Iterator[None]:
 
     Signals within a second are one request, those of Ctrl-C too, which `timeout` passes on twice.
     """
-    from gridpeers.scenarios.results.run_files import TerminatedError
-    from gridpeers.wire.driver.ending import StopSignal
-
     terminate, numbers = StopSignal(TerminatedError), [signal.SIGTERM]
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else a shell has it ignored, or another has it
         numbers.append(signal.SIGINT)
@@ -161,8 +142,6 @@ def interruptible() -> Iterator[None]:
 
 def exit_code(error: KeyboardInterrupt) -> int:
     """Return the exit code of a command that a signal ended."""
-    from gridpeers.scenarios.results.run_files import TerminatedError
-
     return TERMINATED if isinstance(error, TerminatedError) else INTERRUPTED
 
 

@@ -3,17 +3,28 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from tempfile import gettempdir
+from typing import Annotated
 
 import typer
 
-from gridpeers.cli.commands.feeder_glm_command import glm
-from gridpeers.cli.usage import BAD_INPUT, fail, refuse
-from gridpeers.wire.wording import counted
-
-if TYPE_CHECKING:
-    from gridpeers.feeder import Feeder
+from gridpeers.cli.usage import BAD_INPUT, check_choice, fail, load, refuse
+from gridpeers.feeder import Feeder, reader_of
+from gridpeers.output_folders import FolderError, refusal, shown, whole_folder, write_whole
+from gridpeers.plant.dynamics import PlantError
+from gridpeers.plant.equipment.connectivity import Connectivity
+from gridpeers.plant.equipment.derived_feeders import copy_name, joined_copies
+from gridpeers.plant.equipment.imported_equipment import is_behind
+from gridpeers.plant.equipment.neutrals import returns_in_words
+from gridpeers.plant.plant_config import PlantSettings
+from gridpeers.plant.tables import FeederError, feeders
+from gridpeers.rooms import ROOMS
+from gridpeers.scenarios.schema.configs import configs
+from gridpeers.wire.wording import counted, suggestion
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Import, check, solve, draw and export feeders.")
 
@@ -38,12 +49,27 @@ SHOWN = 12
 """Notes that are shown."""
 
 
+@contextmanager
+def _problems_told(feeder: str, file: Path | str) -> Iterator[None]:
+    """End with every problem of a feeder, or with why it or the file that is written cannot be used."""
+    try:
+        yield
+    except FeederError as error:
+        refuse(error)
+    except FolderError as error:
+        fail([str(error)], BAD_INPUT)
+    except (ValueError, ArithmeticError) as error:
+        fail([f"{feeder}: {error}"], BAD_INPUT)
+    except OSError as error:
+        fail([refusal(Path(file), error)], BAD_INPUT)
+
+
 @app.command("import")
 def import_(
     file: Annotated[
         Path, typer.Argument(metavar="FILE", help="Script for OpenDSS (.dss) or model for GridLAB-D (.glm).")
     ],
-    out: Annotated[Path | None, typer.Option("--out", help="Folder for its tables; else the feeder's name.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for its tables; else the feeder's name.")] = None,
     switch: Switches = None,
     leave_out: LeaveOut = None,
 ) -> None:
@@ -53,23 +79,18 @@ def import_(
 
     Example:  gridpeers feeder import Master.dss --out my-feeder
     """
-    from gridpeers.output_folders import FolderError, shown, whole_folder
-    from gridpeers.plant.tables import feeders
-
     feeder = read_script(str(file), switch or [], leave_out or [])
     folder = out or Path(folder_of(feeder.name))
-    try:
-        with whole_folder(folder):
-            save_readable(feeder, folder, file.name)
-    except FolderError as error:
-        fail([str(error)], BAD_INPUT)
+    with _problems_told(feeder.name, folder), whole_folder(folder):
+        save_readable(feeder, folder, file.name)
     _describe(feeder)
-    for note in feeder.notes[:SHOWN]:
-        typer.echo(f"NOTE  {note}")
+    notes = [*feeder.notes[:SHOWN]]
     if len(feeder.notes) > SHOWN:
-        typer.echo(f"NOTE  and {len(feeder.notes) - SHOWN} more")
+        notes.append(f"and {len(feeder.notes) - SHOWN} more")
     if str(folder) in feeders():
-        typer.echo(f'NOTE  in a scenario write "./{folder}": "{folder}" is the feeder that comes with gridpeers')
+        notes.append(f'in a scenario write "./{folder}": "{folder}" is the feeder that comes with gridpeers')
+    for note in notes:
+        typer.echo(f"NOTE  {note}")
     typer.echo(f"Tables: {shown(folder)}")
 
 
@@ -81,26 +102,17 @@ def check(feeder: FeederName, load_set: LoadSet = None, switch: Switches = None,
 
     Example:  gridpeers feeder check microgrid123
     """
-    from gridpeers.plant.equipment.connectivity import Connectivity
-    from gridpeers.plant.equipment.neutrals import returns_in_words
-
     tables = _read(feeder, load_set, switch, leave_out)
     _describe(tables)
-    graph, load = Connectivity(tables), tables.load_by_bus()
+    graph, load_by_bus = Connectivity(tables), tables.load_by_bus()
     for each in tables.switches:
-        name = each.alias or each.name
-        if not each.closed:
-            typer.echo(f"switch {name}: open")
-            continue
-        behind = graph.cut_off(each)
-        if not behind:
-            typer.echo(f"switch {name}: closed; there is another way around it")
-            continue
-        inverters = [row.name for row in tables.inverters if row.bus in behind]
-        cut = (
-            f"{counted(len(behind), 'bus', 'buses')}, {sum(load.get(bus, 0.0) for bus in behind) / 1e3:.0f} kW of load"
-        )
-        typer.echo(f"switch {name}: closed; open, it cuts off {cut}{', ' + ', '.join(inverters) if inverters else ''}")
+        state = "open" if not each.closed else "closed; there is another way around it"
+        if each.closed and (behind := graph.cut_off(each)):
+            kW = sum(load_by_bus.get(bus, 0.0) for bus in behind) / 1e3
+            cut = [counted(len(behind), "bus", "buses"), f"{kW:.0f} kW of load"]
+            cut += [row.name for row in tables.inverters if row.bus in behind]
+            state = f"closed; open, it cuts off {', '.join(cut)}"
+        typer.echo(f"switch {each.alias or each.name}: {state}")
     for text in returns_in_words(tables):
         typer.echo(text)
 
@@ -111,7 +123,7 @@ def solve(
     open_: Annotated[
         list[str] | None, typer.Option("--open", metavar="SWITCH", help="Open it first; repeat it.")
     ] = None,
-    csv: Annotated[Path | None, typer.Option("--csv", help="File for all voltages.")] = None,
+    csv: Annotated[Path | None, typer.Option(help="File for all voltages.")] = None,
     load_set: LoadSet = None,
     switch: Switches = None,
     leave_out: LeaveOut = None,
@@ -122,13 +134,11 @@ def solve(
 
     Example:  gridpeers feeder solve microgrid123 --open 13-152
     """
-    from gridpeers.plant.equipment.imported_equipment import is_behind
-    from gridpeers.scenarios.results.run_files import refusal, shown, write_whole
-
-    try:
-        table = _read(feeder, load_set, switch, leave_out).solve(open_ or ())
-    except (ValueError, ArithmeticError) as error:
-        fail([f"{feeder}: {error}"], BAD_INPUT)
+    tables = _read(feeder, load_set, switch, leave_out)
+    with _problems_told(feeder, csv or ""):
+        table = tables.solve(open_ or ())
+        if csv is not None:
+            write_whole(csv, table.to_csv(index=False))
     phases = table[table["phase"].isin(list("ABC"))]
     live = phases[phases["V"] > 0.0]
     text = f"{counted(len(live), 'node')} with voltage"
@@ -147,17 +157,13 @@ def solve(
         worst = neutrals.loc[neutrals["V"].idxmax()]
         typer.echo(f"neutral  {worst['V']:.2f} V to earth at most, bus {worst['bus']}, node {worst['phase']}")
     if csv is not None:
-        try:
-            write_whole(csv, table.to_csv(index=False))
-        except OSError as error:
-            fail([refusal(csv, error)], BAD_INPUT)
         typer.echo(f"Voltages: {shown(csv)}")
 
 
 @app.command()
 def plot(
     feeder: FeederName,
-    out: Annotated[Path, typer.Option("--out", help="File of the figure: .png, .svg or .pdf.")] = Path("feeder.png"),
+    out: Annotated[Path, typer.Option(help="File of the figure: .png, .svg or .pdf.")] = Path("feeder.png"),
     voltages: Annotated[bool, typer.Option("--voltages", help="Colour by voltage instead of by microgrid.")] = False,
     load_set: LoadSet = None,
     switch: Switches = None,
@@ -169,21 +175,55 @@ def plot(
 
     Example:  gridpeers feeder plot microgrid123 --out map.svg
     """
-    from io import BytesIO
-
-    from gridpeers.scenarios.results.run_files import refusal, shown, write_whole
-
     tables = _read(feeder, load_set, switch, leave_out)
-    try:
-        out = out if out.suffix else out.with_suffix(".png")
-        drawn = BytesIO()
+    out, drawn = out if out.suffix else out.with_suffix(".png"), BytesIO()
+    with _problems_told(feeder, out):
         tables.plot(voltages=voltages).savefig(drawn, dpi=130, format=out.suffix[1:].lower())
         write_whole(out, drawn.getvalue())
-    except (ValueError, ArithmeticError) as error:
-        fail([f"{feeder}: {error}"], BAD_INPUT)
-    except OSError as error:
-        fail([refusal(out, error)], BAD_INPUT)
     typer.echo(f"Figure: {shown(out)}")
+
+
+@app.command()
+def glm(
+    feeder: Annotated[
+        str, typer.Argument(metavar="FEEDER", help="A feeder that comes with gridpeers, or a folder of tables.")
+    ],
+    out: Annotated[Path | None, typer.Option(help="File of the model; else FEEDER.glm here.")] = None,
+    load_set: Annotated[str | None, typer.Option(help="Load table; else main, or the scenario's.")] = None,
+    scenario: Annotated[
+        str | None, typer.Option(help="Inverters' parameters, set-points and changes of this scenario.")
+    ] = None,
+    case: Annotated[str | None, typer.Option(help="Case of the scenario; else its first.")] = None,
+    seconds: Annotated[int, typer.Option(min=1, max=50, help="Length of the run (s).")] = 5,
+) -> None:
+    """Write a feeder as a model that GridLAB-D runs by itself: in delta mode if it has inverters.
+
+    Exit code: 0 it was written, 2 it cannot be; all reasons are named.
+
+    Example:  gridpeers feeder glm microgrid123 --scenario islanding --out islanding.glm
+    """
+    if reader_of(feeder):
+        fail([f"{feeder}: no feeder of our own tables; only those can be written for GridLAB-D"], BAD_INPUT)
+    if scenario:
+        spec, tables = load(scenario, {"plant.load_set": load_set} if load_set else {})
+        if feeder != spec.plant.feeder and Path(feeder).resolve() != Path(spec.plant.feeder).resolve():
+            fail([f'--scenario: "{scenario}" is on feeder "{spec.plant.feeder}", not on "{feeder}"'], BAD_INPUT)
+        if case is not None:
+            check_choice("--case: ", "case", case, tuple(spec.cases))
+        settings = configs(spec, tables, case or next(iter(spec.cases)))[0].settings
+    elif case is not None:
+        fail(["--case: is a case of a scenario; name it with --scenario"], BAD_INPUT)
+    else:
+        tables, settings = _read(feeder, load_set, None, None), PlantSettings(feeder=feeder)
+    file = out or Path(f"{tables.name}.glm")
+    try:
+        with _problems_told(feeder, gettempdir()):  # the tables from which it is made are written there
+            text = ROOMS.resolve("export_glm")(tables, settings, seconds, f"{file.stem}_voltages.csv")
+    except PlantError as error:
+        fail([f"{feeder}: {error}"], BAD_INPUT)
+    with _problems_told(feeder, file):
+        write_whole(file, text)
+    typer.echo(f"Model: {shown(file)}; GridLAB-D writes the voltages of its start to {file.stem}_voltages.csv")
 
 
 GROWN = """\
@@ -241,66 +281,41 @@ def grow(
 
     Example:  gridpeers feeder grow microgrid123 --copies 11 --joint 450 --switch 13-152 --out hundred
     """
-    from gridpeers.feeder import Feeder
-    from gridpeers.output_folders import FolderError, shown, whole_folder
-    from gridpeers.plant.equipment.derived_feeders import copy_name, joined_copies
-    from gridpeers.plant.tables import FeederError
-    from gridpeers.wire.wording import suggestion
-
-    try:
+    with _problems_told(feeder, out):
         tables = Feeder.read(feeder)
         grown = joined_copies(tables, copies, joint)
-    except FeederError as error:
-        refuse(error)
-    except ValueError as error:
-        fail([str(error)], BAD_INPUT)
-    found = next((one for one in tables.switches if switch in one.names), None)
-    if found is None:
-        names = [one.alias or one.name for one in tables.switches]
-        fail([f'--switch: no switch "{switch}"; {suggestion(switch, names, "switches")}'], BAD_INPUT)
-    of_copies = (f"{copy_name(found.from_bus, k)}-{copy_name(found.to_bus, k)}" for k in range(1, copies + 1))
-    text = GROWN.format(
-        feeder=feeder,
-        name=grown.name,
-        copies=copies,
-        inverters=len(grown.inverters),
-        T_c=T_c,
-        switches=", ".join(f'"{name}"' for name in of_copies),
-    )
-    try:
+        found = next((one for one in tables.switches if switch in one.names), None)
+        if found is None:
+            names = [one.alias or one.name for one in tables.switches]
+            fail([f'--switch: no switch "{switch}"; {suggestion(switch, names, "switches")}'], BAD_INPUT)
+        of_copies = (f"{copy_name(found.from_bus, k)}-{copy_name(found.to_bus, k)}" for k in range(1, copies + 1))
+        text = GROWN.format(
+            feeder=feeder,
+            name=grown.name,
+            copies=copies,
+            inverters=len(grown.inverters),
+            T_c=T_c,
+            switches=", ".join(f'"{name}"' for name in of_copies),
+        )
         with whole_folder(out):
             grown.save(out / grown.name)
             (out / "islanding.toml").write_text(text, encoding="utf-8")
-    except FolderError as error:
-        fail([str(error)], BAD_INPUT)
     size = f"{counted(len(grown.buses), 'bus', 'buses')}, {counted(len(grown.inverters), 'inverter')}"
     typer.echo(f"{size}: {shown(out / 'islanding.toml')}")
 
 
-app.command()(glm)
-
-
 def read_script(name: str, switches: list[str], leave_out: list[str]) -> Feeder:
     """Read a feeder that was written for another program, or end with every problem in it."""
-    from gridpeers.feeder import reader_of
-    from gridpeers.plant.tables import FeederError
-
     read = reader_of(name)
     if read is None:
-        fail(
-            [f"{name}: a feeder is a .dss file (OpenDSS) or a .glm file (GridLAB-D), by the end of its name"], BAD_INPUT
-        )
-    try:
+        text = "a feeder is a .dss file (OpenDSS) or a .glm file (GridLAB-D), by the end of its name"
+        fail([f"{name}: {text}"], BAD_INPUT)
+    with _problems_told(name, name):
         return read(name, switches=switches, leave_out=leave_out)
-    except FeederError as error:
-        refuse(error)
 
 
 def save_readable(feeder: Feeder, folder: Path, script: str) -> None:
     """Write the tables of a script's feeder and read them again; end with every problem if a run could not."""
-    from gridpeers.plant.tables import FeederError
-    from gridpeers.rooms import ROOMS
-
     feeder.save(folder)
     try:
         feeder.read(folder)
@@ -313,8 +328,6 @@ def save_readable(feeder: Feeder, folder: Path, script: str) -> None:
 def folder_of(name: str) -> str:
     """Return the name of a folder for a feeder, whose name comes from a script and may be any text.
 
-    Examples
-    --------
     >>> folder_of("ieee13"), folder_of("../up and away")
     ('ieee13', '_up_and_away')
     """
@@ -323,9 +336,6 @@ def folder_of(name: str) -> str:
 
 def _read(name: str, load_set: str | None, switch: list[str] | None, leave_out: list[str] | None) -> Feeder:
     """Read a feeder of tables or a script, or end with every problem in it."""
-    from gridpeers.feeder import Feeder, reader_of
-    from gridpeers.plant.tables import FeederError
-
     if reader_of(name):
         if load_set is not None:
             fail(
@@ -334,22 +344,20 @@ def _read(name: str, load_set: str | None, switch: list[str] | None, leave_out: 
         return read_script(name, switch or [], leave_out or [])
     if switch or leave_out:
         fail(["--switch and --leave-out are for .dss and .glm files; a folder's tables can be edited"], BAD_INPUT)
-    try:
+    with _problems_told(name, name):
         return Feeder.read(name, load_set or "main")
-    except FeederError as error:
-        refuse(error)
 
 
 def _describe(feeder: Feeder) -> None:
-    from gridpeers.plant.equipment.imported_equipment import is_behind
-
     load, generation = (sum(by_bus.values()) / 1e3 for by_bus in (feeder.load_by_bus(), feeder.generation_by_bus()))
     buses = [bus for bus in feeder.buses if not is_behind(bus.name)]
-    nodes = sum(len(bus.phases) for bus in buses)
-    typer.echo(
-        f"{feeder.name}: {counted(len(buses), 'bus', 'buses')}, {counted(nodes, 'node')}, "
-        f"{load:.0f} kW of load, "
-        f"{f'{generation:.0f} kW of constant generation, ' if generation else ''}"
-        f"{counted(len(feeder.switches), 'switch', 'switches')}, {counted(len(feeder.inverters), 'inverter')}, "
-        f"{feeder.f_nom:g} Hz"
-    )
+    parts = [
+        counted(len(buses), "bus", "buses"),
+        counted(sum(len(bus.phases) for bus in buses), "node"),
+        f"{load:.0f} kW of load",
+        *([f"{generation:.0f} kW of constant generation"] if generation else []),
+        counted(len(feeder.switches), "switch", "switches"),
+        counted(len(feeder.inverters), "inverter"),
+        f"{feeder.f_nom:g} Hz",
+    ]
+    typer.echo(f"{feeder.name}: {', '.join(parts)}")

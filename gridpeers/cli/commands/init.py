@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import shlex
 import shutil
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from gridpeers.cli.usage import BAD_INPUT, fail
+from gridpeers.output_folders import FolderError, shown, whole_folder
 from gridpeers.rooms import ROOMS
+from gridpeers.wire.driver.command_line import command_line
 
 TEMPLATE = Path(__file__).parents[1] / "template"
 """Folder that is copied."""
@@ -46,12 +50,6 @@ def init(
 
     Example:  gridpeers init my-study --feeder Master.dss
     """
-    import shlex
-    from importlib.util import find_spec
-
-    from gridpeers.output_folders import FolderError, shown, whole_folder
-    from gridpeers.wire.driver.command_line import command_line
-
     try:
         if feeder is None:
             if switch or leave_out or inverters:

@@ -13,6 +13,9 @@ import typer
 from gridpeers.cli.suggestions import Commands
 from gridpeers.cli.usage import BAD_INPUT, fail, require
 from gridpeers.wire.keys import Role
+from gridpeers.wire.trust import site_authority
+from gridpeers.wire.trust.credentials import DATE_AND_TIME
+from gridpeers.wire.trust.key_folder import CA_KEY, LIST, KeysError, key_warnings, read_list
 
 app = typer.Typer(
     cls=Commands,
@@ -24,9 +27,8 @@ app = typer.Typer(
     "Example:  gridpeers keys init lab",
 )
 
-_Keys = Annotated[Path, typer.Option("--keys", metavar="DIR", help="Folder of the site; the present one if left out.")]
-_Days = Annotated[float, typer.Option("--days", metavar="N", help="Life of the certificates (days).")]
-_Name = Annotated[str, typer.Argument(metavar="NAME", help="Name; of an agent that of its inverter, e.g. inv4.")]
+_Keys = Annotated[Path, typer.Option(metavar="DIR", help="Folder of the site; the present one if left out.")]
+_Days = Annotated[float, typer.Option(metavar="N", help="Life of the certificates (days).")]
 
 
 @app.command()
@@ -41,9 +43,7 @@ def init(
     Example:  gridpeers keys init lab
     """
     with _errors(days):
-        from gridpeers.wire.trust.site_authority import make_site
-
-        known = make_site(site, days=days)
+        known = site_authority.make_site(site, days=days)
         names = ", ".join(f"{member.name} ({member.role})" for member in known.members)
         typer.echo(f"{site}: the site {known.site}, with certificates of {names}, until {known.members[0].expires}")
         typer.echo(
@@ -66,28 +66,26 @@ def issue(
     Example:  gridpeers keys issue inv1 inv2 --keys lab
     """
     with _errors(days):
-        from gridpeers.wire.trust.key_folder import KeysError, read_list
-        from gridpeers.wire.trust.site_authority import issue, objection
-
         names = list(dict.fromkeys(names))
         known = read_list(keys)
-        if problems := [why for name in names if (why := objection(known, name, role))]:
+        if problems := [why for name in names if (why := site_authority.objection(known, name, role))]:
             raise KeysError("\n".join(problems))  # all of them, before any certificate is issued
         for name in names:
-            member = issue(keys, name, role, days=days)
+            member = site_authority.issue(keys, name, role, days=days)
             typer.echo(f"{keys / name}.pem: certificate of {name}, role {member.role}, until {member.expires}")
 
 
 @app.command()
-def revoke(name: _Name, keys: _Keys = Path()) -> None:
+def revoke(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Name; of an agent that of its inverter, e.g. inv4.")],
+    keys: _Keys = Path(),
+) -> None:
     """Revoke a certificate: processes that start from now on with the new list keep its holder out.
 
     Example:  gridpeers keys revoke inv4 --keys lab
     """
     with _errors():
-        from gridpeers.wire.trust.site_authority import revoke as revoke_name
-
-        revoke_name(keys, name)
+        site_authority.revoke(keys, name)
         typer.echo(
             f"{name}: revoked. Copy {keys / 'members.json'} to every host, and start anew what runs: what has begun "
             "before still lets it in"
@@ -103,11 +101,7 @@ def show(keys: _Keys = Path()) -> None:
     Example:  gridpeers keys show --keys lab
     """
     with _errors():
-        from gridpeers.wire.trust.credentials import DATE_AND_TIME
-        from gridpeers.wire.trust.key_folder import CA_KEY, LIST, key_warnings, read_list
-
-        known, now = read_list(keys), f"{datetime.now(UTC):{DATE_AND_TIME}}"
-        warnings = key_warnings(keys)
+        known, now, warnings = read_list(keys), f"{datetime.now(UTC):{DATE_AND_TIME}}", key_warnings(keys)
         authority = f"; {CA_KEY} is here: certificates are issued in this folder" if (keys / CA_KEY).is_file() else ""
         if CA_KEY in warnings:
             authority = f"; {CA_KEY} is here, but cannot be used: no certificates can be issued here"
@@ -129,8 +123,6 @@ def _errors(days: float = 1.0) -> Iterator[None]:
     require({"cryptography": "certificates"}, "install it: pip install 'gridpeers[keys]'")
     if not 0.0 < days <= 3650.0:
         fail([f"--days: must be more than 0 and at most 3650 days, got {days:g}"], BAD_INPUT)
-    from gridpeers.wire.trust.key_folder import KeysError
-
     try:
         yield
     except KeysError as error:

@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
-from gridpeers.cli.commands.options import LiveRun, of_live_run, usage_errors
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.cli.commands.options import LiveRun, of_live_run
 from gridpeers.cli.suggestions import Commands
 from gridpeers.cli.usage import BROKEN, fail
-
-if TYPE_CHECKING:
-    from gridpeers.agents.agent_config import AgentConfig
-    from gridpeers.scenarios.emulation.link_data import LinkCommand
+from gridpeers.netem.fault_schedule import Heal
+from gridpeers.netem.models.delay import DELAY, LONGEST_DELAY, Constant, RandomDelay, Uniform
+from gridpeers.netem.models.medium import Cut
+from gridpeers.netem.schema.fault import Fault
+from gridpeers.netem.schema.pattern import objections
+from gridpeers.scenarios.emulation.link_data import EVERYTHING, LinkCommand
+from gridpeers.scenarios.live.run_address import UsageError
+from gridpeers.scenarios.live.run_requests import (
+    check_link_command,
+    command_links,
+    link_states,
+    links_of_run,
+    links_text,
+)
+from gridpeers.wire.schema.plausible import Plausible
 
 link = typer.Typer(
     cls=Commands,
@@ -55,15 +67,12 @@ def set_(
 
     Example:  gridpeers link set inv1 inv4 --delay 0.1 --loss 0.2 --for 10
     """
-    with usage_errors():
-        given = {"loss": loss, "duplicate": duplicate, "corrupt": corrupt, "rate": rate}
-        fault = {key: value for key, value in given.items() if value is not None} | _delay(delay, jitter)
-        if not fault and not profile:
-            from gridpeers.scenarios.live.run_address import UsageError
-
-            options = "--delay, --jitter (with --delay), --loss, --duplicate, --corrupt, --rate, --profile"
-            raise UsageError(f"nothing is to be set; give one of {options}")
-        _give(links, "->", fault | {"profile": profile}, duration, live)
+    given = {"loss": loss, "duplicate": duplicate, "corrupt": corrupt, "rate": rate}
+    fault = {key: value for key, value in given.items() if value is not None} | _delay(delay, jitter)
+    if not fault and not profile:
+        options = "--delay, --jitter (with --delay), --loss, --duplicate, --corrupt, --rate, --profile"
+        raise UsageError(f"nothing is to be set; give one of {options}")
+    _give(links, "->", fault | {"profile": profile}, duration, live)
 
 
 @link.command()
@@ -83,10 +92,7 @@ def cut(
 
     Example:  gridpeers link cut inv4 inv7 --for 5
     """
-    with usage_errors():
-        from gridpeers.netem.models.medium import Cut
-
-        _give(links, "->" if one_way else "<->", {"cut": Cut(hold=hold)}, duration, live)
+    _give(links, "->" if one_way else "<->", {"cut": Cut(hold=hold)}, duration, live)
 
 
 @link.command()
@@ -106,8 +112,7 @@ def heal(
 
     Example:  gridpeers link heal inv4 inv7
     """
-    with usage_errors():
-        _give(links or [], "<->", None, None, live)
+    _give(links or [], "<->", None, None, live)
 
 
 @link.command()
@@ -120,8 +125,6 @@ def show(live: LiveRun) -> None:
     Example:  gridpeers link show
     """
     with live.client() as client:
-        from gridpeers.scenarios.live.run_requests import link_states, links_text
-
         t, states, silent = link_states(client)
         typer.echo(links_text(live.run, t, states), nl=False)
         if silent:
@@ -129,10 +132,6 @@ def show(live: LiveRun) -> None:
 
 
 def _delay(delay: float | None, jitter: float | None) -> dict[str, Any]:
-    from gridpeers.netem.models.delay import DELAY, LONGEST_DELAY, Uniform
-    from gridpeers.scenarios.live.run_address import UsageError
-    from gridpeers.wire.schema.plausible import Plausible
-
     if jitter is None:
         return {} if delay is None else {"delay": delay}
     if delay is None:
@@ -147,9 +146,6 @@ def _delay(delay: float | None, jitter: float | None) -> dict[str, Any]:
 
 
 def _pattern(links: list[str], arrow: str) -> str:
-    from gridpeers.scenarios.emulation.link_data import EVERYTHING
-    from gridpeers.scenarios.live.run_address import UsageError
-
     if not links:
         return EVERYTHING
     if "-" in links:
@@ -158,21 +154,13 @@ def _pattern(links: list[str], arrow: str) -> str:
         return f"{links[0]} {arrow} {links[1]}"
     if len(links) == 1:
         return links[0]
-    shown = " ".join(links)
     raise UsageError(
-        f'LINKS: "{shown}" is neither two names nor one pattern; write inv1 inv4, or "inv1 -> inv4" in quotes'
+        f'LINKS: "{" ".join(links)}" is neither two names nor one pattern; write inv1 inv4, or "inv1 -> inv4" in quotes'
     )
 
 
 def _give(links: list[str], arrow: str, fault: dict[str, Any] | None, duration: float | None, live: LiveRun) -> None:
-    """Check a link command, give it, and print the receivers' answers."""
-    from gridpeers.netem.fault_schedule import Heal
-    from gridpeers.netem.schema.fault import Fault
-    from gridpeers.netem.schema.pattern import objections
-    from gridpeers.scenarios.emulation.link_data import LinkCommand
-    from gridpeers.scenarios.live.run_address import UsageError
-    from gridpeers.scenarios.live.run_requests import check_link_command, command_links, links_of_run
-
+    """Check a link command, give it, and print the receivers' answers; without a fault it heals."""
     on = _pattern(links, arrow)
     if wrong := objections(on, None, {}):
         raise UsageError(f"LINKS: {wrong[0]}")
@@ -191,8 +179,7 @@ def _give(links: list[str], arrow: str, fault: dict[str, Any] | None, duration: 
         typer.echo(f"acknowledged: {', '.join(result.acknowledged)}")
     if result.absent:
         typer.echo(f"no agent yet, told when it comes: {', '.join(result.absent)}")
-    if note := _age_note(command, agent):
-        typer.echo(note)
+    _note_age(command, agent)
     failed = [f"{name}: {why}" for name, why in result.refused.items()]
     if result.silent:
         failed.append(f"not acknowledged by {', '.join(result.silent)}; is it frozen? It will be told again")
@@ -200,18 +187,13 @@ def _give(links: list[str], arrow: str, fault: dict[str, Any] | None, duration: 
         fail(failed, BROKEN)
 
 
-def _age_note(command: LinkCommand, agent: AgentConfig) -> str:
-    """Return a note if agents will ignore states for their age."""
-    from gridpeers.netem.models.delay import Constant, RandomDelay
-
+def _note_age(command: LinkCommand, agent: AgentConfig) -> None:
+    """Print a note if agents will ignore states for their age."""
     delay = command.fault.models().get("delay") if command.fault is not None else None
     limit = agent.control.degraded_communication.max_age or agent.max_age
-    usual = (
-        delay.delay_s if isinstance(delay, Constant) else delay.quantile(0.5) if isinstance(delay, RandomDelay) else 0.0
-    )
-    if usual < limit:
-        return ""
-    return (
-        f"note: a state {usual:g} s old is ignored, as agents use none older than {limit:g} s; see "
-        "[degraded_communication] max_age_s"
-    )
+    usual = delay.delay_s if isinstance(delay, Constant) else 0.0
+    if isinstance(delay, RandomDelay):
+        usual = delay.quantile(0.5)
+    if usual >= limit:
+        ignored = f"note: a state {usual:g} s old is ignored, as agents use none older than {limit:g} s"
+        typer.echo(f"{ignored}; see [degraded_communication] max_age_s")

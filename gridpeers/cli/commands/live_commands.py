@@ -1,13 +1,76 @@
-"""Commands to a live run: look at it, change it, end it. Each imports its modules when it is used, for help at once."""
+"""Commands to a live run, look at it, change it, end it, and the command that joins it: an agent."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
-from gridpeers.cli.commands.options import LiveRun, of_live_run, usage_errors
+from gridpeers.cli.commands.options import (
+    Connect,
+    Insecure,
+    Keys,
+    LiveRun,
+    Run,
+    Wait,
+    address,
+    check_open,
+    finish,
+    of_live_run,
+    usage_errors,
+)
 from gridpeers.cli.usage import BAD_INPUT, BROKEN, fail, terminal
+from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
+from gridpeers.scenarios.live import watching
+from gridpeers.scenarios.live.live_processes import agent_here
+from gridpeers.scenarios.live.run_address import (
+    RUN,
+    Access,
+    UsageError,
+    check_duration,
+    check_endpoint,
+    check_inverters,
+    check_wait,
+)
+from gridpeers.scenarios.live.run_requests import LEAVING, ask, has_ended, has_left, load_setting
+from gridpeers.wire.driver.ending import watch_readers
+
+
+@usage_errors()
+def agent(
+    inverters: Annotated[
+        list[str], typer.Argument(metavar="INVERTER", help="Names of their inverters, e.g. inv2; spare ones too.")
+    ],
+    run: Run = RUN,
+    connect: Connect = None,
+    listen: Annotated[
+        list[str] | None,
+        typer.Option(metavar="ENDPOINT", help="Where other agents connect; any free port if left out."),
+    ] = None,
+    wait: Wait = 60.0,
+    keys: Keys = None,
+    insecure: Insecure = False,
+    own_code: Annotated[
+        bool,
+        typer.Option("--own-code", help="Run a law, graph or link fault that only the plant, on another host, names."),
+    ] = False,
+) -> None:
+    """Run the agent of an inverter, or of several, in this terminal. Ctrl-C leaves properly: they are switched off.
+
+    Exit code: 0 it has left, 2 no plant or no such inverter, 3 it could not go on, 130 Ctrl-C.
+
+    Example:  gridpeers agent inv2 --keys lab --connect tls/192.168.1.10:7447
+    """
+    check_inverters(inverters)
+    if keys is not None and len(inverters) > 1:
+        raise UsageError(f"--keys: agents of one process have one certificate; start that of {inverters[1]} alone")
+    where = address(run, connect, access := Access(keys=keys, insecure=insecure), ("agent",), inverters[0])
+    for text in listen or ():
+        check_open("--listen", check_endpoint("--listen", text), access)
+    check_wait(wait)
+    watch_readers(quits=False)
+    listening = tuple(free_endpoint(text, option="--listen") for text in listen or ())
+    finish(agent_here(where, tuple(inverters), listening or None, wait, trusts=own_code))
 
 
 @of_live_run
@@ -17,9 +80,7 @@ def status(live: LiveRun) -> None:
     Example:  gridpeers status
     """
     with live.client(meet_agents=True) as client:
-        from gridpeers.scenarios.live.watching import look, plain
-
-        typer.echo(plain(look(client)), nl=False)
+        typer.echo(watching.plain(watching.look(client)), nl=False)
 
 
 @of_live_run
@@ -33,14 +94,9 @@ def watch(
 
     Example:  gridpeers watch --keys lab --connect tls/192.168.1.10:7447
     """
-    with usage_errors():
-        from gridpeers.scenarios.live.run_address import check_duration
-
-        check_duration(duration)
+    check_duration(duration)
     with live.client(meet_agents=True) as client:
-        from gridpeers.scenarios.live.watching import watch as watch_run
-
-        watch_run(client, terminal(), duration)
+        watching.watch(client, terminal(), duration)
 
 
 @of_live_run
@@ -57,8 +113,6 @@ def stop(
     Example:  gridpeers stop inv2
     """
     with live.client(acts=True) as client:
-        from gridpeers.scenarios.live.run_requests import LEAVING, ask, has_left
-
         typer.echo(ask(client, "stop", inverter))
         if not has_left(client, inverter):
             fail([f"{inverter} has not left within {LEAVING:g} s; is its process frozen?"], BROKEN)
@@ -84,10 +138,7 @@ def event(
     if synchronised and action == "open":
         fail(["--synchronised: only closing can wait for synchronism; leave it out to open a switch"], BAD_INPUT)
     with live.client(acts=True) as client:
-        from gridpeers.scenarios.live.run_requests import ask
-
-        closing: Literal["close", "synchronise"] = "synchronise" if synchronised else "close"
-        typer.echo(ask(client, "open" if action == "open" else closing, switch))
+        typer.echo(ask(client, "synchronise" if synchronised else "open" if action == "open" else "close", switch))
 
 
 @of_live_run
@@ -99,7 +150,7 @@ def load(
     live: LiveRun,
     factor: Annotated[
         float | None,
-        typer.Option("--factor", metavar="X", help="Times the power of the feeder's table; 1 is as before."),
+        typer.Option(metavar="X", help="Times the power of the feeder's table; 1 is as before."),
     ] = None,
     P: Annotated[float | None, typer.Option("--P", metavar="KW", help="Real power at nominal voltage.")] = None,
     Q: Annotated[float | None, typer.Option("--Q", metavar="KVAR", help="Reactive power at nominal voltage.")] = None,
@@ -113,10 +164,7 @@ def load(
 
     Example:  gridpeers load 48 --factor 1.5
     """
-    with usage_errors():
-        from gridpeers.scenarios.live.run_requests import ask, load_setting
-
-        setting = load_setting(factor, P, Q)
+    setting = load_setting(factor, P, Q)
     with live.client(acts=True) as client:
         typer.echo(ask(client, "load", name, setting))
 
@@ -130,8 +178,6 @@ def down(live: LiveRun) -> None:
     Example:  gridpeers down --run lab
     """
     with live.client(acts=True) as client:
-        from gridpeers.scenarios.live.run_requests import LEAVING, ask, has_ended
-
         typer.echo(ask(client, "down"))
         if not has_ended(client):
             fail([f"the plant has not ended within {LEAVING:g} s; is its process frozen?"], BROKEN)

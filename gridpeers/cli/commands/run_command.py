@@ -1,40 +1,45 @@
-"""The command `gridpeers run`. What it needs is imported when it is used, so that help comes at once."""
+"""The command `gridpeers run`."""
 
 from __future__ import annotations
 
+import socket
 from contextlib import nullcontext
+from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, NoReturn
+from typing import Annotated, Literal, NoReturn
 
 import typer
 
-from gridpeers.cli.commands.options import Keys
+from gridpeers.cli.commands.options import Keys, usage_errors
+from gridpeers.cli.progress import COMPILING, progress
 from gridpeers.cli.usage import (
     BAD_INPUT,
     BROKEN,
     CLAIM_FAILED,
     PASSED,
-    RUN,
     ScenarioName,
     chosen,
     ended_by_signals,
     fail,
     load,
     refuse,
-    require,
     require_loadable,
     terminal,
 )
+from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.simulators import SIMULATORS
 from gridpeers.rooms import ROOMS
-
-if TYPE_CHECKING:
-    import socket
-
-    from gridpeers.plant.equipment import Feeder
-    from gridpeers.runs.choices import Pace
-    from gridpeers.scenarios.run_request import Driver
-    from gridpeers.scenarios.schema import ScenarioModel
+from gridpeers.runs.choices import Pace, check_how
+from gridpeers.scenarios.drivers.free_endpoint import free_endpoint, local_endpoint
+from gridpeers.scenarios.drivers.secured import secured
+from gridpeers.scenarios.results.file_sizes import file_sizes, require_room
+from gridpeers.scenarios.results.run_files import RUNS, new_folder, shown
+from gridpeers.scenarios.run import run as run_scenario
+from gridpeers.scenarios.run_request import BrokenRunError, Driver, LawStopError, Request
+from gridpeers.scenarios.schema import ScenarioError, ScenarioModel
+from gridpeers.scenarios.schema.configs import configs
+from gridpeers.scenarios.schema.participants import inverters_of
+from gridpeers.wire.trust.key_folder import KeysError
 
 
 def run(
@@ -95,12 +100,6 @@ def run(
 
     Example:  gridpeers run islanding --case IV --driver inprocess
     """
-    if driver == "processes":
-        from gridpeers.scenarios.drivers.forking import prepare
-
-        prepare()
-    from gridpeers.runs.choices import Pace
-
     changes = {"plant.simulator": plant, "plant.helics.broker": broker}
     spec, feeder = load(scenario, {key: value for key, value in changes.items() if value is not None})
     if broker is not None and spec.plant.simulator != "helics":
@@ -109,29 +108,7 @@ def run(
         fail(["--port: goes with a page; add --view"], BAD_INPUT)
     pace = Pace(clock=clock, speed=speed, strict=strict, processes=processes, keys=keys)
     page = ROOMS.resolve("page_socket")(port) if view else None
-    chosen_cases = chosen(spec, case, seed)
-    carry_out(chosen_cases, feeder, driver, out, pace, require_checks=require_checks, page=page)
-
-
-def _check_keys(folder: Path, spec: ScenarioModel, feeder: Feeder) -> None:
-    """End with every problem of the certificates that a run needs, before anything starts; say which end soon."""
-    require({"cryptography": "certificates"}, "install it: pip install 'gridpeers[keys]'")
-    from gridpeers.scenarios.drivers.secured import secured
-    from gridpeers.scenarios.schema.configs import configs
-    from gridpeers.scenarios.schema.participants import inverters_of
-    from gridpeers.wire.trust.key_folder import KeysError
-
-    inverters = tuple(row.name for row in inverters_of(spec, feeder))
-    notes: dict[str, None] = {}
-    try:
-        for case in spec.cases:
-            plant, agents = configs(spec, feeder, case)
-            started = {agent.name for agent in agents}
-            notes |= dict.fromkeys(secured(plant, agents, folder, started=started, inverters=inverters)[2])
-    except KeysError as error:
-        fail(str(error).split("\n"), BAD_INPUT)
-    for note in notes:
-        typer.echo(f"NOTE  {note}")
+    carry_out(chosen(spec, case, seed), feeder, driver, out, pace, require_checks=require_checks, page=page)
 
 
 def carry_out(
@@ -150,59 +127,38 @@ def carry_out(
 
     A `page` is opened at its socket, and follows the run.
     """
-    from datetime import datetime
-
-    from gridpeers.runs.choices import check_how
-    from gridpeers.scenarios.schema import ScenarioError
-
     try:
         check_how(driver, pace, spec, dash="--")
     except ScenarioError as error:
         refuse(error)
     if pace.get("keys") is not None:
         _check_keys(Path(pace["keys"] or ""), spec, feeder)
-    require(RUN | ({"zenoh": "the driver with processes"} if driver == "processes" else {}))
     simulators = {name: SIMULATORS.resolve(name) for name in (spec.plant.simulator, bridge) if name}
     for simulator in simulators.values():
         if simulator.package:
             require_loadable(simulator.package, simulator.words)
-
-    from gridpeers.cli.progress import COMPILING, progress
-    from gridpeers.scenarios.drivers.free_endpoint import ListenError, free_endpoint, local_endpoint
-    from gridpeers.scenarios.results.file_sizes import file_sizes, require_room
-    from gridpeers.scenarios.results.run_files import RUNS, FolderError, new_folder, shown
-    from gridpeers.scenarios.run import run as run_scenario
-    from gridpeers.scenarios.run_request import BrokenRunError, LawStopError, Request
-
-    try:
+    with usage_errors():
         if driver == "processes":
             free_endpoint(local_endpoint(spec.processes.port), option="processes.port")
         sizes = file_sizes(spec, feeder, clock=pace.get("clock", "simulated"))
         require_room(out or RUNS, sizes, "--out")
         folder = new_folder(out, spec.name, datetime.now().astimezone())
-    except (ListenError, FolderError) as error:
-        fail([str(error)], BAD_INPUT)
-
-    console = terminal()
     if sizes.sentence:
         typer.echo(f"{spec.name}: {sizes.sentence}")
     own = [simulator.starting(spec.plant.simulators.get(name)) for name, simulator in simulators.items()]
-    said = next(filter(None, own), COMPILING)
     request = Request(
         scenario=spec, feeder=feeder, driver=driver, folder=folder, bridge=bridge, outside=outside, **pace
     )
-    left = f"what came until then is in {shown(folder)}/"
+    console, left = terminal(), f"what came until then is in {shown(folder)}/"
     with ROOMS.resolve("page_beside")(folder, page, spec.name) if page else nullcontext():
         try:
-            with (
-                ended_by_signals(left),
-                progress(console, tuple(spec.cases), said) as tell,
-            ):
+            said = next(filter(None, own), COMPILING)
+            with ended_by_signals(left), progress(console, tuple(spec.cases), said) as tell:
                 report = run_scenario(request, tell)
-        except LawStopError as error:
-            fail([f"FAILED  {error}", *([left] if folder.is_dir() else [])], CLAIM_FAILED)
         except BrokenRunError as error:
-            fail([f"the run broke: {error}", *([left] if folder.is_dir() else [])], BROKEN)
+            by_law = isinstance(error, LawStopError)
+            why = f"FAILED  {error}" if by_law else f"the run broke: {error}"
+            fail([why, *([left] if folder.is_dir() else [])], CLAIM_FAILED if by_law else BROKEN)
         from gridpeers.scenarios.checks.check_registry import LAW_FAILED
         from gridpeers.scenarios.results.report import show
 
@@ -210,3 +166,18 @@ def carry_out(
     failed = any(verdict.status == "FAIL" for verdict in report.verdicts) or report.fails(LAW_FAILED)
     failed |= require_checks and report.fails()
     raise typer.Exit(CLAIM_FAILED if failed else PASSED)
+
+
+def _check_keys(folder: Path, spec: ScenarioModel, feeder: Feeder) -> None:
+    """End with every problem of the certificates that a run needs, before anything starts; say which end soon."""
+    inverters = tuple(row.name for row in inverters_of(spec, feeder))
+    notes: dict[str, None] = {}
+    try:
+        for case in spec.cases:
+            plant, agents = configs(spec, feeder, case)
+            started = {agent.name for agent in agents}
+            notes |= dict.fromkeys(secured(plant, agents, folder, started=started, inverters=inverters)[2])
+    except KeysError as error:
+        fail(str(error).split("\n"), BAD_INPUT)
+    for note in notes:
+        typer.echo(f"NOTE  {note}")

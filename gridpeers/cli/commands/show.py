@@ -9,11 +9,10 @@ from typing import Annotated, Literal, get_args
 
 import typer
 
-from gridpeers.cli.usage import BAD_INPUT, fail, load, refuse, require, terminal
+from gridpeers.cli.usage import BAD_INPUT, fail, load, refuse, terminal
 from gridpeers.wire.wording import counted, printable
 
 Topic = Literal["keys", "messages", "scenario", "feeder", "laws", "metrics", "claims", "checks", "faults", "graphs"]
-"""Values of the argument of `doc`."""
 
 
 def list_() -> None:
@@ -43,7 +42,6 @@ def check(
     Example:  gridpeers check my-islanding.toml
     """
     spec, feeder = load(file)
-    require({"numba": "the plant", "scipy": "the plant", "threadpoolctl": "the plant"})
 
     from gridpeers.cli.progress import TRYING, explained
     from gridpeers.rooms import ROOMS
@@ -55,9 +53,8 @@ def check(
         problem = start_problem(spec, feeder)
     if problem:
         fail([f"{file}: the plant cannot start: {problem}"], BAD_INPUT)
-    robustness_notes = ROOMS.resolve("robustness_notes")
-    notes = (supply_notes(spec, feeder), liar_notes(spec, feeder), robustness_notes(spec, feeder))
-    for note in chain(*notes, security_notes(spec, feeder, file)):
+    of_scenario = (supply_notes, liar_notes, ROOMS.resolve("robustness_notes"))
+    for note in chain(*(notes(spec, feeder) for notes in of_scenario), security_notes(spec, feeder, file)):
         typer.echo(f"NOTE  {note}")
     typer.echo(
         f"{file}: can be run: {counted(len(spec.cases), 'case')} {', '.join(spec.cases)}; "
@@ -98,7 +95,6 @@ def compare(
 
     Example:  gridpeers compare runs/islanding/latest runs/mine/latest
     """
-    require({"matplotlib": "the figure", "pandas": "the tables"})
     kinds = (".png", ".pdf", ".svg")
     if out.suffix not in kinds:
         fail([f"--out {out}: must end in {', '.join(kinds)}"], BAD_INPUT)
@@ -110,9 +106,8 @@ def compare(
     try:
         comparison = compare_runs(first, second, names=_names(first, second))
         typer.echo(str(comparison))
-        figure = comparison.plot()
         out.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(out)
+        comparison.plot().savefig(out)
     except ScenarioError as error:
         refuse(error)
     except FolderError as error:
@@ -150,8 +145,6 @@ def metrics(
 
     Example:  gridpeers metrics runs/islanding/latest/IV
     """
-    require({"mcap": "the record of a run"})
-
     from gridpeers.scenarios.record.record_metrics import report_of
     from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
     from gridpeers.scenarios.results.report import show

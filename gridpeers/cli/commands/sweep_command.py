@@ -1,12 +1,14 @@
-"""The command `gridpeers sweep`. What it needs is imported when it is used, so that help comes at once."""
+"""The command `gridpeers sweep`."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from gridpeers.cli.progress import remaining
 from gridpeers.cli.usage import (
     BAD_INPUT,
     BROKEN,
@@ -20,14 +22,12 @@ from gridpeers.cli.usage import (
     require,
     terminal,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from gridpeers.scenarios.sweep.study import Summary
-    from gridpeers.scenarios.sweep.sweep_reading import Plan
-
-_PACKAGES = {"joblib": "the runs over all cores", "pyarrow": "the table", "matplotlib": "the plots"}
+from gridpeers.scenarios.results.run_files import FolderError, refusal, shown
+from gridpeers.scenarios.schema import ScenarioError
+from gridpeers.scenarios.sweep.study import Summary, SweepFolder, folder_of, study
+from gridpeers.scenarios.sweep.sweep_reading import Plan, read_sweep
+from gridpeers.scenarios.sweep.workers import WorkersError, cores
+from gridpeers.wire.driver.command_line import command_line
 
 
 def sweep(
@@ -51,28 +51,40 @@ def sweep(
 
     Example:  gridpeers sweep topology --jobs 2
     """
-    from gridpeers.scenarios.schema import ScenarioError
-    from gridpeers.scenarios.sweep.sweep_reading import read_sweep
-
-    try:
-        plan = read_sweep(file)
-    except ScenarioError as error:
-        refuse(error)
-    check_packages(dask=bool(dask))
+    plan = read(file, dask)
     if dry_run:
         typer.echo(_size(file, plan))
         return
-    from gridpeers.scenarios.sweep.study import folder_of
-
     again = ["sweep", file, *(["--out", str(out)] if out else [])]
     summary = finish(file, plan, folder_of(out, plan.name), jobs, dask, again)
     for line in failure_lines(summary):
         typer.secho(line, fg="red", bold=True)
-    for line in _result_lines(summary):
-        typer.echo(line)
-    if sum(summary.broke.values()) == summary.runs:
+    broke = sum(summary.broke.values())
+    ended = f"{summary.runs - broke - sum(summary.law_failed.values())} runs reached their end"
+    typer.echo(f"{ended}, {broke} broke:" if broke else ended)
+    for why, count in summary.broke.most_common(3):
+        typer.echo(f"  {count} x {why}")
+    if len(summary.broke) > 3:
+        typer.echo(f"  and for {len(summary.broke) - 3} more reasons: see the column why")
+    typer.echo(f"table: {shown(summary.table)}")
+    if summary.plots:
+        typer.echo(f"plots: {shown(summary.plots[0].parent)}/ ({len(summary.plots)})")
+    if broke == summary.runs:
         raise typer.Exit(BROKEN)
     raise typer.Exit(CLAIM_FAILED if summary.law_failed else PASSED)
+
+
+def read(file: str, dask: str) -> Plan:
+    """Return the plan of a sweep; or end with every problem in it, or with what to install."""
+    try:
+        plan = read_sweep(file)
+    except ScenarioError as error:
+        refuse(error)
+    modules = {"joblib": "the runs over all cores", "pyarrow": "the table"}
+    if dask:
+        modules["distributed"] = "--dask"
+    require(modules, "install what sweeps need: pip install 'gridpeers[sweep]'")
+    return plan
 
 
 def finish(file: str, plan: Plan, path: Path, jobs: int | None, dask: str, again: Sequence[str]) -> Summary:
@@ -80,26 +92,22 @@ def finish(file: str, plan: Plan, path: Path, jobs: int | None, dask: str, again
 
     `again` has the words of the command that goes on with what was interrupted.
     """
-    from gridpeers.cli.progress import remaining
-    from gridpeers.scenarios.results.run_files import FolderError, refusal, shown
-    from gridpeers.scenarios.sweep.study import SweepFolder, study
-    from gridpeers.scenarios.sweep.workers import WorkersError, cores
-    from gridpeers.wire.driver.command_line import command_line
-
     console = terminal()
     try:
         with interruptible(), SweepFolder(path, plan) as folder:
             console.print(_size(file, plan, len(folder.done)), soft_wrap=True)
             try:
                 with remaining(console, size := len(plan.runs)) as tell:
-
-                    def note(done: int) -> None:
-                        tell(f"{plan.name}, {done} of {size} runs", done)
-
-                    return study(plan, folder, note, jobs=jobs or cores(), dask=dask)
+                    return study(
+                        plan,
+                        folder,
+                        lambda done: tell(f"{plan.name}, {done} of {size} runs", done),
+                        jobs=jobs or cores(),
+                        dask=dask,
+                    )
             except (KeyboardInterrupt, OSError, WorkersError) as error:
                 onward = command_line(*again)
-                kept = f"{folder.kept} of {len(plan.runs)} runs are kept in {shown(path)}/; go on with: {onward}"
+                kept = f"{folder.kept} of {size} runs are kept in {shown(path)}/; go on with: {onward}"
                 if isinstance(error, KeyboardInterrupt):
                     fail([f"interrupted; {kept}"], exit_code(error))
                 fail([refusal(path, error) if isinstance(error, OSError) else str(error), kept], BROKEN)
@@ -112,31 +120,8 @@ def failure_lines(summary: Summary) -> list[str]:
     return [f"FAILED  {count} x {why}" for why, count in summary.law_failed.most_common(3)]
 
 
-def _result_lines(summary: Summary) -> list[str]:
-    from gridpeers.scenarios.results.run_files import shown
-
-    broke = sum(summary.broke.values())
-    lines = [
-        f"{summary.runs - broke - sum(summary.law_failed.values())} runs reached their end"
-        + (f", {broke} broke:" if broke else "")
-    ]
-    lines += [f"  {count} x {why}" for why, count in summary.broke.most_common(3)]
-    if len(summary.broke) > 3:
-        lines.append(f"  and for {len(summary.broke) - 3} more reasons: see the column why")
-    lines.append(f"table: {shown(summary.table)}")
-    if summary.plots:
-        lines.append(f"plots: {shown(summary.plots[0].parent)}/ ({len(summary.plots)})")
-    return lines
-
-
 def _size(file: str, plan: Plan, done: int = 0) -> str:
     samples = plan.runs[-1].sample + 1
     left = f"; {done} are done already" if done else ""
     varied = ", ".join(plan.parameters)
     return f"{file}: {len(plan.runs)} runs ({samples} samples of {plan.base.name}) over {varied}{left}"
-
-
-def check_packages(*, dask: bool = False) -> None:
-    """End with what to install when a package of the extra `sweep` is missing."""
-    modules = _PACKAGES | ({"distributed": "--dask"} if dask else {})
-    require(modules, "install what sweeps need: pip install 'gridpeers[sweep]'")

@@ -1,9 +1,7 @@
 """What the README tells to type and to write works as it stands."""
 
-import inspect
 import re
 import shlex
-import sys
 import tomllib
 from importlib import util
 from pathlib import Path
@@ -34,12 +32,6 @@ def commands(row: str) -> list[list[str]]:
 
 
 COMMANDS = [(row, line) for row in ROWS for line in commands(row)]
-
-
-def test_the_readme_has_snippets_and_commands() -> None:
-    """The tests below look at something."""
-    assert SNIPPETS
-    assert len(COMMANDS) >= 8
 
 
 @pytest.mark.parametrize("snippet", SNIPPETS)
@@ -78,8 +70,7 @@ def test_a_row_whose_command_needs_an_extra_tells_to_install_it(
     monkeypatch.setattr(util, "find_spec", lambda name, *rest: None if name in SWEEP_EXTRA else find(name, *rest))
     monkeypatch.chdir(tmp_path)
     for line in commands(row):
-        command, _ = command_of(line)
-        if "check_packages" in inspect.getsource(sys.modules[command.callback.__module__]):
+        if line[0] in ("sweep", "experiment"):
             code, said = invoke(*line)
             missing.append(code == 2 and "gridpeers[sweep]" in said)
 

@@ -5,16 +5,19 @@ from typing import Any
 import pytest
 import typer
 
-from gridpeers.cli.root import COMMANDS, OWN_COMMANDS, app
+from gridpeers.cli.root import COMMANDS, SUMMARIES, app
 from tests.command_line import invoke
 
 
-@pytest.mark.parametrize("name", OWN_COMMANDS)
-def test_the_help_of_all_commands_has_the_first_sentence_of_each(name: str) -> None:
-    """The line that is known without the command's module is the one that the module has."""
+def test_the_help_of_all_commands_has_the_first_sentence_of_each() -> None:
+    """The line that is known without the command's module is the one that the module has, with an example below."""
     group: Any = typer.main.get_command(app)
+    commands = {name: group.get_command(None, name) for name in SUMMARIES}
 
-    assert group.get_command(None, name).get_short_help_str(200).startswith(OWN_COMMANDS[name].summary)
+    found = {name: command.get_short_help_str(200) for name, command in commands.items()}
+    assert [name for name, text in found.items() if not text.startswith(SUMMARIES[name])] == []
+    lacking = [name for name, command in commands.items() if f"Example:  gridpeers {name}" not in command.help]
+    assert lacking == ["feeder", "bridge"]  # groups
 
 
 def test_a_command_that_cannot_be_imported_leaves_the_others_alone(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -204,12 +204,3 @@ def test_options_that_do_not_fit_are_refused_before_anything_starts(
     assert invoke("keys", "init", "lab")[0] == 0
 
     assert text in refused(*words)
-
-
-def test_in_one_process_there_is_no_link_to_secure(elsewhere: Path) -> None:
-    """A scenario that asks for certificates runs in one process without them."""
-    (elsewhere / "mtls.toml").write_text(MTLS)
-
-    code, text = invoke("run", "mtls.toml", "--driver", "inprocess", "--out", "here")
-
-    assert code == 0, text

@@ -9,32 +9,13 @@ import msgspec
 import pytest
 
 from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.cli.commands import options
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.scenarios.live import run_address
 from gridpeers.scenarios.live.live_options import LiveOptions, configure
 from gridpeers.scenarios.schema import load_scenario
 from tests.command_line import invoke
 
-COMMANDS = ("plant", "agent", "up", "down", "status", "watch", "view", "stop", "event", "load")
-
-
 pytestmark = pytest.mark.usefixtures("elsewhere")
-
-
-@pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_has_help_with_an_example(command: str) -> None:
-    """--help tells what a command does, shows one, and takes --run."""
-    code, text = invoke(command, "--help")
-
-    assert code == 0
-    assert f"Example:  gridpeers {command}" in text
-    assert "--run NAME" in text
-
-
-def test_the_defaults_in_the_help_are_those_of_the_place() -> None:
-    """The help must not import what the place needs, so it has its own copy."""
-    assert (options.RUN, options.ENDPOINT) == (run_address.RUN, run_address.ENDPOINT)
 
 
 @pytest.mark.parametrize(
