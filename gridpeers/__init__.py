@@ -20,43 +20,57 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from gridpeers.agents.carriers.law_registry import LAWS
     from gridpeers.agents.graphs import GRAPHS
-    from gridpeers.agents.laws.law import Law, Neighbour, Own, SetPoints, Term, Terms
-    from gridpeers.feeder import Feeder
-    from gridpeers.lab.predict.prediction import Prediction, predict
-    from gridpeers.lab.replay.counterfactual import Counterfactual, counterfactual
-    from gridpeers.lab.replay.replay import replay
-    from gridpeers.netem.models.own_fault import FAULTS, LinkFault
-    from gridpeers.runs.comparison import Comparison, compare
-    from gridpeers.runs.result import Result, Results
-    from gridpeers.runs.running import read
-    from gridpeers.runs.sweeping import sweep
-    from gridpeers.scenario import Scenario, load
+    from gridpeers.agents.laws.law import Law as Law
+    from gridpeers.agents.laws.law import Neighbour as Neighbour
+    from gridpeers.agents.laws.law import Own as Own
+    from gridpeers.agents.laws.law import SetPoints as SetPoints
+    from gridpeers.agents.laws.law import Term as Term
+    from gridpeers.agents.laws.law import Terms as Terms
+    from gridpeers.feeder import Feeder as Feeder
+    from gridpeers.lab.predict.prediction import Prediction as Prediction
+    from gridpeers.lab.predict.prediction import predict as predict
+    from gridpeers.lab.replay.counterfactual import Counterfactual as Counterfactual
+    from gridpeers.lab.replay.counterfactual import counterfactual as counterfactual
+    from gridpeers.lab.replay.replay import replay as replay
+    from gridpeers.netem.models.own_fault import FAULTS
+    from gridpeers.netem.models.own_fault import LinkFault as LinkFault
+    from gridpeers.runs.comparison import Comparison as Comparison
+    from gridpeers.runs.comparison import compare as compare
+    from gridpeers.runs.result import Result as Result
+    from gridpeers.runs.result import Results as Results
+    from gridpeers.runs.running import read as read
+    from gridpeers.runs.sweeping import sweep as sweep
+    from gridpeers.scenario import Scenario as Scenario
+    from gridpeers.scenario import load as load
     from gridpeers.scenarios.checks.check_registry import CHECKS
-    from gridpeers.scenarios.checks.check_verdict import Check, CheckVerdict, NotJudgedError, Violation
-    from gridpeers.scenarios.checks.checked_case import CheckedCase
-    from gridpeers.scenarios.results.claims import (
-        CLAIMS,
-        Benchmark,
-        Claim,
-        Judge,
-        Published,
-        Verdict,
-        judge,
-    )
-    from gridpeers.scenarios.results.findings import Findings
+    from gridpeers.scenarios.checks.check_verdict import Check as Check
+    from gridpeers.scenarios.checks.check_verdict import CheckVerdict as CheckVerdict
+    from gridpeers.scenarios.checks.check_verdict import NotJudgedError as NotJudgedError
+    from gridpeers.scenarios.checks.check_verdict import Violation as Violation
+    from gridpeers.scenarios.checks.checked_case import CheckedCase as CheckedCase
+    from gridpeers.scenarios.results.claims import CLAIMS
+    from gridpeers.scenarios.results.claims import Benchmark as Benchmark
+    from gridpeers.scenarios.results.claims import Claim as Claim
+    from gridpeers.scenarios.results.claims import Judge as Judge
+    from gridpeers.scenarios.results.claims import Published as Published
+    from gridpeers.scenarios.results.claims import Verdict as Verdict
+    from gridpeers.scenarios.results.claims import judge as judge
+    from gridpeers.scenarios.results.findings import Findings as Findings
     from gridpeers.scenarios.results.metric import METRICS
-    from gridpeers.scenarios.results.plots import style as figures
-    from gridpeers.scenarios.results.run_files import FolderError
-    from gridpeers.scenarios.results.window_metrics import WindowData
-    from gridpeers.scenarios.run_request import BrokenRunError
-    from gridpeers.scenarios.schema.loading import catalogue
-    from gridpeers.scenarios.schema.scenario_errors import ScenarioError
-    from gridpeers.scenarios.sweep import axes as random_graphs
-    from gridpeers.scenarios.sweep import sweep_reading as sweep_files
-    from gridpeers.wire.schema.plausible import Plausible, Range, Unit
+    from gridpeers.scenarios.results.plots import style
+    from gridpeers.scenarios.results.run_files import FolderError as FolderError
+    from gridpeers.scenarios.results.window_metrics import WindowData as WindowData
+    from gridpeers.scenarios.run_request import BrokenRunError as BrokenRunError
+    from gridpeers.scenarios.schema.loading import catalogue as catalogue
+    from gridpeers.scenarios.schema.scenario_errors import ScenarioError as ScenarioError
+    from gridpeers.scenarios.sweep import axes, sweep_reading
+    from gridpeers.wire.schema.plausible import Plausible as Plausible
+    from gridpeers.wire.schema.plausible import Range as Range
+    from gridpeers.wire.schema.plausible import Unit as Unit
 
     claim, graph, law = CLAIMS.register, GRAPHS.register, LAWS.register  # one by one: each has a type of its own
     check, link_fault, metric = CHECKS.register, FAULTS.register, METRICS.register
+    figures, random_graphs, sweep_files = style, axes, sweep_reading
 
 _NAMES = {
     "gridpeers.agents.laws.law": ("Law", "Neighbour", "Own", "SetPoints", "Term", "Terms"),
@@ -96,59 +110,6 @@ _HOME = {name: f"{module}:{name}" for module, names in _NAMES.items() for name i
 _OF_ROOMS = ("Counterfactual", "Prediction", "counterfactual", "predict", "replay")
 """Public names that rooms above the face bring (`gridpeers.rooms`)."""
 
-__all__ = [
-    "Benchmark",
-    "BrokenRunError",
-    "Check",
-    "CheckVerdict",
-    "CheckedCase",
-    "Claim",
-    "Comparison",
-    "Counterfactual",
-    "Feeder",
-    "Findings",
-    "FolderError",
-    "Judge",
-    "Law",
-    "LinkFault",
-    "Neighbour",
-    "NotJudgedError",
-    "Own",
-    "Plausible",
-    "Prediction",
-    "Published",
-    "Range",
-    "Result",
-    "Results",
-    "Scenario",
-    "ScenarioError",
-    "SetPoints",
-    "Term",
-    "Terms",
-    "Unit",
-    "Verdict",
-    "Violation",
-    "WindowData",
-    "catalogue",
-    "check",
-    "claim",
-    "compare",
-    "counterfactual",
-    "figures",
-    "graph",
-    "judge",
-    "law",
-    "link_fault",
-    "load",
-    "metric",
-    "predict",
-    "random_graphs",
-    "read",
-    "replay",
-    "sweep",
-    "sweep_files",
-]
-
 if not TYPE_CHECKING:
 
     def __getattr__(name: str) -> Any:
@@ -168,11 +129,11 @@ if not TYPE_CHECKING:
         else:
             from gridpeers.wire.wording import suggestion
 
-            raise AttributeError(f'gridpeers has no "{name}"; {suggestion(name, __all__, "names")}')
+            raise AttributeError(f'gridpeers has no "{name}"; {suggestion(name, __dir__(), "names")}')
         globals()[name] = found
         return found
 
 
 def __dir__() -> list[str]:
     """Return the public names, for completion in a notebook."""
-    return [*__all__, "__version__"]
+    return sorted([*_HOME, *_OF_ROOMS, "__version__"])

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-import msgspec
+from msgspec.structs import replace
 
 from gridpeers.plant.equipment import NODES, PHASES, InverterRow
 from gridpeers.plant.equipment import Feeder as Tables
@@ -19,6 +19,10 @@ from gridpeers.rooms import READERS
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
+
+
+Names = Sequence[str]
+"""Several names; a text is one."""
 
 
 class Feeder(Tables, frozen=True, kw_only=True):
@@ -49,17 +53,11 @@ class Feeder(Tables, frozen=True, kw_only=True):
         """
         from gridpeers.plant.tables import read_feeder
 
-        tables = read_feeder(str(name), load_set)
-        return cls(**{name: getattr(tables, name) for name in tables.__struct_fields__})
+        return _of_tables(read_feeder(str(name), load_set))
 
     @classmethod
     def from_opendss(
-        cls,
-        path: str | Path,
-        f_nom: float | None = None,
-        *,
-        leave_out: Sequence[str] = (),
-        switches: Sequence[str] = (),
+        cls, path: str | Path, f_nom: float | None = None, *, leave_out: Names = (), switches: Names = ()
     ) -> Feeder:
         """Return the feeder of a script for OpenDSS, often Master.dss; needs the extra `opendss`.
 
@@ -71,12 +69,7 @@ class Feeder(Tables, frozen=True, kw_only=True):
 
     @classmethod
     def from_glm(
-        cls,
-        path: str | Path,
-        f_nom: float | None = None,
-        *,
-        leave_out: Sequence[str] = (),
-        switches: Sequence[str] = (),
+        cls, path: str | Path, f_nom: float | None = None, *, leave_out: Names = (), switches: Names = ()
     ) -> Feeder:
         """Return the feeder of a model for GridLAB-D, once its controls rest; needs the extra `gridlabd`.
 
@@ -101,22 +94,11 @@ class Feeder(Tables, frozen=True, kw_only=True):
     ) -> Feeder:
         """Return the feeder with one inverter more; ValueError says why there can be none.
 
-        Parameters
-        ----------
-        bus : str
-            A bus that has these phases, without another inverter on them.
-        kind : {"GFM", "GFL"}
-            Grid-forming or grid-following.
-        P_rated : float
-            Rated power (W, of all its phases).
-        neutral : str or int, optional
-            Node of the bus to which its phases return, by its number or letter, or "earth"; by default the neutral to
-            which loads return, else earth. Its V, P and Q are those between its phases and this node.
-        m_p, m_q : float, optional
-            Droops (pu frequency per pu power, pu voltage per pu reactive power).
-        params : str, Mapping, GfmParameters or GflParameters, optional
-            Its own parameters, which replace those of `[plant.gfm]` or `[plant.gfl]` of a scenario: the name of a set
-            that the feeder has, some by their keys there ({"T_p_s": 0.02}), or all.
+        The bus must have its phases, without another inverter on them. P_rated (W) is of all its phases; m_p and m_q
+        are droops (pu frequency per pu power, pu voltage per pu reactive power). The phases return to `neutral`: a node
+        of the bus by its number or letter, or "earth"; by default the neutral to which loads return, else earth. Its
+        own parameters, `params`, replace those of `[plant.gfm]` or `[plant.gfl]` of a scenario: the name of a set that
+        the feeder has, some by their keys there ({"T_p_s": 0.02}), or all.
         """
         from gridpeers.plant.tables.parameter_sets import as_set
         from gridpeers.plant.tables.shunts import problems_of
@@ -141,19 +123,16 @@ class Feeder(Tables, frozen=True, kw_only=True):
         if problems := problems_of(row, found, self):
             raise ValueError("; ".join(problems))
         set_name, sets = as_set(name, kind, params, self.parameter_sets)
-        row = msgspec.structs.replace(
+        row = replace(
             row,
-            name=str(name),
-            microgrid=str(microgrid),
-            P_rated=float(P_rated),
-            m_p=float(m_p),
-            m_q=float(m_q),
+            **{key: str(getattr(row, key)) for key in ("name", "microgrid")},
+            **{key: float(getattr(row, key)) for key in ("P_rated", "m_p", "m_q")},  # of numpy, maybe
             neutral=neutral_for(row.neutral, found, row.phases, neutrals_of(self).get(bus, "")),
             parameters=set_name,
         )
-        return msgspec.structs.replace(self, inverters=(*self.inverters, row), parameter_sets=sets)
+        return replace(self, inverters=(*self.inverters, row), parameter_sets=sets)
 
-    def solve(self, open_switches: Sequence[str] = ()) -> pd.DataFrame:
+    def solve(self, open_switches: Names = ()) -> pd.DataFrame:
         """Return the voltages that the substation alone gives: bus, phase, V (V), V_pu, angle_deg, to.
 
         They are 0 where it does not reach. Those of phases A, B and C count from the neutral of the bus, whose letter
@@ -209,17 +188,16 @@ def reader_of(name: str) -> Callable[..., Feeder] | None:
 
 
 def _imported(
-    format: str,
-    path: str | Path,
-    f_nom: float | None = None,
-    *,
-    leave_out: Sequence[str] = (),
-    switches: Sequence[str] = (),
+    format: str, path: str | Path, f_nom: float | None = None, *, leave_out: Names = (), switches: Names = ()
 ) -> Feeder:
     tables = READERS.resolve(format)(path, f_nom, leave_out=_listed(leave_out), switches=_listed(switches))
+    return _of_tables(tables)
+
+
+def _of_tables(tables: Tables) -> Feeder:
     return Feeder(**{name: getattr(tables, name) for name in tables.__struct_fields__})
 
 
-def _listed(names: Sequence[str]) -> Sequence[str]:
+def _listed(names: Names) -> Names:
     """Return several names, also where one is given as it is: its letters are never meant."""
     return [names] if isinstance(names, str) else names

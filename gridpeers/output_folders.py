@@ -10,35 +10,18 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from gridpeers.plant.tables.read import DATA, feeders
-from gridpeers.scenarios.results.run_files import (
-    RUNS,
-    FolderError,
-    empty_folder,
-    new_folder,
-    refusal,
-    set_broken,
-    set_status,
-    shown,
-    write_whole,
-)
-from gridpeers.scenarios.versions import versions
-from gridpeers.wire.driver.ending import OutputLostError
+from gridpeers.scenarios.results.run_files import RUNS as RUNS
+from gridpeers.scenarios.results.run_files import FolderError as FolderError
+from gridpeers.scenarios.results.run_files import empty_folder
+from gridpeers.scenarios.results.run_files import new_folder as new_folder
+from gridpeers.scenarios.results.run_files import refusal as refusal
+from gridpeers.scenarios.results.run_files import set_broken as set_broken
+from gridpeers.scenarios.results.run_files import set_status as set_status
+from gridpeers.scenarios.results.run_files import shown as shown
+from gridpeers.scenarios.results.run_files import write_whole as write_whole
+from gridpeers.scenarios.versions import versions as versions
+from gridpeers.wire.driver.ending import OutputLostError as OutputLostError
 from gridpeers.wire.wording import suggestion
-
-__all__ = [
-    "RUNS",
-    "FolderError",
-    "OutputLostError",
-    "feeder_folder",
-    "new_folder",
-    "refusal",
-    "set_broken",
-    "set_status",
-    "shown",
-    "versions",
-    "whole_folder",
-    "write_whole",
-]
 
 
 @contextmanager
@@ -50,21 +33,20 @@ def whole_folder(folder: Path) -> Iterator[None]:
     there = folder.exists()
     handle = os.open(empty_folder(folder), os.O_RDONLY | os.O_CLOEXEC)
     try:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise FolderError(f"{folder}: another command is writing in it; give another folder") from None
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         empty_folder(folder)  # another command may have filled it before the lock
         try:
             yield
-        except BaseException as error:  # an interruption, too
+        except BaseException:  # an interruption, too
             for path in folder.iterdir() if folder.is_dir() else ():
                 shutil.rmtree(path) if path.is_dir() else path.unlink()
             if folder.is_dir() and not there:
                 folder.rmdir()
-            if isinstance(error, OSError):
-                raise FolderError(refusal(folder, error)) from None
             raise
+    except BlockingIOError:
+        raise FolderError(f"{folder}: another command is writing in it; give another folder") from None
+    except OSError as error:
+        raise FolderError(refusal(folder, error)) from None
     finally:
         os.close(handle)
 

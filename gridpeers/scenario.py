@@ -42,7 +42,7 @@ def load(name_or_path: str | Path) -> Scenario:
     """
     path = find_scenario(str(name_or_path))
     text, tree = read_toml(path)
-    return Scenario._of(tree, path, text)  # noqa: SLF001  a constructor of this file
+    return Scenario._of(tree, path, text, frozenset(), Problems(path.name, text))  # noqa: SLF001  of this file
 
 
 class Scenario:
@@ -72,18 +72,18 @@ class Scenario:
         self._set(tree, Path("scenario.toml").absolute(), "", frozenset(), problems)
 
     @classmethod
-    def _of(cls, tree: Tree, path: Path, text: str) -> Scenario:
-        """Make one of a file's tables."""
+    def _of(cls, tree: Tree, path: Path, text: str, changed: frozenset[str], problems: Problems) -> Scenario:
+        """Make one of the tables of a file; `changed` keys have no line in it."""
         self = cls.__new__(cls)
-        self._set(tree, path, text, frozenset(), Problems(path.name, text))
+        self._set(tree, path, text, changed, problems)
         return self
 
     def _set(self, tree: Tree, path: Path, text: str, changed: frozenset[str], problems: Problems) -> None:
         self._tree, self._path, self._text, self._changed = tree, path, text, changed
-        spec, feeder = check_tables(tree, path, problems)
+        self._spec, feeder = check_tables(tree, path, problems)
         problems.raise_if_any()
         assert feeder is not None
-        self._spec, self._feeder = spec, feeder
+        self._feeder = feeder
 
     def replace(self, changes: Mapping[str, Any]) -> Scenario:
         """Return a scenario with values changed by the dotted path of their keys, e.g. `gains.k_p`, `event[0].t_s`.
@@ -115,9 +115,7 @@ class Scenario:
                     put(tree, path, plain(value))
             except (PathError, ValueError) as error:
                 problems.add(path, str(error))
-        new = type(self).__new__(type(self))
-        new._set(tree, self._path, self._text, changed, problems)  # noqa: SLF001  a new one of the same class
-        return new
+        return self._of(tree, self._path, self._text, changed, problems)
 
     def check(self) -> tuple[str, ...]:
         """Return notes on what the events de-energise or overload; ScenarioError if the plant cannot start."""
@@ -139,11 +137,13 @@ class Scenario:
     ) -> Result | Results:
         """Run a case, which gives a `Result`; several, or with None all, give `Results`.
 
+        The driver is "inprocess", or "processes": a plant process and processes of agents over Zenoh. In simulated time
+        both give the same bytes. ScenarioError if there is no such case, driver or clock; BrokenRunError if a case
+        could not be finished, with the place of the log; FolderError if the folder has something in it, or cannot be
+        written.
+
         Parameters
         ----------
-        driver : {"inprocess", "processes"}
-            All in this process, or a plant process and processes of agents over Zenoh. In simulated time both give the
-            same bytes.
         keys : str or Path, optional
             With "processes": folder with certificates (`gridpeers keys init`), for mutual TLS. Without it links are
             open, on the loopback.
@@ -160,15 +160,6 @@ class Scenario:
             Takes the case, the time that it has reached (s) and its end (s).
         folder : str or Path, optional
             New or empty; takes the run folder with its figures. Without it the files live as long as the results.
-
-        Raises
-        ------
-        ScenarioError
-            If there is no such case, driver or clock.
-        BrokenRunError
-            If a case could not be finished; the text says where the log is.
-        FolderError
-            If there is something in the folder, or it cannot be written.
         """
         from gridpeers.runs.running import run
 
@@ -259,41 +250,32 @@ def plain(value: Any, depth: int = 0) -> Any:
         raise ValueError(f"tables and lists are nested more than {_DEEPEST} levels deep; does one contain itself?")
     if isinstance(value, Enum):
         return plain(value.value, depth)
+    if isinstance(value, str | PurePath):
+        try:
+            return str(value).encode().decode()
+        except UnicodeEncodeError:
+            raise ValueError("has half a character in it, which no file can hold") from None
     if isinstance(value, bool) or value is None:
         return value
-    if isinstance(value, str):
-        return _text(value)
-    if isinstance(value, int | float):
-        return next(kind(value) for kind in (int, float) if isinstance(value, kind))
-    if isinstance(value, PurePath):
-        return str(value)
+    if isinstance(value, int):
+        return int(value)
+    if isinstance(value, float):
+        return float(value)
     if isinstance(value, Mapping):
-        return {_text(str(key)): plain(below, depth + 1) for key, below in value.items()}
-    if isinstance(value, list | tuple | set | frozenset | range):
-        items = value if not isinstance(value, set | frozenset) else sorted(value, key=lambda it: (str(type(it)), it))
-        return [plain(item, depth + 1) for item in items]
+        return {plain(str(key)): plain(below, depth + 1) for key, below in value.items()}
+    if isinstance(value, set | frozenset):
+        value = sorted(value, key=lambda it: (str(type(it)), it))
+    if isinstance(value, list | tuple | range):
+        return [plain(item, depth + 1) for item in value]
     if hasattr(value, "__qualname__") and hasattr(value, "__module__"):
-        return _reference(value)
+        if "<" in value.__qualname__:
+            raise ValueError(
+                f"{value.__qualname__} is defined inside a function, where nobody can import it; define it at the top "
+                "of a module or of the notebook"
+            )
+        return f"{value.__module__}:{value.__qualname__}"
     if callable(getattr(value, "tolist", None)):  # numpy and pandas, which need not be imported for this
         return plain(value.tolist(), depth + 1)
     raise ValueError(
         f"a value of type {type(value).__name__} is none of a scenario's; give a number, text, list or table"
     )
-
-
-def _text(text: str) -> str:
-    """Return a text of Python's own type, if a file could hold it."""
-    try:
-        text.encode()
-    except UnicodeEncodeError:
-        raise ValueError("has half a character in it, which no file can hold") from None
-    return str(text)
-
-
-def _reference(it: Any) -> str:
-    if "<" in it.__qualname__:
-        raise ValueError(
-            f"{it.__qualname__} is defined inside a function, where nobody can import it; define it at the top of a "
-            "module or of the notebook"
-        )
-    return f"{it.__module__}:{it.__qualname__}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -37,18 +37,9 @@ def compare(a: RunSource, b: RunSource, *, names: tuple[str, str] = ("a", "b")) 
     words = tuple(names) if isinstance(names, list | tuple) else ()
     if len(words) != 2 or words[0] == words[1] or not all(isinstance(word, str) and word for word in words):
         raise ScenarioError([f'names: two different words are needed, as ("before", "after"), got {names!r:.60}'])
-    first, second = (read(run) if isinstance(run, str | Path) else run for run in (a, b))
-    for run in (first, second):
-        if not isinstance(run, Result | Results):
-            raise ScenarioError([f"compare: needs results or folders of runs, got {run!r:.60}"])
-    return Comparison(_pairs(first, second), (words[0], words[1]))
-
-
-def _pairs(a: Result | Results, b: Result | Results) -> dict[str, tuple[Result, Result]]:
-    """Return the cases that are compared; "" is the name of a pair of single cases."""
-    first, second = ({run.case: run} if isinstance(run, Result) else dict(run) for run in (a, b))
+    first, second = map(_cases_of, (a, b))
     if len(first) == len(second) == 1:
-        return {"": (*first.values(), *second.values())}  # type: ignore[dict-item]
+        return Comparison({"": (*first.values(), *second.values())}, (words[0], words[1]))  # type: ignore[dict-item]
     both = [case for case in first if case in second]
     if not both:
         raise ScenarioError(
@@ -58,11 +49,18 @@ def _pairs(a: Result | Results, b: Result | Results) -> dict[str, tuple[Result, 
                 f'gridpeers.compare(a["{next(iter(first))}"], b["{next(iter(second))}"])'
             ]
         )
-    return {case: (first[case], second[case]) for case in both}
+    return Comparison({case: (first[case], second[case]) for case in both}, (words[0], words[1]))
+
+
+def _cases_of(run: RunSource) -> Mapping[str, Result]:
+    run = read(run) if isinstance(run, str | Path) else run
+    if not isinstance(run, Result | Results):
+        raise ScenarioError([f"compare: needs results or folders of runs, got {run!r:.60}"])
+    return {run.case: run} if isinstance(run, Result) else run
 
 
 class Comparison:
-    """Two runs side by side; made by `gridpeers.compare`."""
+    """Two runs side by side; made by `gridpeers.compare`. The name of a pair of single cases is empty."""
 
     def __init__(self, pairs: dict[str, tuple[Result, Result]], names: tuple[str, str]) -> None:
         self._pairs = pairs
@@ -126,11 +124,18 @@ class Comparison:
 
 
 def _table(a: Result, b: Result, names: tuple[str, str]) -> pd.DataFrame:
-    """Return the metrics of one pair of cases; windows and islands that one of them lacks are nan there."""
+    """Return the metrics of one pair of cases; windows and islands that one of them lacks are nan there.
+
+    The rows of islands are below that of their metric, which has no value where both have several islands.
+    """
     frame = pd.concat([_column(run) for run in (a, b)], axis=1, keys=names, sort=False)
     frame.index.names = ["window", "metric"]
     both = set(a.islands.index.get_level_values("window")) & set(b.islands.index.get_level_values("window"))
-    frame = frame.loc[[row for row in _in_order(frame.index) if not (row[0] in both and row[1] in SHARING_OF_ISLANDS)]]
+    windows = list(dict.fromkeys(window for window, _ in frame.index))
+    metrics = list(dict.fromkeys(metric.partition(OF_ISLAND)[0] for _, metric in frame.index))
+    rows = [row for row in frame.index if not (row[0] in both and row[1] in SHARING_OF_ISLANDS)]
+    rows.sort(key=lambda row: (windows.index(row[0]), metrics.index(row[1].partition(OF_ISLAND)[0])))
+    frame = frame.loc[rows]
     frame["difference"] = frame[names[1]] - frame[names[0]]
     frame.attrs["units"] = dict(a.metrics.attrs["units"])
     return frame
@@ -145,13 +150,6 @@ def _column(run: Result) -> pd.Series:
         for name in SHARING_OF_ISLANDS
     }
     return pd.concat([whole, pd.Series(islands, dtype=float)]) if islands else whole
-
-
-def _in_order(rows: pd.MultiIndex) -> list[tuple[str, str]]:
-    """Return the rows of a table with those of islands below the row of their metric."""
-    windows = list(dict.fromkeys(window for window, _ in rows))
-    metrics = list(dict.fromkeys(metric.partition(OF_ISLAND)[0] for _, metric in rows))
-    return sorted(rows, key=lambda row: (windows.index(row[0]), metrics.index(row[1].partition(OF_ISLAND)[0])))
 
 
 def _keys(runs: tuple[Result, ...]) -> dict[str, Any]:

@@ -26,13 +26,11 @@ def metrics_frame(windows: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
         label: {name: value for name, value in window.items() if not isinstance(value, dict)}
         for label, window in windows.items()
     }
-    frame = pd.DataFrame.from_dict(rows, orient="index").rename_axis("window")
-    frame = frame.apply(pd.to_numeric)
+    frame = pd.DataFrame.from_dict(rows, orient="index").rename_axis("window").apply(pd.to_numeric)
     frame["reasons"] = [
         "; ".join(f"{name}: {text}" for name, text in window.get("reasons", {}).items()) for window in windows.values()
     ]
-    units = {name: unit_of(name) for name in frame}
-    frame.attrs["units"] = {name: unit for name, unit in units.items() if unit}
+    frame.attrs["units"] = {name: unit for name in frame if (unit := unit_of(name))}
     return frame
 
 
@@ -60,7 +58,7 @@ def checks_frame(verdicts: Iterable[CheckVerdict]) -> pd.DataFrame:
     """
     rows = {}
     for verdict in verdicts:
-        first = verdict.violations[0] if verdict.violations else Violation(text="")
+        first = next(iter(verdict.violations), Violation(text=""))
         of_first = {name: getattr(first, name) for name in ("t", "agent", "value", "unit", "limit")}
         text = {"text": first.text or verdict.reason}
         rows[verdict.check] = {"status": verdict.status, "violations": verdict.count} | of_first | text
@@ -75,11 +73,6 @@ def windows_of(case: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     return {label: value for label, value in case.items() if isinstance(value, dict) and "f_error_Hz" in value}
 
 
-def events_frame(file: Path) -> pd.DataFrame:
-    """Return the events of a run, from events.csv."""
-    return _from_csv(file, {"t_s": float})
-
-
 def failures_frame(failures: Mapping[str, Iterable[LawFailure]]) -> pd.DataFrame:
     """Return the laws that failed, by case, a row each."""
     rows = [(case, *failure) for case, of in failures.items() for failure in of]
@@ -88,11 +81,15 @@ def failures_frame(failures: Mapping[str, Iterable[LawFailure]]) -> pd.DataFrame
     return frame
 
 
+def events_frame(file: Path) -> pd.DataFrame:
+    """Return the events of a run, from events.csv."""
+    return _from_csv(file, {"t_s": float})
+
+
 def links_frame(file: Path) -> pd.DataFrame:
     """Return the fate of every message on emulated links, from links.csv; without the file there are no rows."""
-    if not file.exists():
-        return _from_csv(StringIO(",".join(COLUMNS) + "\n"), {})
-    return _from_csv(file, {"seq": int, "t_s": float, "delay_s": float})
+    kinds = {"seq": int, "t_s": float, "delay_s": float}
+    return _from_csv(file, kinds) if file.exists() else _from_csv(StringIO(",".join(COLUMNS) + "\n"), {})
 
 
 def _from_csv(file: Path | StringIO, kinds: Mapping[str, type]) -> pd.DataFrame:
@@ -103,7 +100,7 @@ def _from_csv(file: Path | StringIO, kinds: Mapping[str, type]) -> pd.DataFrame:
     frame = pd.read_csv(file, dtype=str, keep_default_na=False)
     for name, kind in kinds.items():
         frame[name] = pd.Series([kind(text or "nan") for text in frame[name]], dtype=kind)
-    units = {name: "s" for name in frame if name.endswith("_s")}
-    frame = frame.rename(columns={name: name.removesuffix("_s") for name in units})
-    frame.attrs["units"] = {name.removesuffix("_s"): unit for name, unit in units.items()}
+    times = [name for name in frame if name.endswith("_s")]
+    frame = frame.rename(columns={name: name.removesuffix("_s") for name in times})
+    frame.attrs["units"] = {name.removesuffix("_s"): "s" for name in times}
     return frame

@@ -47,17 +47,11 @@ class _FromFolder:
     """What one case and all cases of a run share."""
 
     def __init__(self, folder: RunFolder, spec: model.ScenarioModel, feeder: Feeder) -> None:
-        self._folder, self._spec, self._feeder = folder, spec, feeder
-
-    @property
-    def spec(self) -> model.ScenarioModel:
+        self._folder, self._feeder = folder, feeder
+        self.spec = spec
         """The scenario as it was run."""
-        return self._spec
-
-    @property
-    def folder(self) -> Path:
+        self.folder = folder.path
         """Folder with the files of the run (docs/results.md)."""
-        return self._folder.path
 
     @property
     def numbers(self) -> dict[str, Any]:
@@ -81,7 +75,6 @@ class Results(_FromFolder, Mapping[str, "Result"]):
     def __init__(self, folder: RunFolder, spec: model.ScenarioModel, feeder: Feeder) -> None:
         super().__init__(folder, spec, feeder)
         self._results = {case: Result(folder, spec, feeder, self, case) for case in spec.cases}
-        self._checks: dict[str, tuple[CheckVerdict, ...]] | None = None
 
     def __getitem__(self, case: str) -> Result:
         if case not in self._results:
@@ -101,14 +94,11 @@ class Results(_FromFolder, Mapping[str, "Result"]):
         frame.attrs["units"] = next(iter(self.values())).metrics.attrs["units"]
         return frame
 
-    def check_verdicts(self, case: str) -> tuple[CheckVerdict, ...]:
-        """Return the verdicts of the checks on a case; on a run without them, those that it would get now."""
-        if self._checks is None:
-            file = self.folder / check_verdict.FILE
-            self._checks = self._folder.read(file.name, check_verdict.read_verdicts) if file.exists() else {}
-        if case not in self._checks:
-            self._checks[case] = judge_case(self[case].checked_case)
-        return self._checks[case]
+    @cached_property
+    def saved_verdicts(self) -> Mapping[str, tuple[CheckVerdict, ...]]:
+        """Verdicts of the checks by case, as the run judged them; empty for a run without them."""
+        file = self.folder / check_verdict.FILE
+        return self._folder.read(file.name, check_verdict.read_verdicts) if file.exists() else {}
 
     @property
     def checks(self) -> pd.DataFrame:
@@ -118,7 +108,7 @@ class Results(_FromFolder, Mapping[str, "Result"]):
     @property
     def failures(self) -> pd.DataFrame:
         """Laws that failed, a row each: case, t (s), agent, why, and line, as "mine.py:12"; empty if none did."""
-        return frames.failures_frame({case: law_failures(_plant_events(result)) for case, result in self.items()})
+        return frames.failures_frame({case: law_failures(result.plant_events) for case, result in self.items()})
 
     @property
     def sha256(self) -> dict[str, str]:
@@ -131,7 +121,7 @@ class Results(_FromFolder, Mapping[str, "Result"]):
         "overview", "frequency", "MPSI", "V_error", "MQSI", "voltage", "power_GFM", "power_GFL", and those that belong
         to the events of this scenario.
         """
-        return draw(self.drawing(self._results), figure)
+        return _draw(self.drawing(self._results), figure)
 
     def save(self, folder: str | Path) -> Path:
         """Write the run folder as the command does, figures included, into a new or empty folder; return its path."""
@@ -144,30 +134,29 @@ class Results(_FromFolder, Mapping[str, "Result"]):
         """The measures as claims judge them; ValueError of a live run, whose windows people made."""
         if self.driver == LIVE:
             raise ValueError("this was a live run: its windows are those that people made, see metrics")
-        return find(self._spec, self._feeder, {case: _case_record(result) for case, result in self.items()})
+        return find(self.spec, self._feeder, {case: result.case_record for case, result in self.items()})
 
     @property
     def verdicts(self) -> tuple[Verdict, ...]:
         """Claims of the scenario's benchmark, and its own, judged; none in a run that was disturbed."""
         if any(result.disturbed for result in self.values()):
             return ()
-        claims = benchmark_of(self._spec.paper).claims
-        return (*judge(self.findings, claims), *judged(self.findings, claims_of(self._spec)))
+        claims = benchmark_of(self.spec.paper).claims
+        return (*judge(self.findings, claims), *judged(self.findings, claims_of(self.spec)))
 
     def drawing(self, cases: Mapping[str, Result]) -> Drawing:
         """Return the data of the figures of some cases (`gridpeers.scenarios.results.plots`)."""
-        spec = msgspec.structs.replace(self._spec, cases={case: self._spec.cases[case] for case in cases})
-        recorded = {case: _plant_events(result) for case, result in cases.items()}
-        *_, (case, last) = cases.items()  # in wall-clock time each case has its own events
-        events = recorded[case]
+        spec = msgspec.structs.replace(self.spec, cases={case: self.spec.cases[case] for case in cases})
+        *_, last = cases.values()  # in real time each case has its own events
         if self.driver == LIVE:
-            departures = compare(spec, self._feeder, events, float(last.record.t[-1]))
-            return live_drawing(departures, spec, self._feeder, last.record, events)
+            departures = compare(spec, self._feeder, last.plant_events, float(last.record.t[-1]))
+            return live_drawing(departures, spec, self._feeder, last.record, last.plant_events)
         histories = {case: result.record for case, result in cases.items()}
-        return drawing_of(spec, self._feeder, histories, recorded, as_they_came(spec, events))
+        events = {case: result.plant_events for case, result in cases.items()}
+        return drawing_of(spec, self._feeder, histories, events, as_they_came(spec, last.plant_events))
 
     def __repr__(self) -> str:
-        return f"<Results {self._spec.name}: cases {', '.join(self)}; {self.driver}>"
+        return f"<Results {self.spec.name}: cases {', '.join(self)}; {self.driver}>"
 
 
 class Result(_FromFolder):
@@ -208,9 +197,15 @@ class Result(_FromFolder):
         return self._folder.read(f"{self.case}/events.csv", frames.events_frame)
 
     @property
+    def plant_events(self) -> list[PlantEvent]:
+        """The same as the plant sent them."""
+        rows = self.events.itertuples(index=False)
+        return [PlantEvent(t=row.t, kind=row.kind, subject=row.subject, text=row.text) for row in rows]
+
+    @property
     def failures(self) -> pd.DataFrame:
         """Laws that failed, a row each, as `Results.failures`."""
-        return frames.failures_frame({self.case: law_failures(_plant_events(self))})
+        return frames.failures_frame({self.case: law_failures(self.plant_events)})
 
     @cached_property
     def links(self) -> pd.DataFrame:
@@ -235,12 +230,8 @@ class Result(_FromFolder):
     def replay(self) -> Replay:
         """Give the cores again what they got, and compare what they decide, as `gridpeers replay` does.
 
-        Raises
-        ------
-        RecordFileError
-            If the run was not recorded.
-        ReplayError
-            If its record does not have what the cores got, or its law, graph or feeder is not here.
+        RecordFileError if the run was not recorded; ReplayError if its record does not have what the cores got, or its
+        law, graph or feeder is not here.
         """
         found: Replay = ROOMS.resolve("replay")(self.run_record)
         return found
@@ -261,14 +252,23 @@ class Result(_FromFolder):
         return list(self._whole.get("disturbed", ()))
 
     @cached_property
+    def case_record(self) -> CaseRecord:
+        """The case with the windows of its scenario's events, as metrics and checks take it."""
+        came = windows(as_they_came(self.spec, self.plant_events), self.spec.time.end_s)
+        measured = frames.windows_of(self._whole)
+        saved = {label: of["messages_saved"] for label, of in measured.items() if of.get("messages_saved")}
+        return CaseRecord(history=self.record, windows=came, events=self.plant_events, messages_saved=saved)
+
+    @cached_property
     def checked_case(self) -> CheckedCase:
         """The case as checks see it: what a check of one's own is called with."""
-        return CheckedCase.of(self.spec, self._feeder, self.case, _case_record(self), self.folder / self.case)
+        return CheckedCase.of(self.spec, self._feeder, self.case, self.case_record, self.folder / self.case)
 
-    @property
+    @cached_property
     def check_verdicts(self) -> tuple[CheckVerdict, ...]:
-        """Verdicts of the checks, each with its violations (docs/checks.md)."""
-        return self._run.check_verdicts(self.case)
+        """Verdicts of the checks, each with its violations (docs/checks.md); of now if the run has none."""
+        saved = self._run.saved_verdicts
+        return saved[self.case] if self.case in saved else judge_case(self.checked_case)
 
     @cached_property
     def checks(self) -> pd.DataFrame:
@@ -282,7 +282,7 @@ class Result(_FromFolder):
 
     def plot(self, figure: str = "overview") -> Figure:
         """Draw the case, as `Results.plot`."""
-        return draw(self.drawing(), figure)
+        return _draw(self.drawing(), figure)
 
     def drawing(self) -> Drawing:
         """Return the data of the figures of the case (`gridpeers.scenarios.results.plots`)."""
@@ -301,22 +301,7 @@ class Result(_FromFolder):
         return f"<Result {self.spec.name} {self.case}: {self.driver}; history {self.sha256[:12]}>"
 
 
-def _case_record(result: Result) -> CaseRecord:
-    """Return a case with the windows of its scenario's events, as metrics and checks take it."""
-    events = _plant_events(result)
-    came = windows(as_they_came(result.spec, events), result.spec.time.end_s)
-    measured = frames.windows_of(result.numbers["cases"][result.case])
-    saved = {label: of["messages_saved"] for label, of in measured.items() if of.get("messages_saved")}
-    return CaseRecord(history=result.record, windows=came, events=events, messages_saved=saved)
-
-
-def _plant_events(result: Result) -> list[PlantEvent]:
-    rows = result.events.itertuples(index=False)
-    return [PlantEvent(t=row.t, kind=row.kind, subject=row.subject, text=row.text) for row in rows]
-
-
-def draw(drawing: Drawing, name: str) -> Figure:
-    """Draw a figure of a run by its name, as a picture if it is the value of a notebook's cell."""
+def _draw(drawing: Drawing, name: str) -> Figure:
     from gridpeers.scenarios.results.plots import run_figures  # imports matplotlib
 
     shown_in_notebooks()

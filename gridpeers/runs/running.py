@@ -55,18 +55,16 @@ def run(
         raise ScenarioError([f"progress: must be a function of a case and two times, got {progress!r:.60}"])
     if driver == "processes" and (wrong := check_portable(spec)):
         raise ScenarioError(wrong)
-    require_room(
-        Path(tempfile.gettempdir()) if folder is None else as_folder(folder),
-        file_sizes(spec, scenario.feeder, clock=pace.get("clock", "simulated")),
-    )
-    if folder is None:
-        try:
-            home = RunFolder(Path(tempfile.mkdtemp(prefix="gridpeers-")), temporary=True)
-        except OSError as error:
-            text = f"there is nowhere for temporary files: {error.strerror}; say folder=..., or set TMPDIR"
-            raise FolderError(text) from error
-    else:
-        home = RunFolder(new_home(folder))
+    sizes = file_sizes(spec, scenario.feeder, clock=pace.get("clock", "simulated"))
+    require_room(Path(tempfile.gettempdir()) if folder is None else as_folder(folder), sizes)
+    try:
+        home = RunFolder(
+            Path(tempfile.mkdtemp(prefix="gridpeers-")) if folder is None else new_home(folder),
+            temporary=folder is None,
+        )
+    except OSError as error:
+        text = f"there is nowhere for temporary files: {error.strerror}; say folder=..., or set TMPDIR"
+        raise FolderError(text) from error
     lasting = folder is not None
     request = Request(scenario=spec, feeder=scenario.feeder, driver=driver, folder=home.path, lasting=lasting, **pace)
     try:

@@ -54,8 +54,6 @@ def sweep(
         Values by the dotted path of a key, as in `Scenario.replace`; every combination is run.
     zip : Mapping[str, Iterable], optional
         Keys whose values go together, first with first.
-    cases : iterable of str, optional
-        All when left out.
     seeds : int
         How many seeds every point is run with: the scenario's, and those that follow it.
     metrics : iterable, optional
@@ -71,15 +69,13 @@ def sweep(
         Takes the number of runs that are done, and of all runs.
     """
     known = as_scenario(scenario)
-    _check_words(grid, zip, cases, metrics, jobs, dask, progress)
+    _check_words(metrics, jobs, dask, progress)
     checked, chosen = _with_metrics(known, metrics)
-    plan = _plan(checked, grid or {}, zip or {}, (cases,) if isinstance(cases, str) else tuple(cases or ()), seeds)
+    plan = _plan(checked, grid or {}, zip or {}, (cases,) if isinstance(cases, str) else cases or (), seeds)
     done: dict[int, SweepRow] = {}
     kept: dict[int, pd.DataFrame | None] = {}
     calls = [(number, run.scenario, run.case) for number, run in enumerate(plan.runs)]
-    if dask:
-        _require_dask(plan)
-    results = on_workers(calls, 1 if dask else _jobs(plan, jobs), run_with_history if histories else _run, dask)
+    results = on_workers(calls, _jobs(plan, jobs, dask), run_with_history if histories else _run, dask)
     with closing(results):
         for row, history in results:
             done[row.number] = row
@@ -90,22 +86,17 @@ def sweep(
     warn_of_laws(failed, depth=1)
     frame = results_frame(plan, done).drop(columns="sample")
     if chosen is not None:
-        frame = frame[_chosen(list(frame), tuple(chosen), plan)]
+        frame = frame[_chosen(list(frame), chosen, plan)]
     frame.attrs["units"] = {name: unit for name in frame if (unit := unit_of(str(name)))}
     if histories:
         frame["history"] = [kept[number] for number in sorted(done)]
     return frame
 
 
-def _check_words(grid: Any, zipped: Any, cases: Any, metrics: Any, jobs: Any, dask: Any, progress: Any) -> None:
-    wrong = [
-        f'{name}: needs lists of values by the path of their key, as {{"gains.k_p": [0.001, 0.002]}}, got {it!r:.60}'
-        for name, it in (("grid", grid), ("zip", zipped))
-        if it is not None and not (isinstance(it, Mapping) and all(isinstance(path, str) for path in it))
-    ]
-    for name, it in (("cases", cases), ("metrics", metrics)):
-        if it is not None and not isinstance(it, Iterable) and not (name == "metrics" and callable(it)):
-            wrong.append(f"{name}: needs a list of names, or None for all, got {it!r:.60}")
+def _check_words(metrics: Any, jobs: Any, dask: Any, progress: Any) -> None:
+    wrong = []
+    if metrics is not None and not isinstance(metrics, Iterable) and not callable(metrics):
+        wrong.append(f"metrics: needs a list of names, or None for all, got {metrics!r:.60}")
     if jobs is not None and (isinstance(jobs, bool) or not isinstance(jobs, int) or jobs < 1):
         wrong.append(f"jobs: must be a whole number, 1 or more, or None for one per core; got {jobs!r:.60}")
     if not isinstance(dask, str):
@@ -133,38 +124,40 @@ def _with_metrics(scenario: Scenario, metrics: str | Iterable[Any] | None) -> tu
     return scenario, asked
 
 
-def _plan(scenario: Scenario, grid: Values, zipped: Values, cases: tuple[str, ...], seeds: int) -> Plan:
+def _plan(scenario: Scenario, grid: Any, zipped: Any, cases: Any, seeds: Any) -> Plan:
+    """Return the checked plan of runs; ScenarioError has everything that is wrong with the values."""
     problems = Problems("sweep")
-    crossed: dict[str, Any] = {}
-    paired: dict[str, Any] = {}
-    for table, values, lists in (("grid", grid, crossed), ("zip", zipped, paired)):
+    lists: dict[str, Any] = {"grid": {}, "zip": {}}
+    for table, values in (("grid", grid), ("zip", zipped)):
+        if not (isinstance(values, Mapping) and all(isinstance(path, str) for path in values)):
+            example = 'needs lists of values by the path of their key, as {"gains.k_p": [0.001, 0.002]}'
+            problems.add(table, f"{example}, got {values!r:.60}")
+            continue
         for path, items in values.items():
             try:
-                if isinstance(items, str):
-                    raise TypeError
-                lists[path] = [plain(item) for item in items]
-            except (TypeError, ValueError) as error:
-                text = str(error) if isinstance(error, ValueError) else f"needs a list of values, got {items!r}"
-                problems.add(f"{table}.{path}", text)
+                if isinstance(items, str) or not isinstance(items, Iterable):
+                    raise ValueError(f"needs a list of values, got {items!r}")
+                lists[table][path] = [plain(item) for item in items]
+            except ValueError as error:
+                problems.add(f"{table}.{path}", str(error))
+    if not isinstance(cases, Iterable):
+        problems.add("cases", f"needs a list of names, or None for all, got {cases!r:.60}")
     if not isinstance(seeds, int):
         problems.add("seeds", f"must be a whole number, got {seeds!r}")
     problems.raise_if_any()
-    request = Sweep(name=scenario.name, scenario=scenario.name, cases=cases, seeds=seeds, grid=crossed, zip=paired)
+    request = Sweep(name=scenario.name, scenario=scenario.name, cases=tuple(cases), seeds=seeds, **lists)
     return plan_of(request, BaseScenario(scenario.tables, scenario.path, scenario.spec, scenario.feeder))
 
 
-def _require_dask(plan: Plan) -> None:
-    if find_spec("joblib") is None or find_spec("distributed") is None:
-        raise ScenarioError(["dask: needs joblib and distributed: pip install 'gridpeers[sweep]'"])
-    unknown = (text for run in plan.runs for text in check_portable(run.scenario, measures=True))
-    if wrong := list(dict.fromkeys(unknown)):
-        raise ScenarioError(wrong)
-
-
-def _jobs(plan: Plan, jobs: int | None) -> int:
+def _jobs(plan: Plan, jobs: int | None, dask: str) -> int:
     """Return how many processes share the runs; definitions of a notebook are known to its own process alone."""
     lacking = find_spec("joblib") is None
-    if (lacking and jobs is None) or any(check_portable(run.scenario, measures=True) for run in plan.runs):
+    unknown = [text for run in plan.runs for text in check_portable(run.scenario, measures=True)]
+    if dask and (lacking or find_spec("distributed") is None):
+        raise ScenarioError(["dask: needs joblib and distributed: pip install 'gridpeers[sweep]'"])
+    if dask and unknown:
+        raise ScenarioError(list(dict.fromkeys(unknown)))
+    if unknown or dask or (lacking and jobs is None):
         return 1
     count = min(cores() if jobs is None else jobs, len(plan.runs))
     if lacking and count > 1:
@@ -177,7 +170,7 @@ def _run(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, His
     return run_one(number, scenario, case), None
 
 
-def _chosen(columns: list[str], metrics: tuple[str, ...], plan: Plan) -> list[str]:
+def _chosen(columns: list[str], metrics: list[str], plan: Plan) -> list[str]:
     """Return the columns of some metrics behind those that say which run it is."""
     head = [name for name in columns if name in ("case", "seed", "status", "why", *plan.parameters)]
     head += [name for name in columns if name == "metric_warnings"]
