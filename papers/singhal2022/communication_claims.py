@@ -35,7 +35,7 @@ communication.relative("IV")
 
 
 @communication.add(
-    f"MQSI: full, then link failure, then reduced, and that below {REDUCED_MQSI.value:g}",
+    f"MQSI: full, then link failure, then reduced, and that below {REDUCED_MQSI:g}",
     source="Table IV",
     figure="",
     cases=ROWS,
@@ -43,7 +43,7 @@ communication.relative("IV")
 )
 def MQSI_order(found: Findings) -> tuple[bool, str]:
     full, reduced, failure = (found.results[case][EVENT].MQSI for case in ROWS)
-    holds = full <= failure < reduced < REDUCED_MQSI.value
+    holds = full <= failure < reduced < REDUCED_MQSI
     return holds, f"full {full:.3f}, link failure {failure:.3f}, reduced {reduced:.3f}"
 
 
@@ -69,7 +69,7 @@ def re_tuning_pays(found: Findings) -> tuple[bool, str]:
 )
 def adaptive_alpha_pays(found: Findings) -> tuple[bool, str]:
     fixed, adaptive = (found.results[case][EVENT] for case in ("reduced", ADAPTIVE))
-    holds = adaptive.MQSI < fixed.MQSI and adaptive.V_error < fixed.V_error + SAME_V.value
+    holds = adaptive.MQSI < fixed.MQSI and adaptive.V_error < fixed.V_error + SAME_V
     shown = f"MQSI {fixed.MQSI:.3f} fixed, {adaptive.MQSI:.3f} adaptive"
     return holds, f"{shown}; V_error {fixed.V_error:.4f}, {adaptive.V_error:.4f} pu"
 
@@ -85,7 +85,7 @@ def same_steady_state(found: Findings) -> tuple[bool, str]:
     f_off = max(s.f_error_Hz for s in steady) - min(s.f_error_Hz for s in steady)
     MPSI_off = max(s.MPSI for s in steady) - min(s.MPSI for s in steady)
     shown = listed((("abs(f-60)", f"within {f_off:.4f} Hz"), ("MPSI", f"within {MPSI_off:.4f}")))
-    return max(f_off, MPSI_off) < SAME_END.value, shown
+    return max(f_off, MPSI_off) < SAME_END, shown
 
 
 @communication.add(
@@ -114,7 +114,7 @@ def _slower(found: Findings, event: str) -> tuple[bool, str]:
     shown = f"MPSI < 0.01 after {seconds(full)} with all links, {seconds(reduced)} reduced"
     if full is None or reduced is None:
         return False, shown
-    return SLOWER_LEAST.value <= reduced - full <= SLOWER_MOST.value, shown
+    return SLOWER_LEAST <= reduced - full <= SLOWER_MOST, shown
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,7 +141,7 @@ def graph_runs(found: Findings) -> tuple[GraphRun, ...]:
     return found.graphs if isinstance(found, GraphFindings) else ()
 
 
-TREE, BEND = 8, int(FEW_LINKS.value)
+TREE, BEND = 8, int(FEW_LINKS)
 """Links of a tree of nine inverters, with fewer of which no graph is connected; and where the paper's curve bends."""
 
 topology = ExperimentClaims("topology", source="section 4, figure of topologies", figure="topology")
@@ -176,7 +176,7 @@ def steepest_at_few_links(found: Findings) -> tuple[bool, str]:
     few = (times[TREE] - times[BEND]) / (BEND - TREE)
     many = (times[BEND] - times[last]) / (last - BEND)
     shown = f"{1e3 * few:.0f} ms a link from {TREE} to {BEND}, {1e3 * many:.1f} ms from there to {last}"
-    return few > STEEPER.value * many, shown
+    return few > STEEPER * many, shown
 
 
 @topology.add("all connected graphs reach the same steady state")
@@ -184,7 +184,7 @@ def same_steady_state_on_every_graph(found: Findings) -> tuple[bool, str]:
     runs = connected(found)
     f_error, MPSI = max(run.steady.f_error_Hz for run in runs), max(run.steady.MPSI for run in runs)
     shown = f"{len(runs)} graphs: abs(f-60) at most {f_error:.4f} Hz, MPSI at most {MPSI:.4f}"
-    return max(f_error, MPSI) < SAME_END.value, shown
+    return max(f_error, MPSI) < SAME_END, shown
 
 
 @topology.add("below 8 links there is no consensus")

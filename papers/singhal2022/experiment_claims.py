@@ -31,7 +31,7 @@ class ExperimentClaims:
         """Add a claim that the decorated function judges; its name is the function's."""
 
         def added(judge: Judge) -> Judge:
-            self.all += (Claim(**self._shared | fields, name=judge.__name__, text=text, judge=judge),)
+            self.all += (Claim(**{"name": judge.__name__} | self._shared | fields, text=text, judge=judge),)
             return judge
 
         return added
@@ -43,7 +43,7 @@ class ExperimentClaims:
 
     def relative(self, number: TableNumber, known_miss: str = "") -> None:
         """Add the claim that all V_error of a table are near the paper's beside their own size."""
-        bound = f"{100 * V_RELATIVE.value:g} % of Table {number}'s"
+        bound = f"{100 * V_RELATIVE:g} % of Table {number}'s"
         self._near(number, "V_error", "_relative", bound, Cell.within_relative, known_miss)
 
     def _near(

@@ -1,13 +1,17 @@
-"""`gridpeers experiment`: from a name to a figure and a table. Heavy packages are imported when it runs."""
+"""`gridpeers experiment`: from a name to a figure and a table."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
+import pandas as pd
 import typer
 
 import gridpeers as gp
+from gridpeers.cli.commands.sweep_command import failure_lines, finish, read
+from gridpeers.cli.progress import progress
 from gridpeers.cli.usage import (
     BAD_INPUT,
     BROKEN,
@@ -16,16 +20,12 @@ from gridpeers.cli.usage import (
     check_choice,
     ended_by_signals,
     fail,
-    refuse,
-    require,
     terminal,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from gridpeers.papers.singhal2022.experiments import FromScenario, FromSweep
-    from gridpeers.papers.singhal2022.experiments.experiment_output import ExperimentResult
+from gridpeers.output_folders import RUNS, refusal, shown
+from gridpeers.papers.singhal2022.experiments import EXPERIMENTS, FromScenario, FromSweep
+from gridpeers.papers.singhal2022.experiments.experiment_data import CaseData, SweepData
+from gridpeers.papers.singhal2022.experiments.experiment_output import ExperimentResult
 
 
 def experiment(
@@ -50,14 +50,13 @@ def experiment(
 
     Example:  gridpeers experiment delay
     """
-    needed = {"numba": "the plant", "scipy": "the theory", "threadpoolctl": "the plant", "matplotlib": "the figure"}
-    require(needed)
-    from gridpeers.output_folders import RUNS, refusal, shown
-    from gridpeers.papers.singhal2022.experiments import EXPERIMENTS, FromSweep
-
     if name == "list":
         for known, source in EXPERIMENTS.items():
-            typer.echo(f"{known:22} {_title(source)}")
+            if isinstance(source, FromSweep):
+                title = gp.sweep_files.sweep_title(source.sweep)
+            else:
+                title = gp.load(source.scenario).title
+            typer.echo(f"{known:22} {title}")
         return
     check_choice("", "experiment", name, tuple(EXPERIMENTS))
     source, folder = EXPERIMENTS[name], RUNS / "experiments" / name if out is None else out
@@ -78,31 +77,17 @@ def experiment(
 
 def _from_sweep(source: FromSweep, folder: Path, jobs: int | None, dask: str, again: Sequence[str]) -> ExperimentResult:
     """Do the runs of the sweep that are not done yet, and draw."""
-    from gridpeers.cli.commands.sweep_command import check_packages, failure_lines, finish
-
-    check_packages(dask=bool(dask))
-    import pandas as pd
-
-    from gridpeers.papers.singhal2022.experiments.experiment_data import SweepData
-
-    try:
-        plan = gp.sweep_files.read_sweep(source.sweep)
-    except gp.ScenarioError as error:
-        refuse(error)
+    plan = read(source.sweep, dask)
     summary = finish(source.sweep, plan, folder, jobs, dask, again)
     if summary.law_failed:
         fail(failure_lines(summary), CLAIM_FAILED)
-    if sum(summary.broke.values()):
+    if summary.broke:
         fail([f"{count} runs broke: {why}" for why, count in summary.broke.items()], BROKEN)
     return source.make(SweepData(rows=pd.read_parquet(summary.table), base=plan.base, window=plan.base.events[0].label))
 
 
 def _from_scenario(source: FromScenario, folder: Path) -> ExperimentResult:
     """Run every case of the scenario in this process, and draw."""
-    from gridpeers.cli.progress import progress
-    from gridpeers.output_folders import shown
-    from gridpeers.papers.singhal2022.experiments.experiment_data import CaseData
-
     scenario, left = gp.load(source.scenario), f"what came until then is in {shown(folder)}/"
     try:
         with ended_by_signals(left), progress(terminal(), tuple(scenario.cases)) as tell:
@@ -115,12 +100,3 @@ def _from_scenario(source: FromScenario, folder: Path) -> ExperimentResult:
         fail([f"FAILED  {why}" for why in run.failures["why"]], CLAIM_FAILED)
     histories = {case: result.record for case, result in run.items()}
     return source.make(CaseData(scenario=scenario.spec, feeder=scenario.feeder, histories=histories))
-
-
-def _title(source: FromSweep | FromScenario) -> str:
-    """Return the title of the file that is run."""
-    from gridpeers.papers.singhal2022.experiments import FromScenario
-
-    if isinstance(source, FromScenario):
-        return gp.load(source.scenario).title
-    return gp.sweep_files.sweep_title(source.sweep)

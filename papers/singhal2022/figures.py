@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 import gridpeers as gp
 from gridpeers.papers.singhal2022.communication_claims import TREE, GraphRun, medians
 from gridpeers.papers.singhal2022.islanding_claims import CASES, EVENTS
+from gridpeers.papers.singhal2022.reproduce.studies import EventValues
 from gridpeers.papers.singhal2022.tables import MQSI_FACTOR, tables_of
 
 LEAST = 1e-6
@@ -47,11 +48,7 @@ def topologies(runs: Sequence[GraphRun]) -> Figure:
             panel.set_xlim(0, 37)
             panel.set_xlabel("links of the communication graph (8: a tree, 36: all)")
         handles = [right.get_lines()[0], right.get_lines()[1], median]
-        labels = [
-            "a random connected graph",
-            "a graph in parts",
-            "median of the connected",
-        ]
+        labels = ["a random connected graph", "a graph in parts", "median of the connected"]
         figure.legend(handles, labels, loc="outside lower center", ncols=3)
     return figure
 
@@ -69,9 +66,6 @@ def _times(panel: Axes, runs: Sequence[GraphRun], marks: dict[str, Any]) -> None
 _COLOURS = ("#0072b2", "#56b4e9", "#009e73", "#e69f00")
 _MARKERS = "os^D"
 
-EventValues = Mapping[tuple[str, str], float]
-"""MQSI by case and event."""
-
 
 def var_sharing(ours: Mapping[str, EventValues]) -> Figure:
     """Draw a mark for each variant of ours beside the paper's line, one panel for each event.
@@ -86,7 +80,7 @@ def var_sharing(ours: Mapping[str, EventValues]) -> Figure:
         for panel, event in zip(panels, EVENTS, strict=True):
             for x, case in enumerate(CASES):
                 number = paper[case, event]
-                ends = np.array([number / MQSI_FACTOR.value, number * MQSI_FACTOR.value])
+                ends = np.array([number / MQSI_FACTOR, number * MQSI_FACTOR])
                 panel.fill_between([x - 0.42, x + 0.42], *ends, color="#000000", alpha=0.10, lw=0)
                 panel.hlines(number, x - 0.42, x + 0.42, color="#000000", lw=1.6)
             for number, (variant, values) in enumerate(ours.items()):
@@ -101,8 +95,7 @@ def var_sharing(ours: Mapping[str, EventValues]) -> Figure:
             panel.grid(visible=False, axis="x")
         panels[0].set_ylabel("MQSI")
         handles, labels = panels[0].get_legend_handles_labels()
-        band = panels[0].collections[0]
-        line = panels[0].collections[1]
-        handles, labels = [line, band, *handles], ["the paper", f"a factor of {MQSI_FACTOR.value:g} of it", *labels]
-        figure.legend(handles, labels, loc="outside lower center", ncols=3)
+        band, line = panels[0].collections[:2]
+        labels = ["the paper", f"a factor of {MQSI_FACTOR:g} of it", *labels]
+        figure.legend([line, band, *handles], labels, loc="outside lower center", ncols=3)
     return figure

@@ -31,7 +31,7 @@ claims.relative(
 )
 def only_IV_restores(found: Findings) -> tuple[bool, str]:
     errors = {case: found.results[case]["event1"].f_error_Hz for case in CASES}
-    holds = errors["IV"] < F_NONE.value and all(errors[case] >= F_NONE.value for case in ("I", "II", "III"))
+    holds = errors["IV"] < F_NONE and all(errors[case] >= F_NONE for case in ("I", "II", "III"))
     return holds, f"abs(f-60) {listed((case, f'{error:.3f}') for case, error in errors.items())} Hz"
 
 
@@ -43,7 +43,7 @@ def only_IV_restores(found: Findings) -> tuple[bool, str]:
 )
 def IV_within_1_s(found: Findings) -> tuple[bool, str]:
     times = {event: found.results["IV"][event].t_restore_s for event in EVENTS}
-    holds = all(t is not None and t <= WITHIN.value for t in times.values())
+    holds = all(t is not None and t <= WITHIN for t in times.values())
     return holds, listed((event, seconds(t)) for event, t in times.items())
 
 
@@ -57,7 +57,7 @@ def IV_within_1_s(found: Findings) -> tuple[bool, str]:
 def GFL_idle(found: Findings) -> tuple[bool, str]:
     p = {case: found.results[case]["event2"].p for case in ("II", "III")}
     off = {case: max(abs(powers[name] - found.P_set0) for name in found.GFL) for case, powers in p.items()}
-    return max(off.values()) < IDLE.value, listed((case, f"within {value:.4f} pu") for case, value in off.items())
+    return max(off.values()) < IDLE, listed((case, f"within {value:.4f} pu") for case, value in off.items())
 
 
 @claims.add(
@@ -76,7 +76,7 @@ def MQSI_order(found: Findings) -> tuple[bool, str]:
 @claims.add("IV: MQSI at most 0.1", source="Table II (0.04 and 0.05)", cases=("IV",), measures=("MQSI",))
 def IV_shares_vars(found: Findings) -> tuple[bool, str]:
     values = {event: found.results["IV"][event].MQSI for event in EVENTS}
-    return max(values.values()) <= IV_MQSI.value, listed((event, f"{x:.3f}") for event, x in values.items())
+    return max(values.values()) <= IV_MQSI, listed((event, f"{x:.3f}") for event, x in values.items())
 
 
 @claims.add(
@@ -87,7 +87,7 @@ def IV_shares_vars(found: Findings) -> tuple[bool, str]:
 )
 def IV_5_times_below_II_and_III(found: Findings) -> tuple[bool, str]:
     least = min(min(_times_below(found, case, "MQSI").values()) for case in ("II", "III"))
-    return least >= FIVE_TIMES.value, f"least ratio {least:.1f}"
+    return least >= FIVE_TIMES, f"least ratio {least:.1f}"
 
 
 @claims.add(
@@ -115,7 +115,7 @@ def IV_V_error_5_times_better_than_I(found: Findings) -> tuple[bool, str]:
 
 def _5_times_better_than_I(found: Findings, quantity: Quantity) -> tuple[bool, str]:
     ratios = _times_below(found, "I", quantity)
-    holds = min(ratios.values()) > FIVE_TIMES.value
+    holds = min(ratios.values()) > FIVE_TIMES
     return holds, listed((event, f"{times:.1f} times") for event, times in ratios.items())
 
 

@@ -1,7 +1,7 @@
 """Benchmarks: the paper's numbers and claims for each experiment, and how near ours are, in a few lines.
 
-An experiment is named in the scenario's key `paper`. The lines leave nothing out: judged, not
-judged, beside its own size.
+An experiment is named in the scenario's key `paper`. The lines leave nothing out: judged, not judged, beside its own
+size.
 """
 
 from __future__ import annotations
@@ -25,17 +25,8 @@ class ComparedNumber(NamedTuple):
 
 def numbers(found: Findings, tables: Iterable[PaperTable]) -> list[ComparedNumber]:
     """Return all numbers of tables that were run, ours beside the paper's."""
-    return [
-        ComparedNumber(cell, float("nan") if found.reason(cell) else found.value(cell))
-        for table in tables
-        for cell in table.cells
-        if found.has(cell)
-    ]
-
-
-def headline(all_numbers: Sequence[ComparedNumber]) -> list[str]:
-    """Return lines on numbers within their tolerance, numbers that have none, and V_error beside its own size."""
-    return [*_judged(all_numbers), *_by_factor(all_numbers), *_relative(all_numbers)]
+    cells = [cell for table in tables for cell in table.cells if found.has(cell)]
+    return [ComparedNumber(cell, float("nan") if found.reason(cell) else found.value(cell)) for cell in cells]
 
 
 def within(all_numbers: Iterable[ComparedNumber], judge: Callable[[Cell, float], bool | None]) -> tuple[int, int]:
@@ -44,39 +35,30 @@ def within(all_numbers: Iterable[ComparedNumber], judge: Callable[[Cell, float],
     return sum(map(bool, passed)), sum(verdict is not None for verdict in passed)
 
 
-def _judged(all_numbers: Sequence[ComparedNumber]) -> list[str]:
+def headline(all_numbers: Sequence[ComparedNumber]) -> list[str]:
+    """Return lines on numbers within their tolerance, numbers that have none, and V_error beside its own size."""
+    lines = []
     near, judged = within(all_numbers, Cell.within)
-    if not judged:
-        return []
-    named = _tables(all_numbers)
-    return [f"{near} of the {judged} numbers of {named} that are judged by a tolerance are within it."]
-
-
-def _by_factor(all_numbers: Sequence[ComparedNumber]) -> list[str]:
-    """Return the numbers that the first line leaves out."""
-    left = [number for number in all_numbers if number.cell.tolerance.value is None]
-    if not left:
-        return []
-    near, _ = within(left, Cell.within_factor)
-    times = [ours / cell.paper for cell, ours in left if not math.isnan(ours)]
-    times_off = f"they are {min(times):.2g} to {max(times):.2g} times the paper's, " if times else ""
-    far = _farthest(left, lambda cell, ours: abs(math.log(ours / cell.paper)) if ours > 0.0 else math.inf)
-    return [
-        f"The other {len(left)}, all MQSI of {_tables(left)}, are not judged by a tolerance: {times_off}"
-        f"{near} of {len(left)} within a factor of {MQSI_FACTOR.value:g}; farthest off: {far}."
-    ]
-
-
-def _relative(all_numbers: Sequence[ComparedNumber]) -> list[str]:
-    about = [number for number in all_numbers if number.cell.relative is not None]
-    if not about:
-        return []
-    near, judged = within(about, Cell.within_relative)
-    far = _farthest(about, lambda cell, ours: abs(ours - cell.paper) / (cell.relative or math.nan))
-    return [
-        f"V_error beside its own size: {near} of {judged} within {100 * V_RELATIVE.value:g} % of the paper's number or "
-        f"half of its last digit; farthest off: {far}."
-    ]
+    if judged:
+        named = _tables(all_numbers)
+        lines.append(f"{near} of the {judged} numbers of {named} that are judged by a tolerance are within it.")
+    if left := [number for number in all_numbers if number.cell.tolerance.value is None]:
+        near, _ = within(left, Cell.within_factor)
+        times = [ours / cell.paper for cell, ours in left if not math.isnan(ours)]
+        times_off = f"they are {min(times):.2g} to {max(times):.2g} times the paper's, " if times else ""
+        far = _farthest(left, lambda cell, ours: abs(math.log(ours / cell.paper)) if ours > 0.0 else math.inf)
+        lines.append(
+            f"The other {len(left)}, all MQSI of {_tables(left)}, are not judged by a tolerance: {times_off}"
+            f"{near} of {len(left)} within a factor of {MQSI_FACTOR:g}; farthest off: {far}."
+        )
+    if about := [number for number in all_numbers if number.cell.relative is not None]:
+        near, judged = within(about, Cell.within_relative)
+        far = _farthest(about, lambda cell, ours: abs(ours - cell.paper) / (cell.relative or math.nan))
+        lines.append(
+            f"V_error beside its own size: {near} of {judged} within {100 * V_RELATIVE:g} % of the paper's number or "
+            f"half of its last digit; farthest off: {far}."
+        )
+    return lines
 
 
 def _farthest(some: Sequence[ComparedNumber], off: Callable[[Cell, float], float]) -> str:
@@ -88,10 +70,8 @@ def _farthest(some: Sequence[ComparedNumber], off: Callable[[Cell, float], float
 
 def _tables(some: Iterable[ComparedNumber]) -> str:
     """Return the tables by their numbers, e.g. "Tables I and II"."""
-    named = list(dict.fromkeys(number.cell.table for number in some))
-    if len(named) == 1:
-        return f"Table {named[0]}"
-    return f"Tables {', '.join(named[:-1])} and {named[-1]}"
+    *named, last = dict.fromkeys(number.cell.table for number in some)
+    return f"Tables {', '.join(named)} and {last}" if named else f"Table {last}"
 
 
 CLAIMS: dict[str, tuple[Claim, ...]] = {

@@ -41,7 +41,7 @@ intermittency.relative("III")
 def saturated_at_their_limit(found: Findings) -> tuple[bool, str]:
     limits = [(case, name, limit) for case in CUT for name, limit in found.available[case].items()]
     off = max((abs(found.results[case][CLOUDS].p[name] - limit) for case, name, limit in limits), default=float("inf"))
-    return off < AT_LIMIT.value, f"at most {off:.4f} pu off their limits"
+    return off < AT_LIMIT, f"at most {off:.4f} pu off their limits"
 
 
 @intermittency.add("the others take over alike, and 60 Hz returns", cases=CUT, measures=("f_error_Hz", "p"))
@@ -51,12 +51,12 @@ def others_take_over(found: Findings) -> tuple[bool, str]:
     f_error = max(found.results[case][CLOUDS].f_error_Hz for case in CUT)
     times = [found.settled[case][CLOUDS].t_f_s for case in CUT]
     slowest = max((t for t in times if t is not None), default=float("nan"))
-    holds = spread < EQUAL.value and f_error < F_NONE.value and None not in times
+    holds = spread < EQUAL and f_error < F_NONE and None not in times
     return holds, f"the others within {spread:.4f} pu of each other, f back within {slowest:.2f} s"
 
 
 @intermittency.add(
-    f"MQSI is the same in all columns (within {MQSI_UNMOVED.value:g})",
+    f"MQSI is the same in all columns (within {MQSI_UNMOVED:g})",
     source="Table III",
     figure="",
     cases=FEASIBLE,
@@ -64,7 +64,7 @@ def others_take_over(found: Findings) -> tuple[bool, str]:
 )
 def MQSI_unmoved(found: Findings) -> tuple[bool, str]:
     values = [found.results[case][CLOUDS].MQSI for case in FEASIBLE]
-    return max(values) - min(values) < MQSI_UNMOVED.value, f"MQSI from {min(values):.3f} to {max(values):.3f}"
+    return max(values) - min(values) < MQSI_UNMOVED, f"MQSI from {min(values):.3f} to {max(values):.3f}"
 
 
 @intermittency.add(
@@ -74,7 +74,7 @@ def MQSI_unmoved(found: Findings) -> tuple[bool, str]:
 )
 def headroom_used_up(found: Findings) -> tuple[bool, str]:
     least, f_error = min(_others(found, INFEASIBLE)), found.results[INFEASIBLE][CLOUDS].f_error_Hz
-    holds = f_error > HEADROOM_GONE.value and least > 1.0 - EQUAL.value
+    holds = f_error > HEADROOM_GONE and least > 1.0 - EQUAL
     return holds, f"the others at {least:.3f} pu or more, abs(f-60) {f_error:.2f} Hz and growing"
 
 
@@ -101,7 +101,7 @@ def wind_up_holds_frequency_up(found: Findings) -> tuple[bool, str]:
 def limits_restore_sooner(found: Findings) -> tuple[bool, str]:
     times = {case: found.results[case][SUN].t_restore_s for case in WIND_UP_CASES}
     free, *limited = times.values()
-    known = [t for t in limited if t is not None and t <= WITHIN.value]
+    known = [t for t in limited if t is not None and t <= WITHIN]
     holds = len(known) == 2 and (free is None or free > max(known))
     return holds, listed((case, seconds(t)) for case, t in times.items())
 
@@ -112,51 +112,48 @@ LEAVE, RETURN = "leave", "return"
 plug_n_play = ExperimentClaims(
     "plug-n-play", source="section 4, figures of plug-n-play", figure="plug-n-play", cases=("IV",)
 )
-_RESTORED = f"IV: abs(f-60) < {F_BAND:g} Hz and MPSI < {MPSI_BAND:g} within {WITHIN.value:g} s of the "
 
 
 @plug_n_play.add(
-    f"IV: the others carry the load of the one that left within {AT_ONCE.value:g} s",
+    f"IV: the others carry the load of the one that left within {AT_ONCE:g} s",
     events=(LEAVE,),
 )
 def others_carry_its_load(found: Findings) -> tuple[bool, str]:
     t = found.results["IV"][LEAVE].t_load_s
-    return t is not None and t <= AT_ONCE.value, f"{LEAVE} {seconds(t)}"
+    return t is not None and t <= AT_ONCE, f"{LEAVE} {seconds(t)}"
 
 
-@plug_n_play.add(f"{_RESTORED}{LEAVE}", events=(LEAVE,))
-def restored_after_leave(found: Findings) -> tuple[bool, str]:
-    return _restored(found, LEAVE)
+def _add_restored(event: str) -> None:
+    text = f"IV: abs(f-60) < {F_BAND:g} Hz and MPSI < {MPSI_BAND:g} within {WITHIN:g} s of the {event}"
+
+    @plug_n_play.add(text, name=f"restored_after_{event}", events=(event,))
+    def restored(found: Findings) -> tuple[bool, str]:
+        t = found.results["IV"][event].t_restore_s
+        return t is not None and t <= WITHIN, seconds(t)
 
 
-@plug_n_play.add(f"{_RESTORED}{RETURN}", events=(RETURN,))
-def restored_after_return(found: Findings) -> tuple[bool, str]:
-    return _restored(found, RETURN)
-
-
-def _restored(found: Findings, event: str) -> tuple[bool, str]:
-    t = found.results["IV"][event].t_restore_s
-    return t is not None and t <= WITHIN.value, seconds(t)
+_add_restored(LEAVE)
+_add_restored(RETURN)
 
 
 @plug_n_play.add(
-    f"IV: after the return all powers are equal within {EQUAL.value:g} pu",
+    f"IV: after the return all powers are equal within {EQUAL:g} pu",
     events=(RETURN,),
     measures=("p",),
 )
 def shares_again(found: Findings) -> tuple[bool, str]:
     p = found.results["IV"][RETURN].p.values()  # the returned inverter's too
-    return max(p) - min(p) < EQUAL.value, f"p from {min(p):.3f} to {max(p):.3f} pu"
+    return max(p) - min(p) < EQUAL, f"p from {min(p):.3f} to {max(p):.3f} pu"
 
 
 @plug_n_play.add(
-    f"IV: V_error below {V_FIGURE.value:g} pu after both",
+    f"IV: V_error below {V_FIGURE:g} pu after both",
     events=(LEAVE, RETURN),
     measures=("V_error",),
 )
 def voltage_likewise(found: Findings) -> tuple[bool, str]:
     errors = {event: found.results["IV"][event].V_error for event in (LEAVE, RETURN)}
-    holds = all(error < V_FIGURE.value for error in errors.values())
+    holds = all(error < V_FIGURE for error in errors.values())
     return holds, listed((event, f"{error:.4f} pu") for event, error in errors.items())
 
 
@@ -194,7 +191,7 @@ def each_shares_its_own_load(found: Findings) -> tuple[bool, str]:
     spread = max((max(p) - min(p) for p in powers), default=0.0)
     apart = min((abs(a - b) for i, a in enumerate(levels) for b in levels[:i]), default=0.0)
     shown = " / ".join(f"{p:.3f}" for p in levels)
-    return spread < EQUAL.value < apart, f"{shown} pu, within an island at most {spread:.4f} pu apart"
+    return spread < EQUAL < apart, f"{shown} pu, within an island at most {spread:.4f} pu apart"
 
 
 def _island_powers(found: Findings) -> list[dict[str, float]]:

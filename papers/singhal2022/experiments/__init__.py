@@ -19,19 +19,17 @@ from gridpeers.papers.singhal2022.experiments.outage_experiments import flapping
 
 @dataclass(frozen=True)
 class FromSweep:
-    """An experiment on the rows of a sweep."""
+    """An experiment on the rows of a sweep of `scenarios/catalogue/sweeps/`."""
 
     sweep: str
-    """Name in `scenarios/catalogue/sweeps/`."""
     make: Callable[[SweepData], ExperimentResult]
 
 
 @dataclass(frozen=True)
 class FromScenario:
-    """An experiment on the histories of a scenario's cases."""
+    """An experiment on the histories of the cases of a scenario of `scenarios/catalogue/`."""
 
     scenario: str
-    """Name in `scenarios/catalogue/`."""
     make: Callable[[CaseData], ExperimentResult]
 
 

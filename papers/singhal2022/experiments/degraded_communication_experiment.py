@@ -35,9 +35,6 @@ OPTIONS: Mapping[str, Mapping[str, Any]] = {
 
 _PAPER = {"stale": "hold", "T_age_s": 0.2, "weights": "paper", "kappa_c": 12.0, "anti_windup": "clamp"}
 
-Condition = tuple[float, float]
-"""Delay (s) and loss of all agent-agent links."""
-
 
 def degraded_communication(sweep: SweepData) -> ExperimentResult:
     """Return the times of every option under every condition."""
@@ -53,60 +50,56 @@ def degraded_communication(sweep: SweepData) -> ExperimentResult:
         (value,) = sweep.measured(index, sweep.where({"case": case, "link": links, **options}))
         return float(value)
 
-    def curves(number: int, index: str, links: str) -> list[Curve]:
-        found = []
-        for style, case in enumerate(CASES):
-            x = np.arange(float(len(OPTIONS))) + 0.18 * (style - 1)
-            y = np.array([measured(case, links, option, index) for option in OPTIONS])
-            predicted = np.array([theory[case, links][number]])
-            found += [Curve(x, y, style, "points"), Curve(x[:1], predicted, style, "hollow")]
-        return found
-
-    panels = [
-        Panel(
-            title=words(condition),
-            x_label="",
-            y_label=f"{title.partition(',')[0]}, time (s)" if links == next(iter(conditions)) else "",
-            curves=curves(number, index, links),
-            log="y",
-            x_names=list(OPTIONS) if number else [""] * len(OPTIONS),
-            y_range=(0.2, 30.0),
-        )
-        for number, (index, title) in enumerate(INDEXES)
-        for links, condition in conditions.items()
-    ]
-    rows: list[tuple[TableCell, ...]] = []
-    for case in CASES:
+    panels: list[Panel] = []
+    for number, (index, title) in enumerate(INDEXES):
         for links, condition in conditions.items():
-            rows.append((case, words(condition), "hold, predicted", *theory[case, links]))
-            for option in OPTIONS:
-                times = [measured(case, links, option, index) for index, _ in INDEXES]
-                rows.append((case, words(condition), option, *times))
+            curves = []
+            for style, case in enumerate(CASES):
+                x = np.arange(float(len(OPTIONS))) + 0.18 * (style - 1)
+                y = np.array([measured(case, links, option, index) for option in OPTIONS])
+                predicted = np.array([theory[case, links][number]])
+                curves += [Curve(x, y, style, "points"), Curve(x[:1], predicted, style, "hollow")]
+            panels.append(
+                Panel(
+                    title=words(*condition),
+                    x_label="",
+                    y_label=f"{title.partition(',')[0]}, time (s)" if links == next(iter(conditions)) else "",
+                    curves=curves,
+                    log="y",
+                    x_names=list(OPTIONS) if number else [""] * len(OPTIONS),
+                    y_range=(0.2, 30.0),
+                )
+            )
     page = Page(
         title="Islanding over late and lossy links, with every option of the agents",
         panels=panels,
         columns=len(conditions),
-        names={style: sweep.base.cases[case].title for style, case in enumerate(CASES)},
+        names=sweep.names(CASES),
         looks={"points": "measured", "hollow": "predicted (hold)"},
         share_y=True,
         height=2.6,
     )
+    rows: list[tuple[TableCell, ...]] = []
+    for case in CASES:
+        for links, condition in conditions.items():
+            rows.append((case, words(*condition), "hold, predicted", *theory[case, links]))
+            rows += [
+                (case, words(*condition), option, *(measured(case, links, option, index) for index, _ in INDEXES))
+                for option in OPTIONS
+            ]
     columns = ("graph", "links", "option", "f (s)", "sharing (s)")
     return ExperimentResult(page=page, table=ExperimentTable(columns=columns, rows=rows))
 
 
-def words(condition: Condition) -> str:
-    """Return a condition in words.
+def words(late: float, lost: float) -> str:
+    """Return a delay (s) and a loss of all agent-agent links in words.
 
-    Examples
-    --------
-    >>> words((0.1, 0.0)), words((0.0, 0.9)), words((0.0, 0.0))
+    >>> words(0.1, 0.0), words(0.0, 0.9), words(0.0, 0.0)
     ('late by 0.1 s', 'loss 90 %', 'good links')
     """
-    late, lost = condition
     return f"late by {late:g} s" if late else f"loss {100 * lost:g} %" if lost else "good links"
 
 
-def _condition(links: str) -> Condition:
+def _condition(links: str) -> tuple[float, float]:
     entries = json.loads(links)
     return (entries[0].get("delay", 0.0), entries[0].get("loss", 0.0)) if entries else (0.0, 0.0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -11,19 +11,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from gridpeers.measures import (
-    MPSI,
-    MQSI,
-    STEADY,
-    Floats,
-    History,
-    Nameplates,
-    Settling,
-    Window,
-    mean_frequency,
-    nameplates_of,
-    settling,
-)
+from gridpeers import measures
+from gridpeers.measures import STEADY, Floats, History, Settling, Window, nameplates_of
 from gridpeers.theory import (
     Feeder,
     InverterGroup,
@@ -43,43 +32,28 @@ from gridpeers.theory import (
 
 @dataclass(frozen=True, kw_only=True)
 class CaseData:
-    """A scenario that was run."""
+    """A scenario that was run, with the history of each case."""
 
     scenario: ScenarioModel
     feeder: Feeder
     histories: Mapping[str, History]
-    """By case."""
 
-    @cached_property
-    def nameplates(self) -> Nameplates:
-        """Nameplates in the order of the histories' columns."""
-        return nameplates_of(self.scenario, self.feeder)
-
-    def _nameplates_in(self, case: str) -> Nameplates:
-        """Return the same without those that have no agent in a case, where sharing is meant."""
-        return nameplates_of(self.scenario, self.feeder, case)
+    def t(self, case: str) -> Floats:
+        return self.histories[case].t
 
     def f(self, case: str) -> Floats:
         """Return the frequency (Hz), mean of the GFM."""
-        return mean_frequency(self.histories[case], self.nameplates)
+        return measures.mean_frequency(self.histories[case], nameplates_of(self.scenario, self.feeder))
 
     def MPSI(self, case: str) -> Floats:
-        """Return the mean power sharing index, (16)."""
-        return MPSI(self.histories[case], self._nameplates_in(case))
-
-    def MQSI(self, case: str) -> Floats:
-        """Return the mean var sharing index, (17)."""
-        return MQSI(self.histories[case], self._nameplates_in(case))
-
-    def t(self, case: str) -> Floats:
-        """Return the time of the rows (s)."""
-        return self.histories[case].t
+        """Return the mean power sharing index of the inverters with an agent, (16)."""
+        return measures.MPSI(self.histories[case], nameplates_of(self.scenario, self.feeder, case))
 
     def settling(self, case: str, start: float, end: float) -> Settling:
         """Return how a case settled from a time to another (s)."""
-        return settling(
-            self.histories[case], self._nameplates_in(case), Window(label="", start=start, end=end), self.feeder.f_nom
-        )
+        nameplates = nameplates_of(self.scenario, self.feeder, case)
+        window = Window(label="", start=start, end=end)
+        return measures.settling(self.histories[case], nameplates, window, self.feeder.f_nom)
 
     def mean(self, x: Floats, case: str, end: float) -> float:
         """Return the mean over the 0.2 s before a time (s), as steady values are measured."""
@@ -97,13 +71,7 @@ class CaseData:
         return {step.label: step.load for step in steps if step.load is not None}
 
 
-def cut_between(inverters: InverterGroup, groups: Mapping[str, str]) -> set[tuple[str, str]]:
-    """Return the links (src, dst) between members of different groups."""
-    names = [name for name in inverters.names if name in groups]
-    return {(a, b) for a in names for b in names if groups[a] != groups[b]}
-
-
-def without(inverters: InverterGroup, links: set[tuple[str, str]]) -> InverterGroup:
+def without(inverters: InverterGroup, links: Iterable[tuple[str, str]]) -> InverterGroup:
     """Return the inverters as if these links (src, dst) were not there."""
     A = np.array(inverters.A)
     for src, dst in links:
@@ -128,8 +96,6 @@ def times_of(predicted: Times) -> TimePair:
 class SweepData:
     """A sweep that is done.
 
-    Examples
-    --------
     >>> table = pd.DataFrame({"case": "a", "link[0].delay": [0.1, 0.0, 0.2], "e.t_f_s": [2.0, 1.0, None]})
     >>> sweep = SweepData(rows=table, base=None, window="e")
     >>> sweep.curve("link[0].delay", "t_f_s", {"case": "a"})
@@ -172,11 +138,16 @@ class SweepData:
         found = [float(over(self.measured(index, self.where({**equal, x: value})))) for value in at]
         return np.array(at, float), np.array(found)
 
-    # ---------------------------------------------------------------- theory
+    def range(self, x: str, index: str, equal: Mapping[str, Any]) -> tuple[Floats, Floats]:
+        """Return the least and the greatest of an index against a column."""
+        return self.curve(x, index, equal, np.min)[1], self.curve(x, index, equal, np.max)[1]
+
+    def names(self, cases: Iterable[str]) -> dict[int, str]:
+        """Return the titles of cases by their place, for a legend."""
+        return {style: self.base.cases[case].title for style, case in enumerate(cases)}
 
     @cached_property
     def feeder(self) -> Feeder:
-        """The feeder."""
         return feeder_of(self.base)
 
     @cached_property

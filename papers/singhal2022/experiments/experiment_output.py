@@ -10,7 +10,7 @@ import csv
 import io
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -34,43 +34,31 @@ wide pale line, which is drawn first and stays visible below others."""
 
 @dataclass(frozen=True)
 class Curve:
-    """One curve of a panel."""
-
     x: Floats
     y: Floats
     """A time that never came is infinite: it is drawn as a sign at the upper edge."""
     style: int
     """Number of its colour and marker: one for the same case in all panels."""
     look: Look = "measured"
-    low: Floats = field(default_factory=lambda: np.zeros(0))
-    high: Floats = field(default_factory=lambda: np.zeros(0))
+    low: Floats | None = None
+    high: Floats | None = None
     """Range around it, if there is one."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class LimitLine:
-    """A vertical line at a predicted limit, in the style of the curve that it belongs to."""
-
-    x: float
-    style: int
-
-
-@dataclass(frozen=True, kw_only=True)
 class Panel:
-    """One pair of axes."""
-
     title: str
     x_label: str
     y_label: str
     curves: Sequence[Curve]
-    lines: Sequence[LimitLine] = ()
+    lines: Sequence[tuple[float, int]] = ()
+    """Vertical lines at predicted limits: x, and the style of the curve that it belongs to."""
     spans: Sequence[tuple[float, float]] = ()
     """Times (s) in which something was down, shaded."""
     level: float | None = None
     """A horizontal line, e.g. the band of the measure."""
     log: Literal["", "x", "y", "xy"] = ""
     x_ticks: Sequence[float] = ()
-    """Values at the axis; without, matplotlib's."""
     x_names: Sequence[str] = ()
     """Names for 0, 1, 2, ... at the axis instead of numbers."""
     zero: float = 0.0
@@ -81,16 +69,13 @@ class Panel:
 
 @dataclass(frozen=True, kw_only=True)
 class Page:
-    """A figure."""
-
     title: str
     panels: Sequence[Panel]
     columns: int
-    """Panels side by side."""
     names: Mapping[int, str]
     """Meaning of the styles, for the legend."""
-    looks: Mapping[Look, str] = field(default_factory=lambda: {"measured": "measured", "predicted": "predicted"})
-    """Meaning of the looks, for the legend; those without words are left out."""
+    looks: Mapping[Look, str] | None = None
+    """Meaning of the looks, for the legend; by default measured and predicted are told."""
     share_y: bool = False
     height: float = 3.0
     """Height of a row of panels (inch)."""
@@ -102,22 +87,6 @@ def time_panels(curves: Callable[[int, str], Sequence[Curve]], suffix: str = "",
         Panel(title=f"{title}{suffix}", y_label="time after islanding (s)", curves=curves(number, index), **axes)
         for number, (index, title) in enumerate(INDEXES)
     ]
-
-
-FIGURE = "figure.png"
-
-
-@dataclass(frozen=True, kw_only=True)
-class ExperimentResult:
-    """A figure and a table."""
-
-    page: Page
-    table: ExperimentTable
-
-    def write(self, folder: Path) -> tuple[Path, ...]:
-        """Write figure.png, table.csv and table.md into a folder; the files."""
-        self.table.write(folder)
-        return draw(self.page, folder / FIGURE), folder / "table.csv", folder / "table.md"
 
 
 TableCell = str | float | None
@@ -135,29 +104,24 @@ class ExperimentTable:
     apart: int = 0
     """Number of first columns whose values part it into tables of their own in Markdown."""
 
-    def write(self, folder: Path) -> None:
-        """Write table.csv and table.md into a folder."""
+    def as_csv(self) -> str:
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
         writer.writerow(self.columns)
         writer.writerows([["never" if _is_never(cell) else cell for cell in row] for row in self.rows])
-        write_whole(folder / "table.csv", text.getvalue())
-        write_whole(folder / "table.md", self.markdown())
+        return text.getvalue()
 
     def markdown(self) -> str:
-        """Return the table as Markdown."""
-        texts = [[self._text(cell) for cell in row] for row in self.rows]
-        names = dict.fromkeys(tuple(row[: self.apart]) for row in texts)
-        return "\n".join(
-            self._one(name, [row[self.apart :] for row in texts if tuple(row[: self.apart]) == name]) for name in names
-        )
-
-    def _one(self, name: tuple[str, ...], rows: Sequence[Sequence[str]]) -> str:
+        parts: dict[tuple[str, ...], list[str]] = {}
+        for row in self.rows:
+            texts = [self._text(cell) for cell in row]
+            parts.setdefault(tuple(texts[: self.apart]), []).append(f"| {' | '.join(texts[self.apart :])} |")
         columns = self.columns[self.apart :]
-        lines = [f"**{', '.join(name)}**", ""] if name else []
-        lines += ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
-        lines += ["| " + " | ".join(row) + " |" for row in rows]
-        return "\n".join(lines) + "\n"
+        head = [f"| {' | '.join(columns)} |", "|" + "---|" * len(columns)]
+        return "\n".join(
+            "\n".join([*([f"**{', '.join(name)}**", ""] if name else []), *head, *rows]) + "\n"
+            for name, rows in parts.items()
+        )
 
     def _text(self, cell: TableCell) -> str:
         if _is_never(cell):
@@ -169,11 +133,23 @@ def _is_never(cell: TableCell) -> bool:
     return cell is None or (isinstance(cell, float) and math.isinf(cell))
 
 
+@dataclass(frozen=True, kw_only=True)
+class ExperimentResult:
+    page: Page
+    table: ExperimentTable
+
+    def write(self, folder: Path) -> tuple[Path, ...]:
+        """Write figure.png, table.csv and table.md into a folder; return the files."""
+        files = folder / "table.csv", folder / "table.md"
+        write_whole(files[0], self.table.as_csv())
+        write_whole(files[1], self.table.markdown())
+        return *gp.figures.save(draw(self.page), folder, "figure", dpi=DPI), *files
+
+
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7a7a7a", "#000000")
 MARKERS = "osD^vPX*"
 DASHES: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (3, 1)), (0, (1, 1)), "-")
 """Of traces over time, which have no markers."""
-
 
 SLANTED = 12
 """Most names at an axis that slant; more of them stand upright."""
@@ -182,8 +158,8 @@ DPI = 130
 """Points per inch: readable in print, and small enough for a repository."""
 
 
-def draw(page: Page, path: Path) -> Path:
-    """Draw a page into a file, at once or not at all."""
+def draw(page: Page) -> Figure:
+    """Draw a page."""
     with mpl.rc_context(gp.figures.PAGE):
         rows = -(-len(page.panels) // page.columns)
         width = {1: 6.4, 2: 8.4}.get(page.columns, 3.1 * page.columns)
@@ -193,14 +169,12 @@ def draw(page: Page, path: Path) -> Path:
             _draw(axes, panel)
         for axes in grid.flat[len(page.panels) :]:
             axes.set_visible(False)
-        handles = [*_names(page), *_looks(page)]
-        if handles:
-            labels = [str(handle.get_label()) for handle in handles]
-            columns = max(1, min(len(labels), int(15 * width / (max(map(len, labels)) + 6))))
-            figure.legend(handles, labels, loc="outside lower center", ncols=columns)
+        if handles := [*_names(page), *_looks(page)]:
+            longest = max(len(str(handle.get_label())) for handle in handles)
+            columns = max(1, min(len(handles), int(15 * width / (longest + 6))))
+            figure.legend(handles=handles, loc="outside lower center", ncols=columns)
         figure.suptitle(page.title, fontsize=10)
-        (file,) = gp.figures.save(figure, path.parent, path.stem, dpi=DPI)
-    return file
+    return figure
 
 
 def _draw(axes: Axes, panel: Panel) -> None:
@@ -209,8 +183,8 @@ def _draw(axes: Axes, panel: Panel) -> None:
         axes.axvspan(start, end, color="#eeeeee", zorder=0)
     if panel.level is not None:
         axes.axhline(panel.level, color="#000000", linewidth=0.6, zorder=1)
-    for line in panel.lines:
-        axes.axvline(line.x, color=COLOURS[line.style], linewidth=1.4, linestyle=(3 * line.style, (4, 2)), zorder=1)
+    for x, style in panel.lines:
+        axes.axvline(x, color=COLOURS[style], linewidth=1.4, linestyle=(3 * style, (4, 2)), zorder=1)
     if "x" in panel.log:
         axes.set_xscale("symlog" if panel.zero else "log", **({"linthresh": panel.zero} if panel.zero else {}))
     if "y" in panel.log:
@@ -231,12 +205,12 @@ def _draw(axes: Axes, panel: Panel) -> None:
         axes.set_ylim(bottom=0.0)
     _never(axes, panel)
     low, high = axes.get_ylim()
-    if "y" in panel.log and high < 1e3 * low:  # decades alone would be too few
+    if "y" not in panel.log:
+        axes.ticklabel_format(axis="y", useOffset=False)
+    elif high < 1e3 * low:  # decades alone would be too few
         axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axes.yaxis.set_major_formatter("{x:g}")
         axes.yaxis.set_minor_locator(NullLocator())
-    if "y" not in panel.log:
-        axes.ticklabel_format(axis="y", useOffset=False)
     axes.set_title(panel.title, loc="left", pad=8)
     axes.set_xlabel(panel.x_label)
     axes.set_ylabel(panel.y_label)
@@ -244,75 +218,59 @@ def _draw(axes: Axes, panel: Panel) -> None:
 
 def _plot(axes: Axes, curve: Curve) -> None:
     colour, marker = COLOURS[curve.style % len(COLOURS)], MARKERS[curve.style % len(MARKERS)]
-    y = np.where(np.isfinite(curve.y), curve.y, np.nan)
-    if curve.low.size:
+    if curve.low is not None and curve.high is not None:
         axes.fill_between(curve.x, curve.low, curve.high, color=colour, alpha=0.2, linewidth=0)
-    match curve.look:
-        case "measured":
-            axes.plot(curve.x, y, "-", color=colour, marker=marker, ms=_nested(curve, 7.0), lw=_nested(curve, 2.4))
-        case "hollow":
-            axes.plot(curve.x, y, "", color=colour, marker=marker, ms=9.0, mfc="none", lw=0)
-        case "predicted":
-            axes.plot(curve.x, y, color=colour, lw=1.6, linestyle=(2.3 * curve.style, (3, 1.6)))
-        case "points":
-            axes.plot(curve.x, y, "", color=colour, marker=marker, ms=4, lw=0, alpha=0.75)
-        case "trace":
-            axes.plot(curve.x, y, linestyle=DASHES[curve.style % len(DASHES)], color=colour, lw=1.5)
-        case "solid":
-            axes.plot(curve.x, y, "-", color=colour, lw=1.5)
-        case "reference":
-            axes.plot(curve.x, y, "-", color=colour, lw=4.0, alpha=0.6)
-
-
-def _nested(curve: Curve, largest: float) -> float:
-    """Return the size of a marker, or width of a line: largest in style 0, 0.55 of it from style 3 on."""
-    return largest * (1.0 - 0.15 * min(curve.style, 3))
+    smaller = 1.0 - 0.15 * min(curve.style, 3)
+    looks: dict[Look, dict[str, Any]] = {
+        "measured": {"ls": "-", "marker": marker, "ms": 7.0 * smaller, "lw": 2.4 * smaller},
+        "hollow": {"marker": marker, "ms": 9.0, "mfc": "none", "lw": 0},
+        "predicted": {"lw": 1.6, "ls": (2.3 * curve.style, (3, 1.6))},
+        "points": {"marker": marker, "ms": 4, "lw": 0, "alpha": 0.75},
+        "trace": {"ls": DASHES[curve.style % len(DASHES)], "lw": 1.5},
+        "solid": {"ls": "-", "lw": 1.5},
+        "reference": {"ls": "-", "lw": 4.0, "alpha": 0.6},
+    }
+    axes.plot(curve.x, np.where(np.isfinite(curve.y), curve.y, np.nan), color=colour, **looks[curve.look])
 
 
 def _never(axes: Axes, panel: Panel) -> None:
     """Put a sign of infinity at the upper edge for times that never came."""
-    some = False
-    for curve in panel.curves:
-        never = np.isposinf(curve.y)
-        if never.any():
-            some = True
-            at = np.full(int(never.sum()), 0.96)
-            colour = COLOURS[curve.style % len(COLOURS)]
-            axes.plot(
-                curve.x[never], at, lw=0, marker=r"$\infty$", color=colour, ms=9, transform=axes.get_xaxis_transform()
-            )
-    if some:
+    curves = [curve for curve in panel.curves if np.isposinf(curve.y).any()]
+    for curve in curves:
+        at = curve.x[np.isposinf(curve.y)]
+        sign: dict[str, Any] = {"marker": r"$\infty$", "color": COLOURS[curve.style], "ms": 9, "lw": 0}
+        axes.plot(at, np.full(len(at), 0.96), transform=axes.get_xaxis_transform(), **sign)
+    if curves:
         note: dict[str, Any] = {"xycoords": "axes fraction", "xytext": (0, 2), "textcoords": "offset points"}
         axes.annotate(r"$\infty$: not within the run", (1.0, 1.0), ha="right", fontsize=7, color="#444444", **note)
 
 
 def _names(page: Page) -> list[Line2D]:
-    used = {curve.look for panel in page.panels for curve in panel.curves}
-    wide = {curve.style for panel in page.panels for curve in panel.curves if curve.look == "reference"}
+    curves = [curve for panel in page.panels for curve in panel.curves]
+    used = {curve.look for curve in curves}
+    wide = {curve.style for curve in curves if curve.look == "reference"}
     found = []
     for i, name in page.names.items():
+        look: dict[str, Any] = {"marker": MARKERS[i], "lw": 0, "ms": 5}
         if used & {"trace", "solid"}:
-            dashes: Any = DASHES[i] if "trace" in used else "-"
             width, alpha = (4.0, 0.6) if i in wide else (1.6, 1.0)
-            found.append(Line2D([], [], color=COLOURS[i], linestyle=dashes, lw=width, alpha=alpha, label=name))
-        else:
-            found.append(Line2D([], [], color=COLOURS[i], marker=MARKERS[i], lw=0, ms=5, label=name))
+            look = {"linestyle": DASHES[i] if "trace" in used else "-", "lw": width, "alpha": alpha}
+        found.append(Line2D([], [], color=COLOURS[i], label=name, **look))
     return found
 
 
 def _looks(page: Page) -> list[Line2D]:
     """Return legend entries for filled, hollow and dashed, as far as the page has them."""
     used = {curve.look for panel in page.panels for curve in panel.curves}
-    black = "#333333"
     shapes: dict[str, dict[str, Any]] = {
         "measured": {"marker": "o", "ms": 4.5, "lw": 1.2},
         "points": {"marker": "o", "ms": 4, "lw": 0},
         "hollow": {"marker": "o", "mfc": "none", "ms": 6.5, "lw": 0},
         "predicted": {"linestyle": "--", "lw": 1.6},
+        "limit": {"linestyle": (0, (4, 2)), "lw": 1.4},
     }
-    found = [
-        Line2D([], [], color=black, label=words, **shapes[look]) for look, words in page.looks.items() if look in used
-    ]
+    words: dict[str, str] = {"measured": "measured", "predicted": "predicted"}
+    words = {look: text for look, text in (words if page.looks is None else page.looks).items() if look in used}
     if any(panel.lines for panel in page.panels):
-        found.append(Line2D([], [], color=black, linestyle=(0, (4, 2)), lw=1.4, label="predicted limit"))
-    return found
+        words["limit"] = "predicted limit"
+    return [Line2D([], [], color="#333333", label=text, **shapes[look]) for look, text in words.items()]

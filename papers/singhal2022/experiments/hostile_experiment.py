@@ -37,9 +37,6 @@ LIMITS = {index: limit for index, _, limit, _, _ in MEASURES}
 LETTERS = {"MPSI": "P", "MQSI": "Q", "S_max_pu": "S"}
 """Signs of measures that are out of their limits, beside the frequency."""
 
-INDEXES = (*LIMITS, "V_min_pu", "V_max_pu")
-"""Measures of the tables."""
-
 RUN = ("case", "node", "link", "law")
 """Columns that name a run."""
 
@@ -51,21 +48,24 @@ def hostile(sweep: SweepData) -> ExperimentResult:
     """Return how far every attack gets against every defence, on every graph."""
     lies = replace(sweep, window=EVENT)
     rows = lies.rows
-    attacks = {attack_words(node, link): (node, link) for node, link in _unique(rows, "node", "link")}
-    defences = {defence_words(law): law for (law,) in _unique(rows, "law")}
-    row_of = {run: number for number, run in enumerate(zip(*(rows[name] for name in RUN), strict=True))}
-    columns = {index: lies.measured(index, rows) for index in INDEXES}
+    attacks = {attack_words(*entries): entries for entries in zip(rows["node"], rows["link"], strict=True)}
+    defences = {defence_words(law): law for law in rows["law"]}
+    columns = {index: lies.measured(index, rows) for index in (*LIMITS, "V_min_pu", "V_max_pu")}
+    found = {
+        run: {index: float(values[number]) for index, values in columns.items()}
+        for number, run in enumerate(zip(*(rows[name] for name in RUN), strict=True))
+    }
 
-    def measured(case: str, attack: str, defence: str, index: str) -> float:
-        return float(columns[index][row_of[case, *attacks[attack], defences[defence]]])
+    def measured(case: str, attack: str, defence: str) -> Mapping[str, float]:
+        return found[case, *attacks[attack], defences[defence]]
 
     def curves(case: str, index: str, least: float) -> list[Curve]:
-        found = []
+        curves = []
         for style, defence in enumerate(defences):
             x = np.arange(float(len(attacks))) + 0.13 * (style - 0.5 * (len(defences) - 1))
-            y = np.array([measured(case, attack, defence, index) for attack in attacks])
-            found.append(Curve(x, np.maximum(y, least), style, "points"))
-        return found
+            y = np.array([measured(case, attack, defence)[index] for attack in attacks])
+            curves.append(Curve(x, np.maximum(y, least), style, "points"))
+        return curves
 
     panels = [
         Panel(
@@ -90,12 +90,12 @@ def hostile(sweep: SweepData) -> ExperimentResult:
         share_y=True,
         height=3.0,
     )
-    table: list[tuple[TableCell, ...]] = []
-    for case in GRAPHS:
-        for what, cell in CELLS.items():
-            for attack in attacks:
-                found = [{index: measured(case, attack, defence, index) for index in INDEXES} for defence in defences]
-                table.append((case, what, attack, *map(cell, found)))
+    table: list[tuple[TableCell, ...]] = [
+        (case, what, attack, *(cell(measured(case, attack, defence)) for defence in defences))
+        for case in GRAPHS
+        for what, cell in CELLS.items()
+        for attack in attacks
+    ]
     heads = ("graph", "numbers", "attack", *defences)
     return ExperimentResult(page=page, table=ExperimentTable(columns=heads, rows=table, apart=2))
 
@@ -103,8 +103,6 @@ def hostile(sweep: SweepData) -> ExperimentResult:
 def frequency_cell(found: Mapping[str, float]) -> str:
     """Return the frequency error (Hz), bold out of its limit, with a letter for everything else that is out of its own.
 
-    Examples
-    --------
     >>> frequency_cell({"f_off_Hz": 0.034, "MPSI": 0.02, "MQSI": 0.1, "S_max_pu": 0.56})
     '**0.034** P'
     >>> frequency_cell({"f_off_Hz": 0.004, "MPSI": 0.0, "MQSI": 0.3, "S_max_pu": 1.3})
@@ -137,16 +135,9 @@ CELLS: Mapping[str, Callable[[Mapping[str, float]], str]] = {
 """The tables of a graph: their numbers, and a cell of them from what was measured."""
 
 
-def _unique(rows: Any, *columns: str) -> list[tuple[str, ...]]:
-    """Return the different values of some columns together, in the order of the sweep."""
-    return list(dict.fromkeys(zip(*(rows[name] for name in columns), strict=True)))
-
-
 def attack_words(node: str, link: str) -> str:
     """Return an attack in words, from the entries of its nodes and links as the sweep writes them.
 
-    Examples
-    --------
     >>> attack_words("[]", "[]"), attack_words("[]", '[{"on": "* -> inv1", "loss": 0.9}]')
     ('nobody lies', 'flood, 90 % lost')
     >>> lies = {"model": "offset", "P_set_W": 1e5, "plant": True, "in_name_of": "inv1"}
@@ -182,8 +173,6 @@ def _lie_words(liars: list[dict[str, Any]]) -> Iterator[str]:
 def defence_words(law: str) -> str:
     """Return a defence in words, from the law as the sweep writes it.
 
-    Examples
-    --------
     >>> defence_words('"consensus"'), defence_words('{"use": "resilient", "F": 1, "tolerance": 0.1, "T_out": 0.5}')
     ("the paper's law", 'F = 1, plausible')
     """

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import product
-from typing import Literal
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +18,6 @@ from gridpeers.papers.singhal2022.experiments.experiment_output import (
     Curve,
     ExperimentResult,
     ExperimentTable,
-    LimitLine,
     Page,
     Panel,
     TableCell,
@@ -26,7 +25,7 @@ from gridpeers.papers.singhal2022.experiments.experiment_output import (
 )
 from gridpeers.theory import InverterGroup, delay_limit, predicted_times, var_delay_limit, var_growth
 
-DELAY, K_Q = "link[0].delay", "gains.k_q"
+DELAY, LOSS, K_Q, ON = "link[0].delay", "link[0].loss", "gains.k_q", "link[0].on"
 WHOLE, ALONE = 0.25, 1e5
 """k_q of the whole law, and of one that leaves V_set alone."""
 
@@ -54,30 +53,31 @@ def delay(sweep: SweepData) -> ExperimentResult:
         title="Islanding over late links",
         panels=time_panels(curves, x_label=X, log="xy", zero=0.02, x_ticks=delays, y_range=(0.3, 40.0)),
         columns=2,
-        names={style: sweep.base.cases[case].title for style, case in enumerate(cases)},
+        names=sweep.names(cases),
         looks={"measured": "measured", "hollow": "measured, V_set left alone", "predicted": "predicted"},
         share_y=True,
     )
     rows: list[list[TableCell]] = []
-    for case in cases:
-        for d in delays:
-            row: list[TableCell] = [case, d]
-            for number, (index, _) in enumerate(INDEXES):
-                measured = [sweep.median(index, {"case": case, DELAY: d, K_Q: k}) for k in (ALONE, WHOLE)]
-                row += [theory[case, d][number], *measured]
-            rows.append(row)
-    columns = ["graph", "delay (s)"]
-    columns += [
-        f"{what}, {how} (s)" for what in ("f", "sharing") for how in ("predicted", "V_set left alone", "whole law")
-    ]
+    for case, d in product(cases, delays):
+        row: list[TableCell] = [case, d]
+        for number, (index, _) in enumerate(INDEXES):
+            measured = [sweep.median(index, {"case": case, DELAY: d, K_Q: k}) for k in (ALONE, WHOLE)]
+            row += [theory[case, d][number], *measured]
+        rows.append(row)
+    columns = ["graph", "delay (s)", *_of_times("predicted", "V_set left alone", "whole law")]
     return ExperimentResult(page=page, table=ExperimentTable(columns=columns, rows=rows))
 
 
-LEFT: tuple[tuple[str, str, Literal["", "y"], tuple[float, float]], ...] = (
-    ("V_error", "mean of abs(V - 1) (pu)", "", (0.0, 0.012)),
-    ("MQSI", "var sharing index, MQSI", "y", (0.003, 1.0)),
+def _of_times(*kinds: str) -> list[str]:
+    """Return columns for kinds of each of the two times."""
+    return [f"{what}, {kind} (s)" for what in ("f", "sharing") for kind in kinds]
+
+
+LEFT: tuple[tuple[str, dict[str, Any]], ...] = (
+    ("V_error", {"y_label": "mean of abs(V - 1) (pu)", "y_range": (0.0, 0.012)}),
+    ("MQSI", {"y_label": "var sharing index, MQSI", "log": "y", "y_range": (0.003, 1.0)}),
 )
-"""Steady values, labels of their axes, and scale and ends of these."""
+"""Steady values with their axes."""
 
 
 def communication(sweep: SweepData) -> ExperimentResult:
@@ -89,17 +89,14 @@ def communication(sweep: SweepData) -> ExperimentResult:
         found = []
         for style, case in enumerate(cases):
             x, y = sweep.curve(DELAY, index, {"case": case})
-            found += [
-                Curve(x, y, style),
-                Curve(x, np.array([theory[case, d][number] for d in delays]), style, "predicted"),
-            ]
+            predicted = np.array([theory[case, d][number] for d in delays])
+            found += [Curve(x, y, style), Curve(x, predicted, style, "predicted")]
         return found
 
     panels = time_panels(curves, x_label=X, log="y", y_range=(0.3, 25.0))
-    for index, y_label, log, y_range in LEFT:
+    for index, axes in LEFT:
         lines = [Curve(*sweep.curve(DELAY, index, {"case": case}), style) for style, case in enumerate(cases)]
-        title = f"{index} at the end of the run"
-        panels.append(Panel(title=title, x_label=X, y_label=y_label, curves=lines, log=log, y_range=y_range))
+        panels.append(Panel(title=f"{index} at the end of the run", x_label=X, curves=lines, **axes))
     page = Page(
         title="Islanding with the paper's reduced communication and link failure, over late links",
         panels=panels,
@@ -108,22 +105,18 @@ def communication(sweep: SweepData) -> ExperimentResult:
         height=2.6,
     )
     rows: list[list[TableCell]] = []
-    for case in cases:
-        for d in delays:
-            row: list[TableCell] = [case, d]
-            for number, (index, _) in enumerate(INDEXES):
-                row += [theory[case, d][number], sweep.median(index, {"case": case, DELAY: d})]
-            for name in ("f_error_Hz", "MPSI", "V_error", "MQSI", "V_swing_pu"):
-                row.append(round(sweep.median(name, {"case": case, DELAY: d}), 4))
-            rows.append([*row, round(var_growth(sweep.inverters[case], sweep.response, link_delay_s=d), 2)])
+    for case, d in product(cases, delays):
+        row: list[TableCell] = [case, d]
+        for number, (index, _) in enumerate(INDEXES):
+            row += [theory[case, d][number], sweep.median(index, {"case": case, DELAY: d})]
+        for name in ("f_error_Hz", "MPSI", "V_error", "MQSI", "V_swing_pu"):
+            row.append(round(sweep.median(name, {"case": case, DELAY: d}), 4))
+        rows.append([*row, round(var_growth(sweep.inverters[case], sweep.response, link_delay_s=d), 2)])
     columns = (
         *("case", "delay (s)", "f, predicted (s)", "f (s)", "sharing, predicted (s)", "sharing (s)"),
         *("abs(f - 60) (Hz)", "MPSI", "V_error (pu)", "MQSI", "swing of V (pu)", "growth of vars, predicted (1/s)"),
     )
     return ExperimentResult(page=page, table=ExperimentTable(columns=columns, rows=rows, digits=2))
-
-
-LOSS = "link[0].loss"
 
 
 def loss(sweep: SweepData) -> ExperimentResult:
@@ -138,10 +131,9 @@ def loss(sweep: SweepData) -> ExperimentResult:
     def against_loss(number: int, index: str) -> list[Curve]:
         found = []
         for style, case in enumerate(cases):
-            x, y = sweep.curve(LOSS, index, {"case": case, DELAY: 0.0})
-            low, high = (sweep.curve(LOSS, index, {"case": case, DELAY: 0.0}, over)[1] for over in (np.min, np.max))
+            of = {"case": case, DELAY: 0.0}
             found += [
-                Curve(x, y, style, low=low, high=high),
+                Curve(*sweep.curve(LOSS, index, of), style, "measured", *sweep.range(LOSS, index, of)),
                 Curve(fine, by_loss[case][:, number], style, "predicted"),
             ]
         return found
@@ -170,21 +162,19 @@ def loss(sweep: SweepData) -> ExperimentResult:
         title="Islanding over lossy links, the last state held",
         panels=panels,
         columns=2,
-        names={style: sweep.base.cases[case].title for style, case in enumerate(cases)},
+        names=sweep.names(cases),
         looks={"measured": "loss: median and range of 3 seeds", "hollow": "delay", "predicted": "predicted"},
     )
     rows: list[list[TableCell]] = []
-    for case in cases:
-        for p, age in zip(lost, age_of_loss.tolist(), strict=True):
-            row: list[TableCell] = [case, p, age]
-            same_age = next((d for d in sweep.values(DELAY) if abs(d - age) < 1e-9), 0.0 if p == 0.0 else None)
-            predicted = sweep.predicted(case, loss=p)
-            for number, (index, _) in enumerate(INDEXES):
-                late_cell = "" if same_age is None else sweep.median(index, {"case": case, DELAY: same_age, LOSS: 0.0})
-                row += [predicted[number], sweep.median(index, {"case": case, DELAY: 0.0, LOSS: p}), late_cell]
-            rows.append(row)
-    columns = ["graph", "loss", "mean age (s)"]
-    columns += [f"{w}, {how} (s)" for w in ("f", "sharing") for how in ("predicted", "measured", "delay of that age")]
+    for case, (p, age) in product(cases, zip(lost, age_of_loss.tolist(), strict=True)):
+        row: list[TableCell] = [case, p, age]
+        same_age = next((d for d in sweep.values(DELAY) if abs(d - age) < 1e-9), 0.0 if p == 0.0 else None)
+        predicted = sweep.predicted(case, loss=p)
+        for number, (index, _) in enumerate(INDEXES):
+            late_cell = "" if same_age is None else sweep.median(index, {"case": case, DELAY: same_age, LOSS: 0.0})
+            row += [predicted[number], sweep.median(index, {"case": case, DELAY: 0.0, LOSS: p}), late_cell]
+        rows.append(row)
+    columns = ["graph", "loss", "mean age (s)", *_of_times("predicted", "measured", "delay of that age")]
     return ExperimentResult(page=page, table=ExperimentTable(columns=columns, rows=rows))
 
 
@@ -206,7 +196,7 @@ def topology(sweep: SweepData) -> ExperimentResult:
         found = []
         for style, d in enumerate(delays):
             x, y = sweep.curve(GRAPH_LINKS, index, {DELAY: d})
-            low, high = (sweep.curve(GRAPH_LINKS, index, {DELAY: d}, over)[1] for over in (np.min, np.max))
+            low, high = sweep.range(GRAPH_LINKS, index, {DELAY: d})
             rows = runs[runs[DELAY] == d]
             at = (rows[GRAPH_LINKS] + 0.25 * (-1.0) ** rows["graph.number"]).to_numpy(float)
             medians = rows.groupby(GRAPH_LINKS)[PREDICTED[number]].median().to_numpy()
@@ -217,30 +207,24 @@ def topology(sweep: SweepData) -> ExperimentResult:
             ]
         return found
 
+    links = "links of the communication graph"
     page = Page(
         title="Random connected graphs",
-        panels=time_panels(
-            curves,
-            x_label="links of the communication graph",
-            log="y",
-            x_ticks=[8, 12, 16, 20, 24, 28, 32, 36],
-            y_range=(0.3, 15.0),
-        ),
+        panels=time_panels(curves, x_label=links, log="y", x_ticks=range(8, 37, 4), y_range=(0.3, 15.0)),
         columns=2,
         names={style: f"links late by {d:g} s" if d else "links at once" for style, d in enumerate(delays)},
         looks={"measured": "median and range", "points": "a graph", "predicted": "predicted, median"},
         share_y=True,
     )
     table: list[list[TableCell]] = []
-    for (d, links), rows in runs.groupby([DELAY, GRAPH_LINKS]):
-        row: list[TableCell] = [d, links, len(rows)]
+    for (d, count), rows in runs.groupby([DELAY, GRAPH_LINKS]):
+        row: list[TableCell] = [d, count, len(rows)]
         for number, (index, _) in enumerate(INDEXES):
             times = sweep.measured(index, rows)
             predicted = rows[PREDICTED[number]].median()
             row += [float(x) for x in (predicted, np.median(times), times.min(), times.max())]
         table.append(row)
-    columns = ["delay (s)", "links", "graphs"]
-    columns += [f"{w}, {h} (s)" for w in ("f", "sharing") for h in ("predicted", "median", "lowest", "highest")]
+    columns = ["delay (s)", "links", "graphs", *_of_times("predicted", "median", "lowest", "highest")]
     return ExperimentResult(page=page, table=ExperimentTable(columns=columns, rows=table))
 
 
@@ -255,23 +239,18 @@ def on_graph(sweep: SweepData, edges: str) -> InverterGroup:
 
 
 GRAPHS = ("full", "reduced", "path", "star")
-ON = "link[0].on"
+LINKS = "* <-> *"
+PLACES = ((LINKS, "links"), ("plant -> *", "measurements"), ("* -> plant", "set-points"))
 
-LINKS, MEASUREMENTS, SET_POINTS = "* <-> *", "plant -> *", "* -> plant"
-
-SWINGS = {"f_swing_Hz": 0.005, "V_swing_pu": 0.002}
-"""Least swing that counts (Hz, pu). An oscillation that stays is ten times as large."""
+SWINGS = (
+    ("f_swing_Hz", 0.005, "f, V_set left alone", "swing of f (Hz)", ALONE),
+    ("V_swing_pu", 0.002, "V, whole law", "swing of V (pu)", WHOLE),
+)
+"""Swings, the least that counts (an oscillation that stays is ten times as large), title, label, and k_q of the runs:
+frequency where the voltage is left alone, and voltage where nothing is."""
 
 LEAST = 1e-5
 """Swings below this (Hz, pu) are drawn as this: the rest of a transient, or rounding."""
-
-_PLACES = ((LINKS, "links"), (MEASUREMENTS, "measurements"), (SET_POINTS, "set-points"))
-
-_ROWS = (
-    ("f_swing_Hz", "f, V_set left alone", "swing of f (Hz)", ALONE),
-    ("V_swing_pu", "V, whole law", "swing of V (pu)", WHOLE),
-)
-"""Rows of the figure: frequency where the voltage is left alone, and voltage where nothing is."""
 
 
 def places(sweep: SweepData) -> ExperimentResult:
@@ -282,15 +261,15 @@ def places(sweep: SweepData) -> ExperimentResult:
     """
     limits = _limits(sweep)
     panels, rows = [], []
-    for (index, title, y_label, k_q), (on, place) in product(_ROWS, _PLACES):
+    for (index, least, title, y_label, k_q), (on, place) in product(SWINGS, PLACES):
         curves, lines = [], []
         for style, case in enumerate(GRAPHS):
             x, y = sweep.curve(DELAY, index, {"case": case, ON: on, K_Q: k_q})
             curves.append(Curve(x, np.maximum(y, LEAST), style))
             limit = limits[index, on != LINKS, case]
             if np.isfinite(limit) and limit <= x[-1]:
-                lines.append(LimitLine(x=limit, style=style))
-            rows.append((title, place, case, limit, *_between(x, y < SWINGS[index])))
+                lines.append((limit, style))
+            rows.append((title, place, case, limit, *_between(x, y < least)))
         panels.append(
             Panel(
                 title=f"{title}: late {place}",
@@ -298,7 +277,7 @@ def places(sweep: SweepData) -> ExperimentResult:
                 y_label=y_label,
                 curves=curves,
                 lines=lines,
-                level=SWINGS[index],
+                level=least,
                 log="y",
                 x_range=(-0.01, 0.62),
                 y_range=(LEAST, 1.0),
@@ -308,7 +287,7 @@ def places(sweep: SweepData) -> ExperimentResult:
         title="Where a delay sits decides whether it destabilises",
         panels=panels,
         columns=3,
-        names={style: sweep.base.cases[case].title for style, case in enumerate(GRAPHS)},
+        names=sweep.names(GRAPHS),
         looks={},
         height=2.9,
     )

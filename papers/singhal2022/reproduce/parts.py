@@ -8,8 +8,6 @@ import msgspec
 
 
 class Picture(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One figure of the report."""
-
     key: str
     """Its name in claims, and its file's name."""
     file: str
@@ -21,7 +19,6 @@ class Picture(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def stem(self) -> str:
-        """Name of the file without its ending."""
         return self.file.partition(".")[0]
 
 

@@ -8,6 +8,7 @@ import os
 import platform
 import shutil
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -40,17 +41,13 @@ class Reproduction:
         return [verdict for result in self.results for verdict in result.verdicts]
 
     @property
-    def wall_s(self) -> float:
-        return sum(result.wall_s for result in self.results)
-
-    @property
-    def cpu_s(self) -> float:
-        return sum(result.cpu_s for result in self.results)
+    def numbers(self) -> list[ComparedNumber]:
+        return [number for result in self.results for number in numbers(result.found, result.tables)]
 
     @property
     def failed(self) -> bool:
         """Whether a claim failed that is no known miss. A number out of its tolerance fails the claim on its column."""
-        return any(verdict.status == "FAIL" for verdict in self.verdicts)
+        return self.counts()["FAIL"] > 0
 
     def counts(self) -> dict[str, int]:
         """Return how many claims have which status."""
@@ -58,16 +55,16 @@ class Reproduction:
         return {status: statuses.count(status) for status in dict.fromkeys(("PASS", "FAIL", "MISS", *statuses))}
 
     @property
-    def numbers(self) -> list[ComparedNumber]:
-        """All numbers of the tables, ours beside the paper's."""
-        return [number for result in self.results for number in numbers(result.found, result.tables)]
-
-    @property
     def claims(self) -> str:
         """How many claims hold, in words."""
         counts = self.counts()
         held = f"{counts['PASS']} of {len(self.verdicts)} claims hold, {counts['MISS']} missed for a known reason"
         return f"{held}, {counts['FAIL']} failed."
+
+    @property
+    def took(self) -> str:
+        wall, cpu = sum(result.wall_s for result in self.results), sum(result.cpu_s for result in self.results)
+        return f"{wall:.0f} s, {cpu:.0f} s of processor time"
 
 
 def settings(scenarios: Mapping[str, ScenarioModel]) -> list[tuple[str, str, str]]:
@@ -78,14 +75,12 @@ def settings(scenarios: Mapping[str, ScenarioModel]) -> list[tuple[str, str, str
         sets.setdefault(scenario.plant.load_set, []).append(name)
     load_sets = "; ".join(f'"{load_set}" in {", ".join(names)}' for load_set, names in sets.items())
     rows = []
-    for name, value, why, case in ((one.name, one.value, one.why, one.case) for one in SETTINGS):
-        if not case:
-            gains = first.gains
-        elif reduced is not None:
-            gains = reduced.cases[case].gains
-        else:
+    for one in SETTINGS:
+        if one.case and reduced is None:
             continue
-        rows.append((name, value.format(gains=gains, plant=first.plant, time=first.time, load_sets=load_sets), why))
+        gains = reduced.cases[one.case].gains if one.case and reduced else first.gains
+        value = one.value.format(gains=gains, plant=first.plant, time=first.time, load_sets=load_sets)
+        rows.append((one.name, value, one.why))
     return rows
 
 
@@ -130,10 +125,11 @@ def tolerances(table: PaperTable) -> list[str]:
     for quantity in table.quantities:
         cell = next(cell for cell in table.cells if cell.quantity == quantity)
         value = cell.tolerance.value
-        bound = f"compared by a factor of {MQSI_FACTOR.value:g} only" if value is None else f"within {value:g}"
+        bound = f"compared by a factor of {MQSI_FACTOR:g} only" if value is None else f"within {value:g}"
         found.append(f"{HEADINGS[quantity]}: {bound}; {cell.tolerance.reason}")
         if cell.relative is not None:
-            found.append(f"{HEADINGS[quantity]}, beside its own size: {100 * V_RELATIVE.value:g} % {V_RELATIVE.reason}")
+            own_size = f"{100 * V_RELATIVE:g} % of the paper's number, or half of its last digit"
+            found.append(f"{HEADINGS[quantity]}, beside its own size: {own_size}")
     return found
 
 
@@ -150,8 +146,8 @@ def _entry(cell: Cell, result: PartResult) -> Entry:
 def _judged(cell: Cell, ours: float) -> tuple[tuple[str, bool], ...]:
     by = {
         "": cell.within(ours),
-        f"{100 * V_RELATIVE.value:g} %": cell.within_relative(ours),
-        f"factor {MQSI_FACTOR.value:g}": cell.within_factor(ours),
+        f"{100 * V_RELATIVE:g} %": cell.within_relative(ours),
+        f"factor {MQSI_FACTOR:g}": cell.within_factor(ours),
     }
     return tuple((name, holds) for name, holds in by.items() if holds is not None)
 
@@ -207,18 +203,15 @@ def write(whole: Reproduction, work: Work, folder: Path) -> None:
 def machine() -> str:
     """Return processor, its cores that may be used, memory and system."""
     cpu = platform.processor() or platform.machine()
-    try:
+    with suppress(OSError, StopIteration):
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
         cpu = next(line.partition(":")[2].strip() for line in text.splitlines() if line.startswith("model name"))
-    except (OSError, StopIteration):
-        pass
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    cores = len(os.sched_getaffinity(0))
     return f"{cpu}, {cores} core{'s' if cores > 1 else ''}; {platform.system()} {platform.release()}"
 
 
 def metrics_json(whole: Reproduction) -> str:
     """Return the text of metrics.json: every number of the tables beside the paper's, every verdict, every measure."""
-    tables = [_number(result, cell) for result in whole.results for table in result.tables for cell in table.cells]
     claims = [
         {
             "part": result.part.name,
@@ -233,12 +226,9 @@ def metrics_json(whole: Reproduction) -> str:
         for verdict in result.verdicts
     ]
     topology = [
-        {
-            "links": run.links,
-            "connected": run.connected,
-            **asdict(run.settled),
-            **{"MPSI": run.steady.MPSI, "f_error_Hz": run.steady.f_error_Hz},
-        }
+        {"links": run.links, "connected": run.connected}
+        | asdict(run.settled)
+        | {"MPSI": run.steady.MPSI, "f_error_Hz": run.steady.f_error_Hz}
         for result in whole.results
         for run in graph_runs(result.found)
     ]
@@ -249,32 +239,14 @@ def metrics_json(whole: Reproduction) -> str:
         "machine": machine(),
         "versions": versions(),
         "times_s": {result.part.name: {"wall": result.wall_s, "cpu": result.cpu_s} for result in whole.results},
-        "tables": tables,
+        "tables": [
+            _number(result, cell) for result in whole.results for table in result.tables for cell in table.cells
+        ],
         "claims": claims,
         "runs": {result.part.name: result.metrics for result in whole.results if result.metrics},
         "topology": topology,
     }
     return json.dumps(_plain(document), indent=2, allow_nan=False) + "\n"
-
-
-def _number(result: PartResult, cell: Cell) -> dict[str, Any]:
-    """Return a number beside the paper's; null where ours is not steady."""
-    reason = result.found.reason(cell)
-    ours = None if reason else result.found.value(cell)
-    return {
-        "table": cell.table,
-        "case": cell.case,
-        "event": cell.event,
-        "island": cell.island,
-        "quantity": cell.quantity,
-        "paper": cell.paper,
-        "ours": ours,
-        **({"reason": reason} if reason else {}),
-        "tolerance": cell.tolerance.value,
-        "within": result.found.within(cell),
-        "within_relative": None if ours is None else cell.within_relative(ours),
-        "within_factor": None if ours is None else cell.within_factor(ours),
-    }
 
 
 def _plain(value: Any) -> Any:
@@ -284,3 +256,19 @@ def _plain(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_plain(item) for item in value]
     return None if isinstance(value, float) and value != value else value
+
+
+def _number(result: PartResult, cell: Cell) -> dict[str, Any]:
+    """Return a number beside the paper's; null where ours is not steady."""
+    reason = result.found.reason(cell)
+    ours = None if reason else result.found.value(cell)
+    named = {name: getattr(cell, name) for name in ("table", "case", "event", "island", "quantity", "paper")}
+    return {
+        **named,
+        "ours": ours,
+        **({"reason": reason} if reason else {}),
+        "tolerance": cell.tolerance.value,
+        "within": result.found.within(cell),
+        "within_relative": None if ours is None else cell.within_relative(ours),
+        "within_factor": None if ours is None else cell.within_factor(ours),
+    }

@@ -6,22 +6,20 @@ The paper prints neither where its capacitors stand nor where its inverters do. 
 
 from __future__ import annotations
 
-import csv
 import math
 import random
 import shutil
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import pandas as pd
 
 import gridpeers as gp
 from gridpeers.measures import Settling, Steady
 from gridpeers.output_folders import feeder_folder
 from gridpeers.papers.singhal2022.communication_claims import GraphFindings, GraphRun
 from gridpeers.papers.singhal2022.islanding_claims import CASES, EVENTS
-
-if TYPE_CHECKING:
-    from gridpeers.papers.singhal2022.figures import EventValues
 
 LINKS = (8, 9, 10, 12, 16, 24, 36)
 """Links of the connected graphs; most where the paper's curve bends."""
@@ -41,8 +39,11 @@ NOT_CONNECTED = 1e-9
 END_S = 6.0
 """End of the runs (s): after the event at 1 s a path of nine inverters shares within 2 s, the slowest tree in 3 s."""
 
-TellProgress = Callable[[int, int], None]
+Tell = Callable[[int, int], None]
 """Is called with the number of runs that are done, and of all runs."""
+
+EventValues = Mapping[tuple[str, str], float]
+"""MQSI by case and event."""
 
 
 def graphs(inverters: int, seed: int) -> Iterator[gp.random_graphs.Edges]:
@@ -58,7 +59,7 @@ def graphs(inverters: int, seed: int) -> Iterator[gp.random_graphs.Edges]:
         yield from gp.random_graphs.connected_graphs(inverters, links, PER_COUNT, seed)
 
 
-def topology_study(seed: int, tell: TellProgress, *, jobs: int | None, dask: str = "") -> GraphFindings:
+def topology_study(seed: int, tell: Tell, *, jobs: int | None, dask: str = "") -> GraphFindings:
     """Run the islanding of case IV on every graph, in one process each; `jobs` and `dask` as of `gridpeers.sweep`."""
     scenario = gp.load("islanding")
     names = scenario.inverters
@@ -77,25 +78,13 @@ def topology_study(seed: int, tell: TellProgress, *, jobs: int | None, dask: str
 
 def _graph_run(inverters: int, edges: gp.random_graphs.Edges, row: Mapping[str, Any]) -> GraphRun:
     at = {name.removeprefix("event1."): value for name, value in row.items() if name.startswith("event1.")}
-
-    def time(name: str) -> float | None:
-        return None if math.isnan(at[name]) else float(at[name])
-
+    at |= {name: None for name in ("t_f_s", "t_share_s", "t_restore_s") if math.isnan(at[name])}
     return GraphRun(
         links=len(edges),
         connected=gp.random_graphs.algebraic_connectivity(inverters, edges) > NOT_CONNECTED,
-        settled=Settling(
-            t_f_s=time("t_f_s"),
-            t_share_s=time("t_share_s"),
-            f_swing_Hz=at["f_swing_Hz"],
-            V_swing_pu=at["V_swing_pu"],
-        ),
+        settled=Settling(**{name: at[name] for name in ("t_f_s", "t_share_s", "f_swing_Hz", "V_swing_pu")}),
         steady=Steady(
-            f_error_Hz=at["f_error_Hz"],
-            MPSI=at["MPSI"],
-            V_error=at["V_error"],
-            MQSI=at["MQSI"],
-            t_restore_s=time("t_restore_s"),
+            **{name: at[name] for name in ("f_error_Hz", "MPSI", "V_error", "MQSI", "t_restore_s")},
             p={name.removeprefix("p."): value for name, value in at.items() if name.startswith("p.")},
         ),
     )
@@ -110,9 +99,7 @@ BANKS: dict[str, dict[str, int]] = {
 """Variants: kvar a phase, by bus."""
 
 
-def bank_study(
-    base: gp.Scenario, folder: Path, tell: Callable[[int, int], None], jobs: int | None, dask: str = ""
-) -> dict[str, EventValues]:
+def bank_study(base: gp.Scenario, folder: Path, tell: Tell, jobs: int | None, dask: str = "") -> dict[str, EventValues]:
     """Run all cases of the islanding over all variants, and return their MQSI by variant, case and event.
 
     The folder takes the variants' feeders; `jobs` and `dask` as of `gridpeers.sweep`.
@@ -138,13 +125,9 @@ def _feeder(standard: Path, folder: Path, banks: Mapping[str, int]) -> Path:
     """Return a copy of a feeder's tables in which the banks of buses 83 and 151 are these."""
     shutil.copytree(standard, folder)
     path = folder / "capacitors.csv"
-    with path.open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
-    rows = [row for row in rows if row["bus"] not in ("83", "151")]
-    for bus, kvar in banks.items():
-        rows.append({**rows[0], "bus": bus, "origin": "changed", **{f"Q_{phase}_kvar": kvar for phase in "abc"}})
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, fieldnames=list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
+    table = pd.read_csv(path, dtype=str, keep_default_na=False)
+    table = table[~table["bus"].isin(["83", "151"])]
+    of_bank = table.iloc[0].to_dict() | {"origin": "changed"}
+    rows = [of_bank | {"bus": bus} | {f"Q_{phase}_kvar": str(kvar) for phase in "abc"} for bus, kvar in banks.items()]
+    pd.concat([table, pd.DataFrame(rows, columns=table.columns)]).to_csv(path, index=False)
     return folder

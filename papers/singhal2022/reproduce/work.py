@@ -11,15 +11,14 @@ from typing import Any, Literal
 
 import gridpeers as gp
 from gridpeers import Findings, Verdict, judge
-from gridpeers.cli.progress import TellPart as Tell
+from gridpeers.cli.progress import TellPart
+from gridpeers.papers.singhal2022.figures import topologies, var_sharing
 from gridpeers.papers.singhal2022.islanding_claims import CASES, EVENTS
 from gridpeers.papers.singhal2022.paper_benchmarks import CLAIMS
 from gridpeers.papers.singhal2022.reproduce.parts import Part, Picture
-from gridpeers.papers.singhal2022.reproduce.studies import BANKS, END_S, bank_study, graphs, topology_study
+from gridpeers.papers.singhal2022.reproduce.studies import BANKS, END_S, Tell, bank_study, graphs, topology_study
 from gridpeers.papers.singhal2022.tables import PaperTable, tables_of
 from gridpeers.theory import ScenarioModel
-
-ReproduceDriver = Literal["processes", "inprocess"]
 
 FORMATS: tuple[gp.figures.Format, ...] = ("png", "pdf", "svg")
 """Files of each figure."""
@@ -63,7 +62,7 @@ class Work:
     def __init__(
         self,
         parts: tuple[Part, ...],
-        driver: ReproduceDriver,
+        driver: Literal["processes", "inprocess"],
         folder: Path,
         seed: int | None,
         jobs: int | None,
@@ -90,13 +89,10 @@ class Work:
         """Seconds that are simulated in all runs together."""
         return sum(self._length(part) for part in self.parts)
 
-    def do(self, tell: Tell, *, figures: bool) -> Iterator[PartResult]:
+    def do(self, tell: TellPart, *, figures: bool) -> Iterator[PartResult]:
         """Run part after part, telling how many seconds of all runs have been simulated.
 
-        Raises
-        ------
-        BrokenRunError
-            If a run broke; those before are done, and their folders stay.
+        BrokenRunError if a run broke; those before are done, and their folders stay.
         """
         for part in self.parts:
             wall, cpu = perf_counter(), sum(os.times()[:4])
@@ -119,13 +115,20 @@ class Work:
             )
 
     def _length(self, part: Part) -> float:
+        """Return the seconds that are simulated in all runs of a part."""
         if part.name == "topology":
             return END_S * sum(1 for _ in graphs(9, self.seed))
         scenario = self.spec(part.name)
         runs = len(BANKS) * len(CASES) if part.name == "var-sharing" else len(scenario.cases)
         return scenario.time.end_s * runs
 
-    def _scenario(self, part: Part, folder: Path, tell: Tell, figures: bool) -> _PartOutput:
+    def _counted(self, part: Part, tell: TellPart, of_what: str) -> Tell:
+        """Return the function that takes the number of runs of a study that are done, and of all its runs."""
+        return lambda done, of: tell(
+            f"{part.name}, {done} of {of} {of_what}", self._before + done / of * self._length(part)
+        )
+
+    def _scenario(self, part: Part, folder: Path, tell: TellPart, figures: bool) -> _PartOutput:
         scenario = self._loaded[part.name]
         order = list(scenario.cases)
 
@@ -138,27 +141,15 @@ class Work:
                 gp.figures.save(run.plot(picture.stem), folder / "plots", picture.stem, FORMATS[1:])
         return run.findings, run.sha256, run.numbers, folder / "plots"
 
-    def _topology(self, part: Part, folder: Path, tell: Tell, figures: bool) -> _PartOutput:
-        def note(done: int, of: int) -> None:
-            tell(f"topology, {done} of {of} graphs", self._before + done * END_S)
-
-        found = topology_study(self.seed, note, jobs=self.jobs, dask=self.dask)
+    def _topology(self, part: Part, folder: Path, tell: TellPart, figures: bool) -> _PartOutput:
+        found = topology_study(self.seed, self._counted(part, tell, "graphs"), jobs=self.jobs, dask=self.dask)
         if figures:
-            from gridpeers.papers.singhal2022.figures import topologies
-
             gp.figures.save(topologies(found.graphs), folder, part.picture[0].stem, FORMATS)
         return found, {}, None, folder
 
-    def _banks(self, part: Part, folder: Path, tell: Tell, figures: bool) -> _PartOutput:
-        scenario = self._loaded[part.name]
-
-        def note(done: int, of: int) -> None:
-            tell(f"{part.name}, {done} of {of} runs", self._before + done * scenario.spec.time.end_s)
-
-        ours = bank_study(scenario, folder, note, self.jobs, self.dask)
+    def _banks(self, part: Part, folder: Path, tell: TellPart, figures: bool) -> _PartOutput:
+        ours = bank_study(self._loaded[part.name], folder, self._counted(part, tell, "runs"), self.jobs, self.dask)
         if figures:
-            from gridpeers.papers.singhal2022.figures import var_sharing
-
             gp.figures.save(var_sharing(ours), folder, part.picture[0].stem, FORMATS)
         metrics = [
             {"variant": variant, "case": case, "MQSI": {event: values[case, event] for event in EVENTS}}

@@ -12,7 +12,6 @@ from gridpeers.papers.singhal2022.experiments.experiment_output import (
     Curve,
     ExperimentResult,
     ExperimentTable,
-    LimitLine,
     Page,
     Panel,
 )
@@ -57,7 +56,7 @@ def test_a_result_is_a_figure_and_the_same_table_twice(tmp_path: Path) -> None:
         x_label="x (s)",
         y_label="y (s)",
         curves=curves,
-        lines=[LimitLine(x=0.5, style=0)],
+        lines=[(0.5, 0)],
         log="xy",
         zero=0.02,
     )
