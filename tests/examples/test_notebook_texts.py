@@ -59,8 +59,3 @@ def test_a_text_that_is_asked_for_is_returned_and_not_shown(cells: list[Any]) ->
     assert got["why"].startswith("inv4 at t = 1.20 s")
     assert "The histories are the same, byte by byte." in got["compared"]
     assert "inv1" in got["predicted"] or "mode" in got["predicted"]
-
-
-def test_a_users_title_is_printed_as_it_is(cells: list[Any]) -> None:
-    """Neither the words between colons nor those in brackets are signs of anything."""
-    assert TITLE in texts(cells)["report"]

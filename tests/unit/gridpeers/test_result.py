@@ -10,9 +10,6 @@ import pandas as pd
 import pytest
 
 import gridpeers as gp
-from gridpeers.scenarios.drivers.inprocess import run_inprocess
-from gridpeers.scenarios.results.record import Recorder
-from gridpeers.scenarios.schema.configs import configs
 from tests.command_line import invoke
 
 
@@ -27,15 +24,6 @@ def scenario() -> gp.Scenario:
 def run(scenario: gp.Scenario) -> gp.Result:
     """One case of it."""
     return scenario.run("IV")
-
-
-def test_a_run_has_the_bytes_of_the_drivers_own_history(scenario: gp.Scenario, run: gp.Result) -> None:
-    """The face adds nothing to a run: its hash is that of the telemetry."""
-    plant, agents = configs(scenario.spec, scenario.feeder, "IV")
-    recorder = Recorder()
-    run_inprocess(plant, agents, recorder)
-
-    assert run.sha256 == recorder.finish(1.5, 0.01).sha256
 
 
 def test_a_history_is_a_table_by_inverter_and_quantity_with_units(run: gp.Result) -> None:
@@ -71,16 +59,6 @@ def test_a_saved_run_is_read_back_the_same_and_has_its_figures(run: gp.Result, t
         pd.testing.assert_frame_equal(getattr(again, table), getattr(run, table))
     assert (tmp_path / "kept" / "plots" / "overview.png").is_file()
     assert again.report.endswith(f"Results: {tmp_path / 'kept'}/\n")
-
-
-def test_a_folder_with_something_in_it_is_not_written_to(run: gp.Result, tmp_path: Path) -> None:
-    """Files that exist stay as they were."""
-    (tmp_path / "mine.txt").write_text("mine")
-
-    with pytest.raises(gp.FolderError, match="is not empty"):
-        run.save(tmp_path)
-
-    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
 
 
 def test_what_is_no_finished_run_is_not_read(tmp_path: Path) -> None:

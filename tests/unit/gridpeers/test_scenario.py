@@ -64,17 +64,6 @@ def test_a_problem_that_a_change_makes_elsewhere_keeps_its_line() -> None:
         gp.load("islanding").replace({"time.end_s": 2.0})
 
 
-def test_a_change_leaves_the_scenario_that_it_starts_from() -> None:
-    """A scenario never changes, and neither does what was given."""
-    before, link = gp.load("islanding"), {"on": "* <-> *", "delay": 0.1}
-
-    after = before.replace({"case.IV.link": [link], "seed": 5})
-
-    assert before == gp.load("islanding") != after
-    assert len(after.cases["IV"].netem.links) == 1
-    assert link == {"on": "* <-> *", "delay": 0.1}
-
-
 def test_a_table_makes_a_new_case_and_none_takes_a_key_out() -> None:
     """A case that is given whole is new; what is taken out has its default."""
     scenario = gp.load("islanding").replace({"case.V": {"secondary": "all", "graph": "ring"}, "case.I": None})
@@ -104,11 +93,6 @@ def test_what_no_file_can_hold_is_refused_with_its_key() -> None:
     assert "replace: seed: a value of type object" in str(caught.value)
     assert "replace: title: " in str(caught.value)
     assert "defined inside a function" in str(caught.value)
-
-
-def test_check_returns_what_events_overload() -> None:
-    """Notes tell what the events take away."""
-    assert any("de-energises" in note for note in gp.load("islanding").check())
 
 
 def test_an_unknown_case_driver_or_clock_is_one_line() -> None:

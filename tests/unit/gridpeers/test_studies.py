@@ -8,8 +8,6 @@ from pathlib import Path
 import pytest
 
 import gridpeers as gp
-from gridpeers.scenarios.sweep.sweep_case import run_one
-from gridpeers.scenarios.sweep.sweep_reading import read_sweep
 from tests.command_line import invoke
 
 
@@ -55,24 +53,6 @@ def test_a_sweep_may_ask_for_a_metric_that_the_scenario_has(
     assert table.columns.tolist()[3:] == ["why", "metric_warnings", "islanding.MPSI", "islanding.lowest_f_Hz"]
 
 
-def test_a_sweep_over_processes_has_the_rows_of_one_process(scenario: gp.Scenario) -> None:
-    """How many share the runs decides nothing, nor does the order in which they end."""
-    request = {"grid": {"gains.k_p": [0.001, 0.002]}, "cases": ["I"]}
-
-    assert gp.sweep(scenario, **request, jobs=2).equals(gp.sweep(scenario, **request, jobs=1))  # type: ignore[arg-type]
-
-
-def test_a_sweep_in_python_is_that_of_the_same_file(scenario: gp.Scenario, tmp_path: Path) -> None:
-    """Both come from one plan: the same runs with the same bytes."""
-    (tmp_path / "base.toml").write_text(scenario.to_toml())
-    (tmp_path / "s.toml").write_text('scenario = "base.toml"\ncases = ["I"]\n[zip]\n"gains.k_p" = [0.001]\n')
-    (run,) = read_sweep(tmp_path / "s.toml").runs
-
-    table = gp.sweep(scenario, zip={"gains.k_p": [0.001]}, cases=["I"], jobs=1)
-
-    assert table["history_sha256"].tolist() == [run_one(0, run.scenario, run.case).history_sha256]
-
-
 def test_all_problems_of_a_sweep_come_before_the_first_run(scenario: gp.Scenario) -> None:
     """Keys, values and metrics are told with what would be right."""
     with pytest.raises(gp.ScenarioError) as caught:
@@ -105,15 +85,6 @@ def test_a_prediction_has_tables_and_the_words_of_the_command() -> None:
     assert math.isinf(found.delay_limits["discrete"]["agent to agent"])
     assert found.times["t_restore_s"].tolist() == pytest.approx([0.64, 0.74], abs=0.02)
     assert invoke("predict", "islanding", "--case", "IV", "--no-vars") == (0, f"{found}\n")
-
-
-def test_a_case_without_a_law_is_predicted_as_such() -> None:
-    """Droop alone has no modes and restores nothing."""
-    found = gp.predict(gp.load("islanding"), "I", voltage=False)
-
-    assert found.modes.empty
-    assert found.times["t_restore_s"].isna().all()
-    assert set(found.times["note"]) == {"there is no secondary law"}
 
 
 def test_another_law_is_not_predicted_by_the_theory_of_the_papers() -> None:
