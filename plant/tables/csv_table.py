@@ -33,13 +33,11 @@ class CsvRow(Generic[C]):
 
     def __init__(self, table: type[C], where: str, cells: Mapping[str, str], problems: list[str]) -> None:
         self._table, self._where, self._problems = table, where, problems
-        self.mistaken = False
         self.wrong: set[str] = set()
         values = {field.name: self._value(field, cells.get(field.key, "").strip()) for field in fields_of(table)}
         self.columns = table(**values)
 
     def problem(self, text: str) -> None:
-        self.mistaken = True
         self._problems.append(f"{self._where}: {text}")
 
     def is_new(self, what: str, name: str, known: Container[str]) -> bool:
@@ -48,16 +46,14 @@ class CsvRow(Generic[C]):
             self.problem(f'{what} "{name}": there is one of this name already; names must differ')
         return name not in known
 
-    def require(self, column: str, plausible: Plausible) -> bool:
-        """Note a number that is not plausible, beside what its column asks of it; return whether it is."""
+    def require(self, column: str, plausible: Plausible) -> None:
+        """Note a number that is not plausible, beside what its column asks of it."""
         value = getattr(self.columns, column)
-        text = "" if math.isnan(value) else plausible.objection(value, named(self._table, column).unit)
-        if text:
+        if not math.isnan(value) and (text := plausible.objection(value, named(self._table, column).unit)):
+            self.wrong.add(column)
             self.problem(f"{column}: {text}")
-        return not text
 
     def _value(self, field: Field, cell: str) -> Any:
-        """Return the value of a cell, or its stand-in after noting why the cell is wrong."""
         if not cell and not field.required:
             return field.default
         value, text = _converted(field, cell)
@@ -92,76 +88,55 @@ def _converted(field: Field, cell: str) -> tuple[Any, str]:
         return choices[0], f' "{cell}": no such {label.text}; choose one of {", ".join(choices)}'
     if not cell:
         return cell, " is empty; give a name"
-    return (
-        cell,
-        "" if cell.isprintable() else f" {cell!a}: has characters that cannot be printed; use letters and digits",
-    )
+    strange = f" {cell!a}: has characters that cannot be printed; use letters and digits"
+    return cell, "" if cell.isprintable() else strange
 
 
 class CsvTable(Generic[C]):
     """A CSV file with one header line. Columns beyond the declared ones are free (origin, note).
 
-    `columns`: struct that declares the columns; one without a default must be there; `problems`: takes the problems;
-    those of a row when the row is reached; `required`: whether it is a problem if the file does not exist; else it then
-    has no rows.
-
-    `readable`: whether its rows are what the file says; if not, references to them cannot be judged.
+    `problems` takes those of the file now, and those of a row when the row is reached. A file that does not exist has
+    no rows, which is a problem if it is `required`. `readable`: whether references to its rows can be judged.
     """
 
     def __init__(
         self, folder: Path, file: str, columns: type[C], problems: list[str], *, required: bool = False
     ) -> None:
         self._file, self._columns, self._problems = file, columns, problems
-        self._header: list[str] = []
-        self._rows: list[tuple[int, list[str]]] = []
-        before = len(problems)
-        self._open(folder / file, required_columns(columns), required)
-        self.readable = len(problems) == before
-
-    def _open(self, path: Path, columns: list[str], required: bool) -> None:
-        file, problems = self._file, self._problems
-        if path.exists() and not path.is_file():
-            problems.append(f"{file}: is no file")
-            return
-        if not path.is_file():
-            if required:
-                problems.append(f"{file}: no such file; a feeder needs it, with the columns {', '.join(columns)}")
-            return
-        fields = fields_of(self._columns)
-        numbers = [field.key for field in fields if field.type is float]
-        try:
-            table = read_table_text(path.read_bytes(), [field.key for field in fields], numbers)
-        except OSError as error:
-            problems.append(f"{file}: cannot be read: {error.strerror}")
-            return
-        except TextFileError as error:
-            problems.append(f"{file}: {error}")
-            return
-        found = table.header
-        for column in dict.fromkeys(name for name in columns if found.count(name) > 1):
-            problems.append(f'{file}: column "{column}" stands there twice; keep one')
-            return
-        for column in columns:
-            if column not in found:
-                problems.append(f'{file}: no column "{column}"; {suggestion(column, found, "columns")}')
-        if set(columns) <= set(found):
-            self._rows = table.rows
-            self._header = found
+        self._header, self._rows, found = _read(folder / file, columns, required)
+        problems += [f"{file}: {text}" for text in found]
+        self.readable = not found
 
     def __iter__(self) -> Iterator[CsvRow[C]]:
         for number, cells in self._rows:
-            row = CsvRow(
-                self._columns,
-                f"{self._file} row {number}",
-                dict(zip(self._header, cells, strict=False)),
-                self._problems,
-            )
+            values = dict(zip(self._header, cells, strict=False))
+            row = CsvRow(self._columns, f"{self._file} row {number}", values, self._problems)
             if (surplus := len(cells) - len(self._header)) > 0:
                 row.problem(f"{surplus} cells more than the header has columns; quote texts that have commas")
             yield row
 
     def __len__(self) -> int:
         return len(self._rows)
+
+
+def _read(
+    path: Path, columns: type[msgspec.Struct], required: bool
+) -> tuple[list[str], list[tuple[int, list[str]]], list[str]]:
+    """Return header and numbered rows of a file, and its problems, with which it has no rows."""
+    fields, keys = fields_of(columns), required_columns(columns)
+    if not path.exists():
+        return [], [], [f"no such file; a feeder needs it, with the columns {', '.join(keys)}"] if required else []
+    numbers = [field.key for field in fields if field.type is float]
+    try:
+        table = read_table_text(path.read_bytes(), [field.key for field in fields], numbers)
+    except OSError as error:
+        return [], [], [f"cannot be read: {error.strerror}"]
+    except TextFileError as error:
+        return [], [], [str(error)]
+    found = table.header
+    problems = [f'column "{key}" stands there twice; keep one' for key in keys if found.count(key) > 1]
+    problems += [f'no column "{key}"; {suggestion(key, found, "columns")}' for key in keys if key not in found]
+    return found, [] if problems else table.rows, problems
 
 
 def required_columns(columns: type[msgspec.Struct]) -> list[str]:

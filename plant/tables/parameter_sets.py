@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from gridpeers.plant.equipment.inverter_parameters import InverterParameters, OwnParameters, foreign, with_published
-from gridpeers.plant.tables.buses import BusTable
+from gridpeers.plant.tables.branches import BusTable
 from gridpeers.plant.tables.feeder_columns import ParameterColumns
 from gridpeers.wire.schema.table_reading import read_table
 from gridpeers.wire.schema.table_schema import contradictions, fields_of
 from gridpeers.wire.wording import suggestion
 
-FILE = "inverter_parameters.csv"  # name of the file; a feeder without it has no such sets
+FILE = "inverter_parameters.csv"
 
 
 def read_parameter_sets(buses: BusTable) -> dict[str, OwnParameters] | None:
@@ -28,7 +28,7 @@ def read_parameter_sets(buses: BusTable) -> dict[str, OwnParameters] | None:
         if it.key in before:
             row.problem(f'set "{it.set}" has {it.key} already; give each parameter once')
             continue
-        value = value_of(it.value)
+        value = _value_of(it.value)
         found = read_table(OwnParameters, {it.key: value})[1] if it.key else []
         for path, text in found:
             row.problem(f'set "{it.set}": {path}: {text}')
@@ -40,8 +40,7 @@ def read_parameter_sets(buses: BusTable) -> dict[str, OwnParameters] | None:
     return sets if table.readable else None
 
 
-def value_of(cell: str) -> float | bool | str:
-    """Return the value that a cell means: true, false, a number, or a text."""
+def _value_of(cell: str) -> float | bool | str:
     if cell in ("true", "false"):
         return cell == "true"
     try:
@@ -59,9 +58,7 @@ def as_set(
     """Return the name of the set that an inverter's parameters are, and all sets with it.
 
     `name`: its name, which a new set takes; `params`: the name of a set, some parameters by their keys in a file, all
-    of them, or none.
-
-    ValueError with all that is wrong.
+    of them, or none. ValueError with all that is wrong.
     """
     if not params:
         return "", dict(sets)
@@ -74,13 +71,13 @@ def as_set(
     else:
         if isinstance(params, Mapping):
             values = {str(key): value for key, value in params.items()}
-        elif not isinstance(params, InverterParameters):
+        elif isinstance(params, InverterParameters):
+            values = {field.key: getattr(params, field.name) for field in fields_of(type(params))}
+        else:
             raise ValueError(
                 f'inverter "{name}": params: must be the name of a set, keys with values such as {{"T_p_s": 0.02}}, '
                 f"GfmParameters or GflParameters, got {params!r}"
             )
-        else:
-            values = {field.key: getattr(params, field.name) for field in fields_of(type(params))}
         own, noted = read_table(OwnParameters, values)
         found = [f"{path}: {text}" for path, text in noted]
         label = next((known for known, other in sets.items() if other == own), name)

@@ -12,8 +12,7 @@ from gridpeers.plant.equipment import Feeder, InverterRow, Line, LineConfig, Reg
 from gridpeers.plant.equipment.imported_equipment import LoadPart
 from gridpeers.plant.equipment.inverter_parameters import OwnParameters, given
 from gridpeers.plant.equipment.neutrals import EARTH, neutrals_of
-from gridpeers.plant.tables.feeder_columns import LOAD_SETS, TABLES
-from gridpeers.plant.tables.parameter_sets import FILE
+from gridpeers.plant.tables.feeder_columns import LOAD_SETS, TABLES, InverterColumns
 from gridpeers.wire.schema.table_schema import named
 
 TAP_STEP = 0.00625  # step (pu) in which the ratios of regulators are written
@@ -65,10 +64,12 @@ def _tables(feeder: Feeder) -> Iterator[tuple[str, list[Row]]]:
         yield from ((file, rows) for file, rows in optional.items() if rows)
     states = ((it, "closed" if it.closed else "open") for it in feeder.switches)
     yield "switches.csv", [(it.from_bus, it.to_bus, it.phases, state, it.alias) for it, state in states]
-    neutrals = neutrals_of(feeder)
-    yield "inverters.csv", [_inverter(it, it.bus in neutrals) for it in (*feeder.inverters, *feeder.spares)]
+    neutrals, inverters = neutrals_of(feeder), (*feeder.inverters, *feeder.spares)
+    earth = {it.name: it.neutral or (EARTH if it.bus in neutrals else "") for it in inverters}
+    yield "inverters.csv", [tuple((inverter_cells(it) | {"neutral": earth[it.name]}).values()) for it in inverters]
     if feeder.parameter_sets:
-        yield FILE, [row for name, own in feeder.parameter_sets.items() for row in _parameters(name, own)]
+        rows = [row for name, own in feeder.parameter_sets.items() for row in _parameters(name, own)]
+        yield "inverter_parameters.csv", rows
     if source := feeder.source:
         yield "source.csv", [(source.bus, source.V_pu, degrees(source.angle))]
 
@@ -82,20 +83,27 @@ def _load_part(it: LoadPart) -> Row:
     return it.name, it.bus, *it.ends, it.S.real / 1e3, it.S.imag / 1e3, it.V_nom / 1e3, *it.exponents, *limits
 
 
-def _inverter(it: InverterRow, has_neutral: bool) -> Row:
-    ratings = it.P_rated / 1e3, it.m_p, it.m_q
-    returns = it.neutral or (EARTH if has_neutral else "")
-    return (
+def inverter_cells(it: InverterRow) -> dict[str, str]:
+    """Return the cells of an inverter by their columns; what a user gave in place of a number stays as it is."""
+    try:
+        P_rated = repr(float(it.P_rated) / 1e3)
+    except (TypeError, ValueError):
+        P_rated = str(it.P_rated)
+    spare = "yes" if it.spare else ""
+    values = (
         it.name,
         it.kind,
         it.bus,
         it.microgrid,
-        *ratings,
+        P_rated,
+        it.m_p,
+        it.m_q,
         it.phases,
-        "yes" if it.spare else "",
+        spare,
         it.parameters,
-        returns,
+        it.neutral,
     )
+    return dict(zip(InverterColumns.__struct_fields__, map(str, values), strict=True))
 
 
 def _parameters(name: str, own: OwnParameters) -> Iterator[Row]:
