@@ -71,11 +71,7 @@ class Switch(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All its names: its buses in either order, and its alias.
-
-        >>> Switch(name="13-152", alias="sw1", from_bus="13", to_bus="152", phases="ABC", closed=True).names
-        ('13-152', '152-13', 'sw1')
-        """
+        """All its names: its buses in either order, and its alias."""
         return (self.name, f"{self.to_bus}-{self.from_bus}", *((self.alias,) if self.alias else ()))
 
     @property
@@ -85,11 +81,7 @@ class Switch(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def full_name(self) -> str:
-        """Its name in sentences: both of its names, if it has another one than in events.
-
-        >>> Switch(name="13-152", alias="sw1", from_bus="13", to_bus="152", phases="ABC", closed=True).full_name
-        'sw1 (13-152)'
-        """
+        """Its name in sentences: both of its names, if it has another one than in events."""
         return f"{self.alias} ({self.name})" if self.alias not in ("", self.event_name) else self.event_name
 
 
@@ -153,19 +145,16 @@ class InverterRow(msgspec.Struct, frozen=True, kw_only=True):
     phases: Literal["ABC", "A", "B", "C"] = "ABC"  # phases of the bus at which it stands: all three, or one
     neutral: str = ""  # node of the bus to which its phases return, by its letter; empty for earth
     spare: bool = False  # whether it stays off until an agent joins for it
-    parameters: str = ""
-    """Name of its set of parameters (`Feeder.parameter_sets`, or a published one); empty for none."""
-    own: OwnParameters = OwnParameters()
-    """Parameters that replace those of its set and of its kind: a scenario gives them."""
+    parameters: str = ""  # name of its set, of `Feeder.parameter_sets` or published; empty for none
+    own: OwnParameters = OwnParameters()  # parameters that a scenario gives it
 
     @property
     def node(self) -> tuple[str, str]:
-        """Bus and phase of its first terminal."""
         return self.bus, self.phases[0]
 
 
 class Feeder(msgspec.Struct, frozen=True, kw_only=True):
-    """All tables of a feeder with one load set. `gridpeers.plant.tables.read_feeder` has checked their consistency."""
+    """All tables of a feeder with one load set, checked by `gridpeers.plant.tables.read_feeder`."""
 
     name: str
     load_set: str  # name of the load set: "main" is from loads_main.csv
@@ -180,17 +169,13 @@ class Feeder(msgspec.Struct, frozen=True, kw_only=True):
     inverters: tuple[InverterRow, ...] = ()
     source: Source | None  # the substation, or None in a feeder with inverters alone
     f_nom: float = F_NOM  # nominal frequency (Hz) of the impedances
-    elements: tuple[LinearElement, ...] = ()
-    """Linear elements given by their admittance: of feeders that were written for another program."""
+    elements: tuple[LinearElement, ...] = ()  # of feeders that were written for another program
     load_parts: tuple[LoadPart, ...] = ()  # loads of such feeders
-    notes: tuple[str, ...] = ()
-    """Notes of the import of such a feeder: commands that were not run, protection that was left out."""
+    notes: tuple[str, ...] = ()  # notes of the import of such a feeder: commands that were not run, and the like
     places: dict[str, str] = {}
     """File and line of each element, load and "bus NAME" of such a feeder, where its import knows them."""
-    spares: tuple[InverterRow, ...] = ()
-    """Inverters that stay off until an agent joins for them; a run with a fixed roster leaves them out."""
-    parameter_sets: dict[str, OwnParameters] = {}
-    """Parameters that single inverters have instead of their kind's, by the name of the set."""
+    spares: tuple[InverterRow, ...] = ()  # inverters that stay off until an agent joins for them
+    parameter_sets: dict[str, OwnParameters] = {}  # parameters in place of the kind's, by the set's name
 
     def parameters_of(self, row: InverterRow, gfm: GfmParameters, gfl: GflParameters) -> InverterParameters:
         """Return the parameters of one inverter: its own, then those of its set, then its kind's."""
@@ -212,7 +197,7 @@ class Feeder(msgspec.Struct, frozen=True, kw_only=True):
         return self._by_bus(1.0)
 
     def generation_by_bus(self) -> dict[str, float]:
-        """Return the real power (W) of constant generation at each bus that has any: loads of negative power."""
+        """Return the real power (W) of constant generation, loads of negative power, at each bus that has any."""
         return self._by_bus(-1.0)
 
     def _by_bus(self, sign: float) -> dict[str, float]:

@@ -8,12 +8,10 @@ from typing import TypeVar
 from gridpeers.plant.equipment import PHASES, Feeder, InverterRow, Line, Regulator, Switch, Transformer
 from gridpeers.wire.wording import suggestion
 
-SwitchOperations = tuple[Iterable[str], Iterable[str]]
-"""Switches that open, and switches that close, by any of their names."""
+SwitchOperations = tuple[Iterable[str], Iterable[str]]  # switches that open, and that close, by any of their names
 
 
 def switch_names(feeder: Feeder) -> dict[str, str]:
-    """Return the name of each switch in the tables, by each of its names."""
     return {name: switch.name for switch in feeder.switches for name in switch.names}
 
 
@@ -71,8 +69,7 @@ class Connectivity:
     """The graph of a feeder's nodes.
 
     Lines, regulators and switches join the nodes of each of their phases; a transformer, the substation and a
-    grid-forming inverter of three phases join all three. Equipment that feeds nothing by itself, or is connected to
-    ground (loads, capacitors, grid-following inverters), joins none.
+    grid-forming inverter of three phases join all three. Other equipment joins none.
     """
 
     def __init__(self, feeder: Feeder) -> None:
@@ -104,8 +101,7 @@ class Connectivity:
     ) -> tuple[frozenset[Node], ...]:
         """Return the sets of connected nodes, in the order of their first buses.
 
-        `whole`: buses whose three phases count as one, because their source feeds all of them; `tied`: further pairs of
-        nodes that count as connected.
+        `whole`: buses whose three phases count as one, because their source feeds all of them; `tied`: further pairs.
         """
         joined = [*self._fixed, *(((bus, "A"), (bus, phase)) for bus in whole for phase in PHASES), *tied]
         for switch in self._feeder.switches:
@@ -116,10 +112,7 @@ class Connectivity:
     def fed(
         self, closed: Collection[str], forming: Iterable[InverterRow]
     ) -> tuple[tuple[frozenset[Node], ...], tuple[frozenset[Node], ...]]:
-        """Return the parts that the substation or a grid-forming inverter feeds, and the de-energised parts.
-
-        `forming`: the connected grid-forming inverters.
-        """
+        """Return the parts that the substation or a connected grid-forming inverter feeds, and the others."""
         alive, whole = set[Node](), list[str]()
         for row in forming:
             alive.add(row.node)
@@ -145,10 +138,7 @@ class Connectivity:
 def buses_without_ground(
     transformers: Iterable[Transformer], lines: Iterable[Line], others: Iterable[Regulator | Switch]
 ) -> frozenset[str]:
-    """Return the buses behind a delta winding, from which no current can return through ground.
-
-    `transformers`, `lines`, `others`: the feeder's; the others are its regulators and switches.
-    """
+    """Return the buses behind a delta winding, from which no current can return through ground."""
     beside: dict[str, set[str]] = {}
     grounded = [(row.from_bus, row.to_bus) for row in transformers if row.connection != "D-D"]
     joins = [*((row.from_bus, row.to_bus) for row in lines), *((row.from_bus, row.to_bus) for row in others)]

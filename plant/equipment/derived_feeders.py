@@ -44,7 +44,6 @@ def changed(feeder: Feeder, changes: FeederChanges) -> Feeder:
 
 
 def _inverter(row: InverterRow, changes: FeederChanges) -> InverterRow:
-    """Return an inverter with its changes: its own values replace the table's, factors multiply the others."""
     own = changes.inverters.get(row.name)
     return replace(
         row,
@@ -86,7 +85,7 @@ _NAMES = ("name", "alias", "microgrid", "zone")  # fields whose names differ fro
 
 
 def copy_name(name: str, k: int) -> str:
-    """Return the name that a bus, a switch or an inverter has in copy k; the first copy keeps its names."""
+    """Return the name of a bus, a switch or an inverter in copy k; the first copy keeps its names."""
     return name if k == 1 or not name else f"{name}_{k}"
 
 
@@ -94,10 +93,8 @@ def joined_copies(feeder: AnyFeeder, copies: int, joint: str) -> AnyFeeder:
     """Return copies of a feeder at one substation, joined in a chain by ties between their buses `joint`.
 
     All copies hang on the first one's substation by closed switches. A tie is a closed switch and a line, so the copies
-    remain one network when each is cut off the substation. Spare inverters are left out.
-
-    ValueError if the feeder has no substation, the number is below 1 or makes too many inverters, or `joint` lacks a
-    phase.
+    remain one network when each is cut off the substation. Spare inverters are left out. ValueError if the feeder has
+    no substation, the number is below 1 or makes too many inverters, or `joint` lacks a phase.
     """
     bus = next((each for each in feeder.buses if each.name == joint), None)
     if feeder.source is None:

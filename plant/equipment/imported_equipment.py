@@ -15,8 +15,7 @@ HIGH = 1.1  # voltage (pu) above which what it usually has is taken for nominal:
 def cut_off(usual: float) -> float:
     """Return the `LoadPart.V_off_above` of generation that usually has this voltage (pu).
 
-    Other programs have no such limit: beyond their own limits it is a negative impedance, and an island in which it
-    prevails has no voltage at which to rest.
+    Other programs have no such limit, and an island in which generation prevails then has no voltage at which to rest.
 
     >>> cut_off(1.02), cut_off(1.7)
     (1.2, 2.04)
@@ -25,7 +24,6 @@ def cut_off(usual: float) -> float:
 
 
 def bus_behind(bus: str, element: str) -> str:
-    """Return the name of the bus that an import puts between a bus and an element."""
     return f"{bus}{BEHIND}{element}"
 
 
@@ -38,8 +36,7 @@ class LinearElement(msgspec.Struct, frozen=True, kw_only=True):
     """Anything linear between nodes, by its primitive admittance matrix: a line, a transformer, a capacitor."""
 
     name: str  # name, unique: "transformer.sub"
-    nodes: tuple[tuple[str, str], ...]
-    """The nodes (bus, phase) of its rows and columns; whatever leads to ground has no row."""
+    nodes: tuple[tuple[str, str], ...]  # nodes (bus, phase) of its rows; whatever leads to ground has no row
     Y: tuple[tuple[complex, ...], ...]  # admittance (S); it need not be symmetric
 
 
@@ -55,19 +52,16 @@ class LoadPart(msgspec.Struct, frozen=True, kw_only=True):
     ends: tuple[str, str]  # its two phases; the second is empty for ground
     S: complex  # power at nominal voltage (VA)
     V_nom: float  # nominal voltage across it (V)
-    exponents: tuple[float, float]
-    """Powers of the voltage with which P and Q go: 0 constant power, 1 constant current, 2 constant impedance."""
+    exponents: tuple[float, float]  # of the voltage, for P and Q: 0 constant power, 1 current, 2 impedance
     V_low: float = 0.0
     """Voltage (pu) below which it is its nominal impedance. If it is `V_min`, the current stays as at `V_min` below."""
     V_min: float = 0.0  # voltage (pu) below which it is limited; 0: nowhere
     V_max: float = 0.0  # voltage (pu) above which it is limited; 0: nowhere
-    edge: float = 0.0
-    """Exponent that sets its current at the limits: 0 as of constant power, 1 as of current, 2 as of impedance."""
+    edge: float = 0.0  # exponent of its current at the limits: 0 of constant power, 1 current, 2 impedance
     V_off: float = 0.0
     """Voltage (pu) below which it switches off: half of it is off there, all of it 0.01 pu below; 0: nowhere."""
     V_off_above: float = 0.0  # the same for voltages above; 0: nowhere
 
     @property
     def is_impedance(self) -> bool:
-        """Whether it is a constant impedance at any voltage."""
         return self.exponents == (2.0, 2.0) and self.V_off == self.V_off_above == 0.0

@@ -77,7 +77,7 @@ REGFM_A1 = GfmParameters(
     Q_min=-0.44,
     E_max=1.15,
 )
-"""REGFM_A1 with the default values of public implementations, at 60 Hz (section 3.8); VFlag is 1."""
+"""Default values of public implementations of REGFM_A1, at 60 Hz (section 3.8); VFlag is 1."""
 
 REGFM_A1_VFLAG0 = replace(REGFM_A1, voltage_control=False, k_pq=0.1, k_iq=10.0)
 """The same with VFlag 0, which has other gains of the Q limiters."""
@@ -129,17 +129,13 @@ class GflParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
 
 
 Kind = Literal["GFM", "GFL"]
-"""Grid-forming or grid-following."""
 
 InverterParameters = GfmParameters | GflParameters
-"""All parameters of one inverter."""
 
 PARAMETERS_OF: dict[str, type[GfmParameters] | type[GflParameters]] = {"GFM": GfmParameters, "GFL": GflParameters}
-"""Parameters by kind of inverter."""
 
 
 def _either(first: Any, second: Any) -> Any:
-    """Return the type of a key that both kinds have: a choice takes the words of both, `foreign` knows whose."""
     if get_origin(first) is get_origin(second) is Literal:
         return Literal[(*get_args(first), *get_args(second))]
     return first | second
@@ -178,8 +174,7 @@ else:
     OwnParameters.__doc__ = "Some parameters of an inverter of either kind; None gives nothing."
 
 
-BOUNDS_OF_SET_POINTS = frozenset({"P_set_lim", "V_set_min", "V_set_max"})
-"""Parameters of ours alone: neither a published model nor GridLAB-D's inverter has them."""
+BOUNDS_OF_SET_POINTS = frozenset({"P_set_lim", "V_set_min", "V_set_max"})  # of ours alone, not of a published model
 
 
 def _published(own: InverterParameters) -> OwnParameters:
@@ -188,7 +183,6 @@ def _published(own: InverterParameters) -> OwnParameters:
 
 
 PUBLISHED_SETS = {"regfm_a1": _published(REGFM_A1), "regfm_a1_vflag0": _published(REGFM_A1_VFLAG0)}
-"""Sets of published values, which every feeder has."""
 
 
 def with_published(sets: Mapping[str, OwnParameters]) -> dict[str, OwnParameters]:
@@ -203,12 +197,10 @@ def given(own: OwnParameters) -> dict[str, Any]:
 
 
 def foreign(own: OwnParameters, kind: str) -> list[str]:
-    """Return what a set gives and a kind of inverter does not have: keys, and words of a choice with their key.
+    """Return what a set gives and a kind does not have: keys, and words of a choice with their key.
 
-    >>> foreign(OwnParameters(P_max=1.2, S_max=1.2), "GFM")
-    ['S_max_pu']
-    >>> foreign(OwnParameters(model="regfm_a1"), "GFL")
-    ['model = "regfm_a1"']
+    >>> foreign(OwnParameters(P_max=1.2, S_max=1.2), "GFM"), foreign(OwnParameters(model="regfm_a1"), "GFL")
+    (['S_max_pu'], ['model = "regfm_a1"'])
     """
     values, found = given(own), []
     fields = {field.name: field for field in fields_of(PARAMETERS_OF[kind])}

@@ -15,8 +15,7 @@ from gridpeers.wire.wording import first_of, suggestion
 
 FACTOR = Plausible("a factor on a load", 0.0, 10.0)  # factors on the power that a load has in the feeder's tables
 
-LEAST = 0.01
-"""Part of the sum of its branches' sizes below which a load's total says nothing of how its branches share it."""
+LEAST = 0.01  # part of its branches' sizes below which a load's total does not say how they share it
 
 
 class NamedLoad(msgspec.Struct, frozen=True, kw_only=True):
@@ -42,10 +41,6 @@ def load_name(loads: Mapping[str, NamedLoad], text: str) -> str:
     """Return the name of a load by its name, with or without OpenDSS's "load." before it, or by its bus.
 
     ValueError if there is no such load, or the text may mean several; the message says what was probably meant.
-
-    >>> loads = {name: NamedLoad(name=name, bus=name[5:8], S=1 + 0j) for name in ("load.634a", "load.634b", "load.671")}
-    >>> load_name(loads, "634a"), load_name(loads, "Load.671"), load_name(loads, "671")
-    ('load.634a', 'load.671', 'load.671')
     """
     if text in loads:
         return text
@@ -62,15 +57,13 @@ def load_name(loads: Mapping[str, NamedLoad], text: str) -> str:
 
 
 def _bare(name: str) -> str:
-    """Return the name of a load without the class that OpenDSS puts before it."""
     return name[5:] if name[:5].lower() == "load." else name
 
 
 def with_powers(feeder: Feeder, powers: Mapping[str, complex]) -> Feeder:
     """Return a feeder in which some loads have another power at nominal voltage (VA), by name.
 
-    The branches of a load keep their shares of its real and of its reactive power. What has no shares, as the reactive
-    power of a load that has none, is shared in proportion to the branches' apparent power.
+    Branches keep their shares of the real and of the reactive power; a power that was none is shared by their sizes.
     """
     of_bus: dict[str, list[complex]] = {}
     of_part: dict[str, list[complex]] = {}
@@ -110,17 +103,13 @@ def _scaled(values: Sequence[float], sizes: Sequence[float], total: float) -> li
     ]
 
 
-MOST = 10.0
-"""Greatest power of one load, as a multiple of all loads of the feeder, or of its inverters' ratings if more."""
+MOST = 10.0  # greatest power of one load, over that of all loads, or of the inverters' ratings if more
 
 _POWER = re.compile(r"\bset to (\S+) kW and (\S+) kvar at nominal voltage")
 
 
 class LoadPowers:
-    """The loads of a feeder by name, and the powers at nominal voltage that each can have.
-
-    `feeder`: the feeder, with the powers of its tables; `P_rated`: ratings of its inverters together (W).
-    """
+    """The loads of a feeder by name, and the powers that each can have; `P_rated`: of all inverters (W)."""
 
     def __init__(self, feeder: Feeder, P_rated: float) -> None:
         self._loads = named_loads(feeder)
@@ -133,10 +122,7 @@ class LoadPowers:
         return self._loads[name].S
 
     def power(self, name: str, setting: LoadSetting, before: complex) -> complex:
-        """Return the power (VA) of a load after a setting.
-
-        ValueError if a number makes no sense; the message says what would be right, and does not name the load.
-        """
+        """Return the power (VA) of a load after a setting; ValueError says what would be right."""
         table = self._loads[name].S
         if (setting.factor is None) == (setting.P is None and setting.Q is None):
             raise ValueError("takes either a factor, or real or reactive power")
@@ -156,11 +142,7 @@ class LoadPowers:
 
 
 def set_power(text: str) -> complex | None:
-    """Return the power (VA, to six digits) that an event of the plant says a load was set to; None if it says none.
-
-    >>> set_power("load 48 set to 315 kW and -22.5 kvar at nominal voltage, 1.5 times its table")
-    (315000-22500j)
-    """
+    """Return the power (VA, to six digits) that an event of the plant says a load was set to; None if it says none."""
     match = _POWER.search(text)
     return complex(1e3 * float(match[1]), 1e3 * float(match[2])) if match else None
 

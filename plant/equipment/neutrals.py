@@ -20,17 +20,13 @@ Node = tuple[str, str]
 
 
 def neutrals_of(feeder: Feeder) -> dict[str, str]:
-    """Return the neutral of each bus of a feeder that has one; see `neutrals_by_bus`."""
     return neutrals_by_bus(feeder.buses, feeder.load_parts, feeder.elements, feeder.switches)
 
 
 def neutral_for(text: str, bus: Bus, phases: str, neutral: str) -> str:
-    """Return the letter of the node to which an inverter returns; empty for earth.
+    """Return the letter of the node to which an inverter returns; empty for earth. ValueError says where it can.
 
-    `text`: what is wanted: such a letter, `EARTH`, or empty for the bus's neutral; `neutral`: the bus's neutral; empty
-    for none.
-
-    ValueError if it cannot return there; the message says where it can.
+    `text`: what is wanted: such a letter, `EARTH`, or empty for the bus's `neutral`, which is empty for none.
     """
     if text in ("", EARTH):
         return "" if text == EARTH or neutral in phases else neutral
@@ -65,9 +61,8 @@ def neutrals_by_bus(
 ) -> dict[str, str]:
     """Return the neutral of each bus that has one: the letter of a node, that of most load where there are several.
 
-    `buses`, `load_parts`, `elements`, `switches`: the feeder's. A neutral goes on along the elements that have it in
-    the same place at both ends. Node A, B or C is none where loads return to earth: there a load between two phases has
-    a voltage that is wrong.
+    A neutral goes on along the elements that have it in the same place at both ends. Node A, B or C is none where loads
+    return to earth: there a load between two phases has a voltage that is wrong.
     """
     load_parts = tuple(load_parts)
     V_nom = {bus.name: bus.V_nom for bus in buses}

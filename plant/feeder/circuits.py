@@ -38,7 +38,6 @@ class Circuits:
 
 
 def circuit_of(network: Network, closed: frozenset[str], loads: LoadBranches) -> Circuit:
-    """Make the circuit of a feeder with these switches closed; `loads` are at their own nodes."""
     merge = network.merge(closed)
     on = loads.on(merge)
     raw = np.array(
@@ -82,8 +81,8 @@ def _neutral_nodes(network: Network, merge: Merge, reference: Integers | None) -
 def _references(network: Network, merge: Merge, on: LoadBranches, terminals: Integers) -> Integers:
     """Return the node from which each node's voltage counts: the neutral of an inverter there, or -1.
 
-    A node between which and a terminal a load stands counts from the same neutral, where it can: the load is then
-    between two nodes in these voltages, too, and not three.
+    A node that a load connects with a terminal counts from the same neutral, where it can: the load is then between two
+    nodes in these voltages, too, and not three.
     """
     reference = np.full(len(network.nodes), -1, np.int64)
     for unit, nodes in zip(network.inverters, terminals, strict=True):
@@ -108,7 +107,6 @@ def _references(network: Network, merge: Merge, on: LoadBranches, terminals: Int
 
 
 def _referred(Y: sp.csc_array, C: sp.csc_array, reference: Integers) -> tuple[sp.csc_array, sp.csc_array]:
-    """Return admittances and incidence for voltages that count from these nodes; see `Circuit`."""
     n = reference.size
     at = np.flatnonzero(reference >= 0)
     M = sp.csc_array((np.ones(n + at.size), (np.r_[:n, at], np.r_[:n, reference[at]])), shape=(n, n))

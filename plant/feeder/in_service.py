@@ -14,17 +14,15 @@ from gridpeers.plant.plant_config import Protection
 
 Tell = Callable[[int, Literal["inverter", "trip"], str, str], None]  # takes an event: step, kind, subject, text
 
-Settle = Callable[[int, list[int]], None]
-"""Called after inverters were switched at a step: reads them again, and reports islands."""
+Settle = Callable[[int, list[int]], None]  # called after inverters were switched at a step
 
 
 class InService:
     """Connect and disconnect the inverters of a feeder, by agents, protection and the network.
 
-    A tripped inverter returns by itself when voltage and frequency at its terminals have been normal for the
-    delay. In a de-energised island all tripped inverters return at once, when the last of them has waited as long: a
-    black start, which needs a GFM. There is no load shedding, so these inverters take the whole load of the island;
-    an inverter that trips repeatedly stays off.
+    A tripped inverter returns when voltage and frequency at its terminals have been normal for the delay; in a
+    de-energised island all return at once, when the last of them has waited as long: a black start, which needs a GFM.
+    An inverter that trips repeatedly stays off.
     """
 
     def __init__(
@@ -39,10 +37,8 @@ class InService:
     ) -> None:
         self._names, self._V_nom, self._dynamics = names, V_nom, dynamics
         self._tell, self._settle = tell, settle
-        self._connected = np.array(connected)
-        """Inverters that should be connected: those with an agent, or without need of one."""
-        self._joining: set[int] = set()
-        """Inverters whose agent has joined, and which wait for others to start their island."""
+        self._connected = np.array(connected)  # inverters with an agent, or without need of one
+        self._joining: set[int] = set()  # inverters that wait for others to start their island
         self._relays = Relays(settings, len(names), dynamics.h, dynamics.inverters.f_nom)
         self._recovery = Recovery(settings.enter_service, len(names), dynamics.h, dynamics.inverters.f_nom)
 
@@ -87,8 +83,7 @@ class InService:
     def watch(self, step: int, out: Real) -> None:
         """Trip inverters beyond their settings after these steps, and bring back those that may return.
 
-        `step`: present step of the plant; changes act from the next step on; `out`: readings of the steps since the
-        last call, of `Dynamics.run`.
+        Changes act from the next step on. `out`: readings of the steps since the last call, of `Dynamics.run`.
         """
         reduction = self._dynamics.network.reduction
         f, V_low, V_high = out[:, :, 0], out[:, :, 4] / self._V_nom, out[:, :, 5] / self._V_nom
@@ -118,10 +113,7 @@ class InService:
             self._settle(step, group)
 
     def note_trips(self, step: int, which: list[int], before: int = 0) -> None:
-        """Note that inverters have tripped at a step, `before` steps after the last `watch`.
-
-        They hold no load until they return, whatever their set-points.
-        """
+        """Note trips at a step, `before` steps after the last `watch`; these inverters hold no load until they return."""
         locked = [self._names[i] for i in which if self._recovery.trip(i, before)]
         self._dynamics.inverters.set_points[which] = 0.0, 1.0, 0.0
         if locked:

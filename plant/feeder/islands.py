@@ -22,14 +22,11 @@ GRID = "grid"  # name of the island that the substation feeds
 
 
 class Islands:
-    """Name a feeder's islands, and report their changes."""
-
     def __init__(self, network: Network) -> None:
         self._network = network
         self._inverters = tuple(unit.name for unit in network.inverters)
         self._dead: list[str] = []
-        self._named: tuple[SwitchState, tuple[list[str], list[bool]]] | None = None
-        """The last switch state, and its `names`."""
+        self._named: tuple[SwitchState, tuple[list[str], list[bool]]] | None = None  # the last `names`
         self._reported: dict[str, str] = {}  # last reported text of each island
 
     def change_loads(self, network: Network) -> None:

@@ -67,17 +67,13 @@ class SetPointLimits:
         return [PlantEvent(t=t, kind="limit", subject=name, text=text)]
 
 
-LIMITS = "limits its phase currents"
-"""Words of these events alone; their kind, `limit`, is that of set-points, available power and loads, too."""
+LIMITS = "limits its phase currents"  # words of these events alone; their kind, `limit`, has others
 
 PAUSE = 0.1  # time (s) without limiting after which the next limiting is a spell of its own
 
 
 class CurrentLimits:
-    """The inverters whose phases are, or were lately, at their limit.
-
-    `I_max`: their limits (pu), 0 for an inverter without one.
-    """
+    """Report the inverters whose phases are at their limit, `I_max` (pu), once a spell."""
 
     def __init__(self, names: tuple[str, ...], I_max: tuple[float, ...]) -> None:
         self._names, self._I_max = names, I_max
@@ -94,14 +90,12 @@ class CurrentLimits:
         return events
 
 
-CROSSING_PAUSE = 0.5
-"""Time (s) without a crossing after which a load's next crossing is reported: once per spell of an oscillation."""
+CROSSING_PAUSE = 0.5  # time (s) without a crossing after which a load's next crossing is reported
 
 SHOWN = 3  # loads that an event names
 BESIDE = 1e-9  # distance from a limit, in proportion, at which the law beside it is taken; a jump is larger by far
 
-LAW_LIMITS = {"V_min": -1, "V_max": 1}
-"""Limits of a load's law, and the side on which a load is beyond them: below or above."""
+LAW_LIMITS = {"V_min": -1, "V_max": 1}  # limits of a load's law, and the side on which a load is beyond them
 
 
 class _Jump(NamedTuple):
@@ -128,10 +122,7 @@ class LoadLimits:
         self._last: dict[str, float] = {}
 
     def report(self, t: float, V: Complex) -> list[PlantEvent]:
-        """Return events for the loads that crossed a limit since the last call, at these voltages (V) of all branches.
-
-        There is one for each limit and direction. A load without voltage stays as it was.
-        """
+        """Return an event for each limit and direction of crossings since the last call, at these voltages (V)."""
         magnitude = np.abs(V[self._branches])
         now = np.where(magnitude > 0.0, self._are_beyond(magnitude), self._beyond)
         groups: dict[tuple[str, bool], list[_Jump]] = {}

@@ -35,7 +35,6 @@ def hunting_event(name: str) -> PlantEvent:
 
 
 def installed_inverters(network: Network, settings: PlantSettings) -> tuple[Inverter, ...]:
-    """Return all inverters of a network, spare ones too, in its order, with the parameters of each."""
     feeder = network.feeder
     return tuple(
         Inverter(
@@ -57,9 +56,8 @@ class Plant(RecordedPlant):
     """The feeder with its inverters, advanced by control periods.
 
     `T_c`: control period (s), a multiple of `settings.h`; `record_step`: distance of the recorded rows (s), a multiple
-    of h that divides T_c.
-
-    PlantError if there is no operating point at the start. ValueError if a parameter or a switch's name is wrong.
+    of h that divides T_c. PlantError if there is no operating point at the start; ValueError if a parameter or name is
+    wrong.
     """
 
     def __init__(self, network: Network, settings: PlantSettings, T_c: float, record_step: float) -> None:
@@ -141,8 +139,8 @@ class Plant(RecordedPlant):
     def hold(self, name: str, P_set: float, V_set: float) -> None:
         """Take set-points (W, V), in force from the next step until the next ones, within the inverter's bounds.
 
-        A value beyond its bounds is limited, and one that is not finite is ignored; each is an event, once per spell.
-        A tripped inverter accepts none: it returns at no load.
+        A value beyond its bounds is limited, and one that is not finite is ignored; each is an event, once per spell. A
+        tripped inverter accepts none: it returns at no load.
         """
         i, t = self._row[name], self._t
         if not (isfinite(P_set) and isfinite(V_set)):
@@ -164,13 +162,9 @@ class Plant(RecordedPlant):
     def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
         """Operate a switch now ("open" or "close"), by its name or alias, from the next step on.
 
-        A closing switch joins two live islands as they are, and a warning gives their differences; with
-        `synchronised` it closes only if they are in step.
-
-        Return whether it was in that state already, or will be by another command since the last step.
-
-        ValueError if there is no such switch, or its sides are not in step; the message lists the switches, or the
-        differences of the sides.
+        A closing switch joins two live islands as they are, and a warning gives their differences; with `synchronised`
+        it closes only if they are in step. Return whether it was in that state already, or will be by another command
+        since the last step. ValueError if there is no such switch, or its sides are not in step.
         """
         known = self.network.switch_name(name)
         if synchronised and action == "close" and (refusal := self._closings.refusal(known)):
@@ -186,22 +180,19 @@ class Plant(RecordedPlant):
         return self._loads.changed
 
     def set_load(self, name: str, setting: LoadSetting) -> str:
-        """Have a load take another power from the next step on; return it in words. See `LoadBoard.put`."""
         return self._loads.put(name, setting)
 
     def difference_across(self, name: str) -> Difference | None:
-        """Return angle, frequency and voltage across a switch, by its name or alias, that parts two live islands."""
         return self._closings.difference(self.network.switch_name(name))
 
     def connect(self, name: str, on: bool) -> None:
-        """Connect an inverter at zero current and in step with the network, or disconnect it; see `InService`."""
         self._in_service.connect(self._row[name], self.tick * self._steps, on=on)
 
     def advance(self) -> None:
         """Advance to the next tick, with the switches and loads of these steps, scheduled or set by people.
 
-        An island whose network has no solution is de-energised, which is an event; the others continue. Protection
-        acts at the very step at which a clearing time ends: the steps are split there.
+        An island whose network has no solution is de-energised. Steps are split where a clearing time ends, so that
+        protection acts at that very step.
         """
         first, last = self.tick * self._steps, (self.tick + 1) * self._steps
         self._events += self._closings.check_waiting(first)

@@ -1,9 +1,8 @@
 """Protection of inverters: trips, and the return to service. Pure.
 
-Trips are those of IEEE 1547-2018, clause 6.4.1 (voltage) and 6.5.1 (frequency), with its default settings; entering
-service is clause 4.10. The quantities are those the clauses name: for undervoltage the lowest phase of the terminal,
-for overvoltage the highest; the frequency is the inverter's own (of the internal voltage of a GFM, of a GFL's PLL).
-A function trips when its condition has held at every step of its clearing time.
+IEEE 1547-2018: clauses 6.4.1 (voltage) and 6.5.1 (frequency) with their default settings, and 4.10 (entering service).
+For undervoltage the lowest phase of the terminal counts, for overvoltage the highest; the frequency is the inverter's
+own. A function trips when its condition has held at every step of its clearing time.
 """
 
 from __future__ import annotations
@@ -19,8 +18,7 @@ from gridpeers.plant.plant_config import Protection
 V_ENTER = (0.917, 1.05)  # voltages (pu) within which an inverter may enter service: IEEE 1547-2018, Table 4
 F_ENTER = (59.5, 60.1)  # the same for the frequency (Hz at 60 Hz)
 
-ATTEMPTS = 3
-"""Trips, each within `SETTLED` of the last return, after which an inverter stays off until its agent joins again."""
+ATTEMPTS = 3  # trips, each within `SETTLED` of the last return, after which an inverter stays off
 
 SETTLED = 60.0  # time in service (s) after which earlier trips do not count
 
@@ -52,8 +50,7 @@ class Relays:
         self._of = np.array([0 if name[1] == "F" else 2 if name[0] == "O" else 1 for name in chosen], np.int64)
         """Quantity of each function: f, V_low or V_high."""
         self._sign = np.array([1.0 if name[0] == "O" else -1.0 for name in chosen])
-        self._count = np.zeros((n, len(chosen)), np.int64)
-        """Number of steps for which each function's condition has held."""
+        self._count = np.zeros((n, len(chosen)), np.int64)  # steps for which each function's condition has held
         self._shortest = int(np.min(self._need, initial=2**31))
         self._counting = False  # whether any condition has held at the last step
         highest, lowest = np.full(3, np.inf), np.full(3, -np.inf)
@@ -71,10 +68,9 @@ class Relays:
         return int(np.min(self._need - self._count, initial=2**31)) if self._counting else self._shortest
 
     def watch(self, f: Real, V_low: Real, V_high: Real, on: Flags) -> list[Tripped]:
-        """Take the readings of the steps since the last call, at most `quiet` of them.
+        """Take the readings since the last call, at most `quiet` of them; inverters that are not `on` do not trip.
 
-        `f`, `V_low`, `V_high`: frequency (Hz), and voltage of the lowest and of the highest phase (pu): steps x
-        inverters; `on`: inverters in service; the others do not trip.
+        `f`, `V_low`, `V_high`: Hz, and voltage of the lowest and the highest phase (pu), steps x inverters.
         """
         if not self.names:
             return []
@@ -102,10 +98,8 @@ class Relays:
 class Recovery:
     """Tripped inverters, and their return to service.
 
-    `delay`: time (s) for which voltage and frequency must have been normal at the terminals.
-
-    `tripped`: inverters that are off because they tripped; `locked`: those among them that have tripped too often:
-    they do not return by themselves.
+    `delay`: time (s) for which voltage and frequency must have been normal at the terminals; `locked`: inverters that
+    have tripped too often, which do not return by themselves.
     """
 
     def __init__(self, delay: float, n: int, h: float, f_nom: float) -> None:
@@ -152,11 +146,9 @@ class Recovery:
         return int(np.min(waits[waits > 0], initial=2**31))
 
     def watch(self, f: Real, V_low: Real, V_high: Real, dead: Flags) -> None:
-        """Take the readings of the terminals since the last call.
+        """Take the readings since the last call, as `Relays.watch`, with f of the island.
 
-        `f`, `V_low`, `V_high`: frequency of the island (Hz), and voltage of the lowest and of the highest phase (pu):
-        steps x inverters; `dead`: inverters in a de-energised island: there the delay counts from the trip, because
-        there is no voltage.
+        `dead`: inverters in a de-energised island, where the delay counts from the trip.
         """
         steps = len(f)
         if not self.tripped.any():

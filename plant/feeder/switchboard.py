@@ -23,10 +23,7 @@ class Operation(NamedTuple):
 
 
 class Switchboard:
-    """The switches of a feeder.
-
-    ValueError if an event names no switch; the message lists all switches.
-    """
+    """The switches of a feeder; ValueError, which lists them, if an event names none."""
 
     def __init__(self, network: Network, events: Iterable[SwitchEvent], h: float) -> None:
         self._network, self._h = network, h
@@ -44,10 +41,7 @@ class Switchboard:
         return self._at.keys()
 
     def put(self, step: int, name: str, action: str, *, synchronised: bool = False) -> None:
-        """Schedule an operation ("open" or "close") of a switch, by its name or alias, at a step.
-
-        ValueError if there is no such switch; the message lists all switches.
-        """
+        """Schedule an operation ("open" or "close") of a switch, by its name or alias, at a step."""
         known = self._network.switch_name(name)  # first, so that an error leaves the schedule as it is
         self._at.setdefault(step, []).append(Operation(known, action, synchronised))
 
@@ -91,10 +85,7 @@ def _operated(closed: frozenset[str], name: str, action: str) -> frozenset[str]:
 
 
 class LoadBoard:
-    """The powers of a feeder's loads at nominal voltage, and those that they are to have.
-
-    ValueError if an event names no load, or a number of it makes no sense.
-    """
+    """The powers of a feeder's loads at nominal voltage; ValueError if an event names no load, or makes no sense."""
 
     def __init__(self, network: Network, events: Iterable[LoadEvent] = (), h: float = 1.0) -> None:
         self._network, self._h = network, h
@@ -129,16 +120,12 @@ class LoadBoard:
             yield step, network
 
     def put(self, text: str, setting: LoadSetting) -> str:
-        """Have a load take another power at nominal voltage from the next step on; return it in words.
-
-        ValueError if there is no such load, or a number makes no sense.
-        """
+        """Have a load take another power from the next step on; return it in words, or raise ValueError."""
         name = self._powers.name(text)
         S = self._coming[name] = self._power(name, setting, self._set | self._coming)
         return f"load {name}: {self._powers.words(name, S)}"
 
     def is_due(self, step: int) -> bool:
-        """Return whether a load changes at a step: by its schedule, or because a person has set it since the last."""
         return bool(self._coming) or step in self._at
 
     def apply(self, step: int) -> tuple[Network, list[PlantEvent]]:
@@ -169,7 +156,6 @@ class LoadBoard:
             powers[name] = S
 
     def _network_with(self, powers: dict[str, complex]) -> Network:
-        """Return the network with these powers (VA) of loads: the one that was made before, if they are foreseen."""
         made = self._networks.get(_key(powers))
         return self._network.with_loads(with_powers(self._network.feeder, powers)) if made is None else made
 

@@ -1,7 +1,6 @@
 """Switches that join live islands: the differences across them, and the closings that wait for synchronism.
 
-The limits are the synchronization parameter limits of IEEE Std 1547-2018, Table 5: of frequency, voltage and
-phase-angle difference for connecting an energized local system, by the aggregate rating of its units.
+The limits are those of IEEE Std 1547-2018, Table 5, by the aggregate rating of the energized system's units.
 """
 
 from __future__ import annotations
@@ -25,11 +24,10 @@ from gridpeers.wire.messages import PlantEvent
 from gridpeers.wire.timing import time_of
 
 _TABLE_5 = ((500e3, 0.3, 0.10, 20.0), (1500e3, 0.2, 0.05, 15.0), (np.inf, 0.1, 0.03, 10.0))
-"""Rating (VA) up to which these limits hold: frequency (Hz), voltage (pu), angle (deg)."""
+"""Rating (VA) up to which these limits hold: Hz, pu, deg."""
 
 
-LOCKED = 0.01
-"""Difference of frequency (Hz) below which two islands count as held at one frequency: a beat lasts 100 s and more."""
+LOCKED = 0.01  # difference of frequency (Hz) below which two islands count as held at one frequency
 
 LEAST = 0.1  # voltage without load (pu) below which a pole of a switch is a neutral's
 
@@ -55,10 +53,6 @@ class Difference:
         >>> apart = {"switch": "sw", "V": 0.0, "limits": SynchronizationLimits(angle=10.0, f=0.1, V=0.03)}
         >>> Difference(angle=90.0, f=0.05, **apart).way_out
         'try again: the angle passes through zero every 20 s'
-        >>> Difference(angle=90.0, f=0.001, **apart).way_out
-        'at equal frequencies the angle stays: change the load or the set-points of one side'
-        >>> Difference(angle=3.0, f=0.5, **apart).way_out
-        'try again when frequencies and voltages have come closer'
         """
         if self.f > self.limits.f or self.V > self.limits.V:
             return "try again when frequencies and voltages have come closer"
@@ -83,26 +77,19 @@ class SynchronizationLimits:
 
 
 def limits_for(rating: float, check: SyncCheck, f_nom: float = F_BASE) -> SynchronizationLimits:
-    """Return the limits of IEEE 1547-2018, Table 5, for an aggregate rating (VA); limits set in `check` replace them.
+    """Return the limits of Table 5 for an aggregate rating (VA); limits set in `check` replace them.
 
     The standard's frequencies are for 60 Hz; at another nominal frequency (Hz) they are in proportion.
 
-    >>> limits_for(1.3e6, SyncCheck())
-    SynchronizationLimits(angle=15.0, f=0.2, V=0.05)
-    >>> str(limits_for(3.9e6, SyncCheck(angle=5.0)))
-    'at most 5 deg, 0.1 Hz and 3 %'
-    >>> round(limits_for(3.9e6, SyncCheck(), 50.0).f, 4), limits_for(3.9e6, SyncCheck(f=0.2), 50.0).f
-    (0.0833, 0.2)
+    >>> str(limits_for(1.3e6, SyncCheck())), str(limits_for(3.9e6, SyncCheck(angle=5.0)))
+    ('at most 15 deg, 0.2 Hz and 5 %', 'at most 5 deg, 0.1 Hz and 3 %')
     """
     f, V, angle = next(row[1:] for row in _TABLE_5 if rating <= row[0])
     return SynchronizationLimits(angle=check.angle or angle, f=check.f or f * (f_nom / F_BASE), V=check.V or V)
 
 
 class Synchronism:
-    """Measure differences across the open switches of a feeder.
-
-    `check`: limits that replace those of the standard.
-    """
+    """Measure differences across open switches; `check`: limits that replace those of the standard."""
 
     def __init__(self, network: Network, dynamics: Dynamics, check: SyncCheck) -> None:
         self._network, self._dynamics, self._check = network, dynamics, check
@@ -171,9 +158,7 @@ class _Pending(NamedTuple):
 
 
 class Closings:
-    """Judge the closings of a feeder's switches.
-
-    `timeout`: longest wait of a switch for synchronism (steps).
+    """Judge the closings of a feeder's switches, which wait for synchronism up to `timeout` (steps).
 
     `joined`: closings that have joined live islands, the latest last.
     """
@@ -184,7 +169,6 @@ class Closings:
         self.joined: list[Closing] = []
 
     def difference(self, name: str) -> Difference | None:
-        """Return the difference across a switch (by its name) now; None if it does not part two live islands."""
         return self._sync.across(name, self._switches.closed)
 
     def refusal(self, name: str) -> str:

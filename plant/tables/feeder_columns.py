@@ -25,17 +25,12 @@ MUTUAL = Plausible("a mutual impedance", -10.0, 10.0)
 MUTUAL_B = Plausible("the susceptance of a line", -2000.0, 2000.0)
 RATIO = Plausible("the ratio of a regulator", 0.8, 1.25)
 
-BRANCH_CURRENT = 2000.0
-"""Largest current of one load or capacitor bank (A per phase); conductors of a distribution feeder carry less."""
-PART_CURRENT = 50e3
-"""The same of a part of a load that another program has: it may stand for a town, at any of its voltages."""
-RATED_CURRENT = 5000.0
-"""Largest rated current of an inverter or transformer (A per phase)."""
-TIMES_THE_LOAD = 50.0
-"""Largest rating of one inverter beside the total real power of the feeder's loads."""
+BRANCH_CURRENT = 2000.0  # largest current of a load or capacitor bank (A per phase): conductors carry less
+PART_CURRENT = 50e3  # the same of a load that another program has: it may stand for a town
+RATED_CURRENT = 5000.0  # largest rated current of an inverter or transformer (A per phase)
+TIMES_THE_LOAD = 50.0  # largest rating of one inverter beside the total real power of the feeder's loads
 
 SOURCE_VOLTAGE = Plausible("the voltage of the substation", 0.8, 1.2, above_zero=True)
-"""Range of the substation's voltage (pu)."""
 
 Phases = Annotated[str, PhaseLetters()]
 OhmPerKm = Annotated[float, Unit("ohm/km")]
@@ -242,10 +237,8 @@ TABLES: dict[str, type[msgspec.Struct]] = {
     "source.csv": SourceColumns,
     "elements.csv": ElementColumns,
 }
-"""Tables of a feeder by their files, beside its load sets."""
 
 LOAD_SETS: dict[str, type[msgspec.Struct]] = {"loads_": LoadColumns, "load_parts_": LoadPartColumns}
-"""Tables of a load set, by the beginnings of their files."""
 
 
 def power_of(what: str, V_nom: float, current: float, phases: int) -> Plausible:
