@@ -2,7 +2,6 @@
 
 from gridpeers.plant.dynamics.circuit import Circuit, PlantError
 from gridpeers.plant.dynamics.inverters import Inverter
-from gridpeers.plant.dynamics.simulation import Dynamics
-from gridpeers.plant.dynamics.switching import Trip
+from gridpeers.plant.dynamics.simulation import Dynamics, Trip
 
 __all__ = ["Circuit", "Dynamics", "Inverter", "PlantError", "Trip"]

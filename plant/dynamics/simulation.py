@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gridpeers.plant.dynamics import switching
-from gridpeers.plant.dynamics.circuit import PHASES, Circuit, NoSolutionError
+from gridpeers.plant.dynamics.circuit import PHASES, Circuit, NoSolutionError, aligned_sum
 from gridpeers.plant.dynamics.equilibrium import OperatingPoint, equilibrium, set_equilibrium
 from gridpeers.plant.dynamics.inverters import Inverter, Inverters
 from gridpeers.plant.dynamics.island_parts import is_large
-from gridpeers.plant.dynamics.kernel.compiled import Complex, Real
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Real
 from gridpeers.plant.dynamics.kernel.controller_pass import READING, Units
 from gridpeers.plant.dynamics.kernel.second_order_step import Slopes, run_second_order_steps
 from gridpeers.plant.dynamics.kernel.step import FAILURES, run_steps, run_steps_unlocked
@@ -20,6 +20,15 @@ from gridpeers.plant.dynamics.live_network import TOLERANCE, LiveNetwork, unsett
 from gridpeers.plant.plant_config import Method
 
 MOST_RENEWALS = 20  # tangents of one network solution, while its limited currents shrink; two or three are enough
+
+
+class Trip(NamedTuple):
+    """Sources disconnected because their island has no solution."""
+
+    step: int  # number of steps of the present `Dynamics.run` before it
+    inverters: tuple[int, ...]  # disconnected inverters
+    substation: bool  # whether the substation was disconnected too
+    V_min: float  # their lowest terminal voltage before (pu); inf where only the substation was left
 
 
 class Dynamics:
@@ -38,7 +47,7 @@ class Dynamics:
         self._tolerance = TOLERANCE * float(self.inverters.V_b.max(initial=1.0))  # of a network solution (V)
         self.network = LiveNetwork(circuit, self.inverters)
         self._single = np.flatnonzero(self.inverters.single)
-        self._trips: list[switching.Trip] = []
+        self._trips: list[Trip] = []
         units = self.inverters
         self._gfm_0, self._gfm_d = units.gfm_state.copy(), units.gfm_state.copy()
         self._gfl_0, self._gfl_d = units.gfl_state.copy(), units.gfl_state.copy()
@@ -65,21 +74,122 @@ class Dynamics:
         self.connect(network.circuit)
         return point
 
-    def connect(self, circuit: Circuit) -> None:
-        self._trips += switching.connect(self.inverters, self.network, circuit)
+    # ---------------------------------------------------------------- switching
 
-    def switch_inverter(self, i: int, on: bool) -> None:
-        self.switch_inverters((i,), on)
+    def connect(self, circuit: Circuit, step: int = 0) -> None:
+        """Continue with another network from the present injections; islands without solution trip, at this step.
+
+        Inverters that lose their source of voltage stop; those that regain it start at zero current, in step with it.
+        """
+        units, network = self.inverters, self.network
+        before = network.reduction.online
+        network.change(circuit)
+        while True:
+            online = network.reduction.online
+            regained = online & ~before
+            units.J[~online] = 0.0
+            try:
+                for i in np.flatnonzero(regained & units.forming).tolist():
+                    self._black_start(i)
+                followers = regained & ~units.forming
+                if (behind_filter := followers & (units.y_f != 0.0)).any():
+                    self._solve_without(behind_filter)
+                units.J[followers] = units.y_f[followers, None] * units.V[followers]
+                network.guess()
+                network.solve()
+                for i in np.flatnonzero(followers).tolist():
+                    units.I[i] = 0.0
+                    units.rest(i, 0.0, self._mean_voltage(i))
+                return
+            except NoSolutionError as error:
+                self._trip(error.islands, step)
+                network.change(circuit)
 
     def switch_inverters(self, which: Sequence[int], on: bool) -> None:
-        self._trips += switching.switch_inverters(self.inverters, self.network, which, on)
+        """Disconnect inverters all at once, or reconnect them at zero current, in step with the voltage there.
+
+        A reconnected inverter gets the set-points at which it rests: V_set is the terminal's voltage, and P_set the
+        value whose droop gives no power at the island's frequency. Control decides the rest.
+        """
+        units = self.inverters
+        moved = [i for i in which if on != bool(units.connected[i])]
+        if not moved:
+            return
+        speed = {i: self._island_speed(i) for i in moved}
+        units.connected[moved] = on
+        w_nom = 2.0 * np.pi * units.f_nom
+        for i in moved if on else ():
+            v = self._mean_voltage(i)
+            if units.positive_sequence[i] or units.direct[i]:
+                v = float(abs(aligned_sum(units.V[i]))) / 3.0 / float(units.V_b[i])
+            units.set_points[i] = speed[i] / (units.m_p[i] * w_nom), v if v > 0.1 else 1.0, 0.0
+        self.connect(self.network.circuit)
+        for i, w in speed.items() if on else ():
+            if units.forming[i]:
+                units.gfm_state["w"][units.gfm_at == i] = w
+            else:  # its PLL has locked to the island's frequency before the contactor closes
+                follower = units.gfl_at == i
+                for name in ("w_i", "w_i_B", "w_i_C"):
+                    units.gfl_state[name][follower] = w
+                units.gfl_state["f"][follower] = units.gfl_state["f_m"][follower] = units.f_nom + w / (2.0 * np.pi)
 
     def deenergise(self, islands: Iterable[int], step: int = 0) -> None:
-        self._trips += switching.deenergise(self.inverters, self.network, islands, step)
+        """Disconnect all inverters of these islands; where there are none, the substation, which stays off.
 
-    def take_trips(self) -> list[switching.Trip]:
+        An island with the substation thus first loses only its inverters: the grid may be able to feed it without them.
+        """
+        self._trip(islands, step)
+        self.connect(self.network.circuit, step)
+
+    def _trip(self, islands: Iterable[int], step: int) -> None:
+        units, reduction, numbers = self.inverters, self.network.reduction, list(islands)
+        lost = reduction.online & np.isin(reduction.inverter_island, numbers)
+        bare = [k for k in numbers if not lost[reduction.inverter_island == k].any()]
+        v = np.abs(units.V[lost]) / units.V_b[lost, None]
+        units.connected[lost] = False
+        if bare:
+            self.network.substation_on = False
+        lowest = float(np.min(v, initial=np.inf))
+        self._trips.append(Trip(step, tuple(np.flatnonzero(lost).tolist()), bool(bare), lowest))
+
+    def _solve_without(self, away: Flags) -> None:
+        """Find the voltages at the open terminals of inverters that are about to return.
+
+        At zero current the internal voltage is that of the open terminal, in each phase.
+        """
+        units, network = self.inverters, self.network
+        connected = units.connected.copy()
+        units.connected[away] = False
+        try:
+            network.change(network.circuit)
+            network.guess()
+            network.solve()
+        finally:
+            units.connected[:] = connected
+            network.change(network.circuit)
+
+    def _black_start(self, i: int) -> None:
+        units = self.inverters
+        V_1 = complex(aligned_sum(units.V[i])) / 3.0
+        if abs(V_1) < 0.1 * units.V_b[i]:
+            V_1 = complex(units.set_points[i, 1] * units.V_b[i] * PHASES[units.phase[i]])
+        units.J[i], units.I[i] = V_1 * PHASES * units.y_f[i], 0.0
+        units.rest(i, 0.0, abs(V_1) / units.V_b[i])
+
+    def _island_speed(self, i: int) -> float:
+        """Return the speed (rad/s, relative to nominal) of inverter i's island; 0 with a source or if dead."""
+        units, reduction = self.inverters, self.network.reduction
+        leader = reduction.leader[reduction.inverter_island[i]]
+        return 0.0 if leader < 0 else float(units.gfm_state["w"][units.gfm_at == leader][0])
+
+    def _mean_voltage(self, i: int) -> float:
+        return float(np.mean(np.abs(self.inverters.V[i]))) / float(self.inverters.V_b[i])
+
+    def take_trips(self) -> list[Trip]:
         trips, self._trips = self._trips, []
         return trips
+
+    # ---------------------------------------------------------------- steps
 
     def run(self, steps: int) -> Real:
         """Advance by `steps` steps; return steps x n_inv x `kernel.controller_pass.READING`, all finite.

@@ -14,11 +14,11 @@ from gridpeers.plant.dynamics.circuit import NoPowerFlowError
 from gridpeers.plant.dynamics.equilibrium import require_within_limits
 from gridpeers.plant.dynamics.live_network import KEPT
 from gridpeers.plant.feeder.circuits import Circuits
-from gridpeers.plant.feeder.in_service import InService
 from gridpeers.plant.feeder.islands import Islands, NeutralEvents, trip_event
 from gridpeers.plant.feeder.limit_events import CurrentLimits, LoadLimits, SetPointLimits
+from gridpeers.plant.feeder.protection import InService
 from gridpeers.plant.feeder.switchboard import LoadBoard, Switchboard
-from gridpeers.plant.feeder.synchronism import Closings, Difference, Synchronism
+from gridpeers.plant.feeder.synchronism import Closings, Difference
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings, PowerLimit
 from gridpeers.plant.plant_interface import Reading, RecordedPlant
@@ -91,9 +91,7 @@ class Plant(RecordedPlant):
         self._current_limits = CurrentLimits(
             self.inverters, tuple(getattr(unit.parameters, "I_max", 0.0) for unit in units)
         )
-        sync = Synchronism(network, self._dynamics, settings.sync_check)
-        timeout = round(settings.sync_check.timeout / settings.h)
-        self._closings = Closings(self._switches, sync, timeout, settings.h)
+        self._closings = Closings(self._switches, network, self._dynamics, settings.sync_check, settings.h)
         self._in_service = InService(
             settings.protection,
             self.inverters,

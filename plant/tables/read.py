@@ -7,7 +7,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from gridpeers.plant.equipment import PHASES, Feeder
+from gridpeers.plant.equipment import PHASES, Feeder, Load
 from gridpeers.plant.equipment.connectivity import Connectivity, buses_without_ground, by_bus
 from gridpeers.plant.equipment.neutrals import neutrals_by_bus
 from gridpeers.plant.tables import branches, shunts
@@ -88,7 +88,7 @@ def _read_tables(folder: Path, feeder: str, load_set: str, contents: tuple[tuple
     transformers = branches.read_transformers(buses)
     buses.floating = buses_without_ground(transformers, lines, [*switches, *regulators])
     sets, of_parts = load_sets(folder), f"load_parts_{load_set}.csv"
-    loads = ()
+    loads: tuple[Load, ...] = ()
     if load_set in sets:
         loads = shunts.read_loads(buses, f"loads_{load_set}.csv", required=not (folder / of_parts).is_file())
     elif sets:

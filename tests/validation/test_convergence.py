@@ -46,7 +46,7 @@ def test_the_reference_refuses_what_its_equations_do_not_have() -> None:
     on_one_phase.start(np.array([0.0, 0.4]), np.zeros(2))
     one_off = DaeDynamics(pair_of(3, 0.8), (inverter(GFM_D), inverter(GFL_D)), 0.002)
     one_off.start(np.array([0.0, 0.4]), np.zeros(2))
-    one_off.switch_inverter(1, on=False)
+    one_off.switch_inverters([1], False)
 
     with pytest.raises(RuntimeError, match="the reference has no single-phase inverter"):
         on_one_phase.run(1)

@@ -54,9 +54,9 @@ def test_it_is_a_third_of_a_balanced_three_phase_inverter(
         runs.append([dynamics.readings(), *dynamics.run(20)[:, :, :6]])
         dynamics.connect(pair_of(phases, 1.4))
         runs[-1] += [*dynamics.run(200)[:, :, :6]]
-        dynamics.switch_inverter(1, False)
+        dynamics.switch_inverters([1], False)
         runs[-1] += [*dynamics.run(50)[:, :, :6]]
-        dynamics.switch_inverter(1, True)
+        dynamics.switch_inverters([1], True)
         runs[-1] += [*dynamics.run(100)[:, :, :6]]
     whole, third = (np.array([row[:, :4] for row in run]) for run in runs)
     whole[:, :, 1:3] /= 3.0
@@ -118,7 +118,7 @@ def test_it_starts_its_dead_lateral_at_its_own_phase() -> None:
     dynamics = Dynamics(network, (single(GFM_D, "C"),), 0.002, connected=[False])
     dynamics.inverters.set_points[0] = 0.0, 1.0, 0.0
     dynamics.connect(network)
-    dynamics.switch_inverter(0, True)
+    dynamics.switch_inverters([0], True)
     dynamics.run(1)
 
     assert np.degrees(np.angle(dynamics.inverters.V[0, 0])) == pytest.approx(120.0, abs=6.0)

@@ -66,9 +66,9 @@ def test_a_gfm_alone_starts_a_dead_island_at_its_set_point() -> None:
     """Taken off, it leaves 0 V behind; put back where there is no voltage, it holds nominal voltage at angle 0."""
     plant = lone(GFM_D, 0.3)
     plant.run(100)
-    plant.switch_inverter(0, on=False)
+    plant.switch_inverters([0], False)
     off = plant.inverters.V.copy()
-    plant.switch_inverter(0, on=True)
+    plant.switch_inverters([0], True)
 
     units = plant.inverters
     assert not off.any()
@@ -82,9 +82,9 @@ def test_a_gfm_comes_back_in_step() -> None:
     plant = pair(GFM_D, GFM_D, 0.4)
     plant.inverters.set_points[:, 0] = 0.3, 0.1
     plant.run(200)
-    plant.switch_inverter(1, on=False)
+    plant.switch_inverters([1], False)
     plant.run(500)
-    plant.switch_inverter(1, on=True)
+    plant.switch_inverters([1], True)
 
     units = plant.inverters
     w = float(units.gfm_state["w"][0])
@@ -129,9 +129,9 @@ def test_a_gfl_in_an_island_that_starts_again_begins_at_no_current() -> None:
     network = pair(GFM_D, GFM_D, 0.4).network.circuit
     plant = Dynamics(network, (inverter(GFM_D), inverter(GFL_D)), 0.002)
     plant.start(np.array([0.4, 0.0]), np.zeros(2))
-    plant.switch_inverter(0, on=False)
+    plant.switch_inverters([0], False)
     assert plant.inverters.connected.tolist() == [False, True]
-    plant.switch_inverter(0, on=True)
+    plant.switch_inverters([0], True)
 
     assert currents(plant.inverters, 1) < 1e-9
 

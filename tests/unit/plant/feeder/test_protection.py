@@ -7,7 +7,7 @@ import pytest
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from gridpeers.plant.dynamics.switching import Trip
+from gridpeers.plant.dynamics import Trip
 from gridpeers.plant.equipment.inverter_parameters import GfmParameters
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.feeder.islands import trip_event
