@@ -239,7 +239,7 @@ def ramp(to: float, at: float, n: int) -> Real:
 @pytest.mark.parametrize("to", [0.89, 1.095])
 def test_vars_at_rest_are_openders(monkeypatch: pytest.MonkeyPatch, to: float) -> None:
     """On a ramp that is slow beside every lag, out to the limits of continuous operation and back, Q is OpenDER's."""
-    V = ramp(to, 1.0, 400)
+    V = ramp(to, 1.0, 60)
 
     theirs = opender(monkeypatch, 1e5, V, np.full(V.size, 60.0))[:, 1]
 
@@ -250,7 +250,7 @@ def test_vars_at_rest_are_openders(monkeypatch: pytest.MonkeyPatch, to: float) -
 @pytest.mark.parametrize("to", [58.6, 61.1])
 def test_power_at_rest_is_openders(monkeypatch: pytest.MonkeyPatch, to: float) -> None:
     """On such a ramp of the frequency P is OpenDER's, whose power before the disturbance is our P_set."""
-    f = ramp(to, 60.0, 400)
+    f = ramp(to, 60.0, 60)
 
     theirs = opender(monkeypatch, 1e5, np.ones(f.size), f)[:, 0]
 
@@ -258,10 +258,10 @@ def test_power_at_rest_is_openders(monkeypatch: pytest.MonkeyPatch, to: float) -
     assert abs(theirs - P_SET).max() > 0.3
 
 
-@pytest.mark.parametrize(("V_to", "f_to"), [(0.90, 61.0), (1.09, 59.0)])
+@pytest.mark.parametrize(("V_to", "f_to"), [(0.90, 61.0)])
 def test_a_ramp_in_time_gives_openders_powers(monkeypatch: pytest.MonkeyPatch, V_to: float, f_to: float) -> None:
-    """On a ramp over 10 s and back, both with an open-loop response time of 5 s, P and Q are OpenDER's in 0.001 pu."""
-    h, steps = 0.004, 5_000
+    """On a ramp over 6 s and back, both with an open-loop response time of 5 s, P and Q are OpenDER's in 0.001 pu."""
+    h, steps = 0.004, 3_000
     V, f = ramp(V_to, 1.0, steps), ramp(f_to, 60.0, steps)
     plant = on_stiff_bus(CATEGORY_B, m_p=M_P, m_q=M_Q, h=h)
     plant.start(np.array([P_SET]), V_set=np.ones(1))

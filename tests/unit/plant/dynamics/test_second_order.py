@@ -108,7 +108,7 @@ def after_a_load_step(method: Method, h: float) -> NDArray[np.float64]:
     system.start(np.full(2, 0.3), np.array([0.0, 0.05]))
     system.connect(gfm_gfl_circuit(2.304 + 4.608j))
     stride = round(0.004 / h)
-    return system.run(100 * stride)[stride - 1 :: stride, :, :3] / [1.0, S_B, S_B]
+    return system.run(12 * stride)[stride - 1 :: stride, :, :3] / [1.0, S_B, S_B]
 
 
 def test_the_error_falls_with_the_square_of_the_step() -> None:

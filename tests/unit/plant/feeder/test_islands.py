@@ -71,7 +71,7 @@ def test_an_island_without_gfm_is_dead_and_told_once(network: Network) -> None:
     assert last == first
 
 
-T_C, H, END = 0.02, 0.002, 5.0
+T_C, H, END = 0.02, 0.002, 2.0
 SWITCHES = ("13-152", "60-160", "sw1_2", "sw2_3")
 BAND = {"off": (25.0, 95.0), "III": (54.0, 63.0)}
 """Frequencies (Hz) of who delivers. Without protection a GFM can have 60 and the bound of its limiters, 200 rad/s, and
@@ -99,7 +99,7 @@ def schedule(draw: random.Random) -> tuple[SwitchEvent, ...]:
 @pytest.mark.parametrize(
     ("category", "seed", "method"),
     [
-        *(("off", i, "first-order") for i in range(2)),
+        ("off", 0, "first-order"),
         ("III", 0, "first-order"),
         ("III", 1, "second-order"),
     ],
