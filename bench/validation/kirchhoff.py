@@ -11,7 +11,6 @@ from gridpeers.plant.dynamics import Dynamics
 from gridpeers.plant.dynamics.kept_network import kept_network
 from gridpeers.plant.dynamics.kernel.solve import solve_network
 from gridpeers.plant.dynamics.live_network import TOLERANCE
-from gridpeers.plant.dynamics.reduction import SparseReduction
 
 
 def kirchhoff_residual(dynamics: Dynamics) -> float:
@@ -39,22 +38,20 @@ def solved_voltages(dynamics: Dynamics) -> tuple[NDArray[np.complex128], NDArray
     turned = np.where(leader >= 0, units.theta()[leader] - net.theta_lin, 0.0) if len(units) else np.zeros(leader.size)
     frame = np.exp(1j * turned)
     x, V_G = network.x.copy(), np.empty((len(units), 3), complex)
-    room = np.empty(12 * len(units) + 6 * m)
     tolerance = TOLERANCE * float(units.V_b.max(initial=1.0))
-    status = solve_network(net, units.J, np.conj(frame), x, np.empty(m, complex), V_G, tolerance, room)
+    status = solve_network(net, units.J, np.conj(frame), x, np.empty(m, complex), V_G, tolerance)
     V_b = (x[:m] + 1j * x[m:]) * frame[reduction.branch_island]
     V = reduction.node_voltages(units.J, V_b, network.source_voltage)
-    if isinstance(reduction, SparseReduction):
-        circuit = reduction.circuit
-        kept = kept_network(circuit, reduction.unknown, reduction.branches, reduction.C, reduction.to_ground).nodes
-        V[kept] = net.sparse.scratch[: 2 * kept.size].view(complex) * frame[reduction.node_island]
-        rest = np.setdiff1d(reduction.unknown, kept)
-        V[rest] = 0.0
-        if rest.size:
-            V[rest] = splu(csc_matrix(reduction.Y[rest][:, rest])).solve(-(reduction.Y[rest] @ V))
+    circuit = reduction.circuit
+    kept = kept_network(circuit, reduction.unknown, reduction.branches, reduction.C, reduction.to_ground).nodes
+    V[kept] = net.sparse.scratch[: 2 * kept.size].view(complex) * frame[reduction.node_island]
+    rest = np.setdiff1d(reduction.unknown, kept)
+    V[rest] = 0.0
+    if rest.size:
+        V[rest] = splu(csc_matrix(reduction.Y[rest][:, rest])).solve(-(reduction.Y[rest] @ V))
     if status < 0:
         V[:] = np.nan
     J = np.zeros(V.size, complex)
-    here = reduction.feeding
-    np.add.at(J, reduction.terminals[here], units.J.T.ravel()[here])
+    here = (reduction.place[circuit.terminals] >= 0) & reduction.online[:, None] & ~circuit.copies
+    np.add.at(J, circuit.terminals[here], units.J[here])
     return V, J

@@ -18,7 +18,7 @@ from bench.validation.opendss_engines import ENGINES, SolvedStates, solve_script
 from bench.validation.random_script import RandomFeeder, Shape, random_feeder
 from bench.validation.validation_part import CaseResult, ToleranceCheck, ValidationPart, inverter_row
 from gridpeers.bridges.opendss import read_opendss
-from gridpeers.plant.dynamics import Dynamics, PlantError, reduction
+from gridpeers.plant.dynamics import Dynamics, PlantError
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.equipment.named_loads import with_powers
 from gridpeers.plant.feeder.circuits import circuit_of
@@ -57,17 +57,12 @@ class FeederStates(NamedTuple):
     """Inverters that have no substation after the switching, and deliver."""
 
 
-def run_states(drawn: RandomFeeder, script: Path, *, dense: bool = False) -> FeederStates:
-    """Run our plant through the states of a feeder whose script is written, by sparse factors or by dense matrices.
+def run_states(drawn: RandomFeeder, script: Path) -> FeederStates:
+    """Run our plant through the states of a feeder whose script is written.
 
     FeederError, PlantError, ArithmeticError: the import or the plant refuses it, or an island has no solution.
     """
-    before = reduction.MOST_DENSE
-    reduction.MOST_DENSE = before if dense else 0
-    try:
-        return _Run(drawn, read_opendss(script, switches=[drawn.switch])).states()
-    finally:
-        reduction.MOST_DENSE = before
+    return _Run(drawn, read_opendss(script, switches=[drawn.switch])).states()
 
 
 class _Run:
@@ -213,7 +208,7 @@ def _run(case: str, count: int = ALL) -> CaseResult:
             drawn, script = random_feeder(seed, shape), Path(folder) / f"{case}{seed}.dss"
             script.write_text(drawn.script, encoding="utf-8")
             try:
-                found.append(run_states(drawn, script, dense=seed % 4 == 3))
+                found.append(run_states(drawn, script))
                 scripts.append(script)
             except (FeederError, PlantError, ArithmeticError):
                 refused.append(script)

@@ -171,15 +171,14 @@ class ReplayedMachines(Dynamics):
         """
         units, network, net = self.inverters, self.network, self.network.net
         arrays = self.arrays()
-        n, m = len(units), net.S.size
+        n = len(units)
         if not second:
             keep_start(arrays)
         units.J[n - self._machines :] = J
         rotation = np.empty(net.leader.size, complex)
         turn_frames(arrays, net, np.zeros(n), rotation)
-        scale, work = float(units.V_b.max()), np.empty(12 * n + 6 * m)
-        I_b = np.empty(m, complex)
-        if solve_within_limits(net, arrays, rotation, network.x, I_b, TOLERANCE * scale, work) < 0:
+        tolerance, I_b = TOLERANCE * float(units.V_b.max()), np.empty(net.S.size, complex)
+        if solve_within_limits(net, arrays, rotation, network.x, I_b, tolerance) < 0:
             raise RuntimeError("the network has no solution with the replayed machines")
         out = np.zeros((n, READING))
         advance_inverters(arrays, self.h, second, out)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gridpeers.bridges.gridlabd.glm import write_glm
 from gridpeers.bridges.gridlabd.gridlabd_process import DeltaModeProcess, GridlabdError
-from gridpeers.plant.dynamics.switch_state import SwitchState
+from gridpeers.plant.dynamics.reduction import Reduction
 from gridpeers.plant.equipment.inverter_parameters import GflParameters
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.feeder.circuits import Circuits
@@ -190,10 +190,10 @@ class GridlabdPlant(RecordedPlant):
             text = f"{name} has {limit.P_max / 1e3:g} kW available"
             self._events.append(PlantEvent(t=round(limit.t, 9), kind="limit", subject=name, text=text))
 
-    def _switch_state(self) -> SwitchState:
+    def _switch_state(self) -> Reduction:
         circuit = self._circuits.of(self._switchboard.closed)
         forming = np.array([unit.kind == "GFM" for unit in self._units.values()])
-        return SwitchState(circuit, np.zeros(forming.size, complex), forming, np.ones(forming.size, bool))
+        return Reduction(circuit, np.zeros(forming.size, complex), forming, np.ones(forming.size, bool))
 
     def _in_units(self, name: str, reading: NDArray[np.float64]) -> tuple[float, ...]:
         """Convert a reading to Hz, W, var, V, W, V."""

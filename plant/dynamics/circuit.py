@@ -134,10 +134,6 @@ class Circuit:
         none = np.full(self.terminals.shape[0], -1, np.int64)
         return none if self.reference is None else self.reference[self.terminals[:, 0]]
 
-    @cached_property
-    def two_ended(self) -> bool:
-        return bool(np.max(np.diff(self.C.tocsc().indptr), initial=0) <= 2)
-
     def to_earth(self, V: Complex) -> Complex:
         """Return the voltages of all nodes to earth (V) from those to their references."""
         return V if self.reference is None else V + np.where(self.reference >= 0, V[self.reference], 0.0)

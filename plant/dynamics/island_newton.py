@@ -38,33 +38,6 @@ class IslandEquations(Protocol):
         """Return Newton's step (V), and whether V is on the branch of high voltage; None if there is none."""
 
 
-class DenseIsland:
-    """An island by the impedances Z between its load branches (ohm), F(V) = V - E + Z I_b(V).
-
-    `nominal`: nominal phasor of each branch (V); `E`: their voltages without load (V).
-    """
-
-    def __init__(self, Z: Complex, loads: LoadLaw, nominal: Complex, E: Complex) -> None:
-        self._Z, self._loads, self.V_nom, self.without_load = Z, loads, np.abs(nominal), E
-
-    def residual(self, V: Complex, part: float) -> tuple[Complex, float]:
-        F = V - self.without_load + part * (self._Z @ self._loads.currents(V))
-        return F, float(np.max(np.abs(F) / self.V_nom, initial=0.0))
-
-    def step(self, V: Complex, F: Complex, part: float) -> tuple[Complex, bool] | None:
-        A, B = self._loads.tangent(V)
-        ZA, ZB = part * self._Z * A, part * self._Z * B
-        real: Real = np.block([[(ZA + ZB).real, (ZB - ZA).imag], [(ZA + ZB).imag, (ZA - ZB).real]])
-        jacobian = np.eye(2 * V.size) + real
-        try:
-            dV = np.linalg.solve(jacobian, -np.concatenate([F.real, F.imag]))
-        except np.linalg.LinAlgError:
-            return None
-        step = dV[: V.size] + 1j * dV[V.size :]
-        small = float(np.max(np.abs(step) / self.V_nom, initial=0.0)) <= ROUNDING
-        return step, not small or bool(np.linalg.slogdet(jacobian)[0] > 0)
-
-
 @one_thread()
 def solve_island(island: IslandEquations, guess: Complex) -> Complex | None:
     """Return the voltages (V) of an island, from a guess (V); None if there are none."""

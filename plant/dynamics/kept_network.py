@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+from itertools import combinations
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -83,23 +84,25 @@ def elimination_order(Y: sp.csc_array, C: sp.csc_array) -> Integers:
 class BlockPattern:
     """The matrix of a network as blocks [Re; Im] of its nodes in the order of elimination, with room for its factors.
 
-    `first`, `second`: nodes of each branch, or -1; `a_first`, `a_second`: ratios with which their voltages count in it.
+    `ends`: nodes of each branch, or -1; `ratios`: with which their voltages count in it.
     """
 
     def __init__(self, Y: sp.csc_array, C: sp.csc_array) -> None:
         self.start, self.later = _filled(_links(Y, C))
         self._Y = self._blocks(Y)
-        self.first, self.second, self.a_first, self.a_second = _ends(C)
-        both = (self.first >= 0) & (self.second >= 0)
-        self._across = np.full(both.size, -1, np.int64)
-        self._across[both] = self._entry(self.first[both], self.second[both])
+        self.ends, self.ratios = _ends(C)
+        pairs = list(combinations(self.ends.T, 2))
+        self._across = np.full((self.ends.shape[0], max(len(pairs), 1)), -1, np.int64)
+        for k, (first, second) in enumerate(pairs):
+            both = (first >= 0) & (second >= 0)
+            self._across[both, k] = self._entry(first[both], second[both])
 
     def matrix(self, A: Complex, B: Complex, y: Complex | None = None) -> BlockFactors:
         """Return V -> (Y + diag(y)) V + C (A C' V + B C' V^*), to be factored in place."""
         f = self._Y._replace(D=self._Y.D.copy(), L=self._Y.L.copy(), U=self._Y.U.copy())
         if y is not None:
             f.D[:] += np.column_stack([y.real, -y.imag, y.imag, y.real])
-        add_tangent(f, self.first, self.second, self._across, self.a_first, self.a_second, A, B)
+        add_tangent(f, self.ends, self.ratios, self._across, A, B)
         return f
 
     def _entry(self, i: Integers, j: Integers) -> Integers:
@@ -151,13 +154,15 @@ def _filled(link: sp.csc_array) -> tuple[Integers, Integers]:
     return start, np.array(later, np.int64)
 
 
-def _ends(C: sp.csc_array) -> tuple[Integers, Integers, Real, Real]:
-    m = C.shape[1]
-    nodes, ratios = np.full((2, m), -1, np.int64), np.zeros((2, m))
-    branch = np.repeat(np.arange(m), np.diff(C.indptr))
+def _ends(C: sp.csc_array) -> tuple[Integers, Real]:
+    """Return the nodes of each branch, -1 for none, and the ratios with which they count."""
+    count = np.diff(C.indptr)
+    shape = count.size, int(np.max(count, initial=1))
+    nodes, ratios = np.full(shape, -1, np.int64), np.zeros(shape)
+    branch = np.repeat(np.arange(count.size), count)
     which = np.arange(C.indices.size) - C.indptr[branch]
-    nodes[which, branch], ratios[which, branch] = C.indices, C.data
-    return nodes[0], nodes[1], ratios[0], ratios[1]
+    nodes[branch, which], ratios[branch, which] = C.indices, C.data
+    return nodes, ratios
 
 
 class KeptNetwork:

@@ -15,7 +15,7 @@ from gridpeers.plant.dynamics.kernel.controller_pass import Units
 from gridpeers.plant.dynamics.kernel.network_arrays import Reduced
 from gridpeers.plant.dynamics.kernel.solve import solve_network
 from gridpeers.plant.dynamics.kernel.step import MAX_LIMITING, limit_currents
-from gridpeers.plant.dynamics.reduction import Reduction, SparseReduction, reduce_network
+from gridpeers.plant.dynamics.reduction import Reduction
 
 KEPT = 32  # circuits, and their factors, that are kept: a factored network of 123 nodes has 1 MB
 
@@ -70,7 +70,7 @@ class LiveNetwork:
         if not self.substation_on:
             circuit = recent(self._unsourced, circuit, circuit.without_source)
         key = circuit, units.connected.tobytes()
-        return recent(self._reductions, key, lambda: reduce_network(circuit, units.y_f, units.forming, units.connected))
+        return recent(self._reductions, key, lambda: Reduction(circuit, units.y_f, units.forming, units.connected))
 
     def change(self, circuit: Circuit) -> None:
         """Take another circuit, or the same with other connected inverters; call `solve` next."""
@@ -95,8 +95,8 @@ class LiveNetwork:
             self.net = self.reduction.linearise(V_b, self.source_voltage, theta)
             m = V_b.size
             x = np.concatenate([V_b.real, V_b.imag])
-            I_b, work = np.empty(m, complex), np.empty(12 * len(units) + 6 * m)
-            status = solve_network(self.net, units.J, still, x, I_b, units.V, TOLERANCE * scale, work)
+            I_b = np.empty(m, complex)
+            status = solve_network(self.net, units.J, still, x, I_b, units.V, TOLERANCE * scale)
             if status >= 0:
                 V_b = x[:m] + 1j * x[m:]
                 break
@@ -113,15 +113,14 @@ class LiveNetwork:
         self._linearise(self._solve_islands(self._branch_voltages()))
 
     def refresh(self, iterations: int, solutions: int) -> None:
-        """Linearise sparse factors again once their tangent has cost more iterations than a new one costs time."""
-        if self.net.sparse.constant.size:
-            self._excess += max(iterations - 2 * solutions, 0)
-            if self._excess > WORTH:
-                self._linearise(self._branch_voltages())
+        """Linearise again once their tangent has cost more iterations than a new one costs time."""
+        self._excess += max(iterations - 2 * solutions, 0)
+        if self._excess > WORTH:
+            self._linearise(self._branch_voltages())
 
     def parts(self, units: Units) -> IslandParts | None:
         """Return the islands in parts; None where the network is too small, or all is one island."""
-        if self._parts is None and isinstance(self.reduction, SparseReduction) and is_large(self.net):
+        if self._parts is None and is_large(self.net):
             self._parts = IslandParts(self.net, self.reduction.node_island, units)
         return self._parts
 
@@ -181,18 +180,18 @@ def unsettled_island(net: Reduced, units: Units, x: Real, tolerance: float) -> i
     `x`.
     """
     x, J, V, limiting = x.copy(), units.J.copy(), units.V.copy(), units.limiting.copy()
-    I_b, work = np.empty(x.size // 2, complex), np.empty(12 * len(J) + 3 * x.size)
+    I_b = np.empty(x.size // 2, complex)
     still = np.ones(net.leader.size, complex)
     with np.errstate(all="ignore"):  # what diverges is not finite in the end
         for _ in range(MAX_LIMITING):
             surplus = limit_currents(units.gfm, units.gfm_at, units.online, J, V, limiting)
             before = x.copy(), V.copy()
-            status = solve_network(net, J, still, x, I_b, V, tolerance, work)
+            status = solve_network(net, J, still, x, I_b, V, tolerance)
             if status < 0 or surplus <= tolerance:
                 break
         if status < 0:  # the last iterations alone tell who diverges: those that have settled do not move again
             before = x.copy(), V.copy()
-            solve_network(net, J, still, x, I_b, V, tolerance, work)
+            solve_network(net, J, still, x, I_b, V, tolerance)
         change = np.zeros(net.leader.size)
         np.maximum.at(change, np.tile(net.branch_island, 2), _size(x - before[0]))
         np.maximum.at(change, net.inverter_island[units.online], _size(V - before[1]).max(axis=1)[units.online])

@@ -18,7 +18,7 @@ from gridpeers.plant.dynamics.island_newton import weak_branches
 from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Integers, Real
 from gridpeers.plant.dynamics.kernel.network_arrays import Reduced
 from gridpeers.plant.dynamics.kernel.solve import NO_NETWORK, settle_powers
-from gridpeers.plant.dynamics.reduction import reduce_network
+from gridpeers.plant.dynamics.reduction import Reduction
 from gridpeers.plant.dynamics.threads import one_thread
 
 MOST_ROUNDS = 500  # rounds between network and inverters, within which the changes of injections must end or halve
@@ -30,7 +30,7 @@ class PowerFlow:
     def __init__(self, circuit: Circuit, units: Inverters, held: Flags) -> None:
         # GFM filters stay in the network, because their EMF is balanced, not their current; a GFL is a pure current
         y = np.where(units.forming & ~held, units.y_f, 0.0)
-        self.reduction = reduce_network(circuit, y, units.forming, units.connected)
+        self.reduction = Reduction(circuit, y, units.forming, units.connected)
         self.circuit, self.units, self.y = circuit, units, y
         self.V_b = circuit.V_branch[self.reduction.branches].astype(complex)
         self.I_b = np.empty(self.V_b.size, complex)  # currents of the live load branches (A), of the last solution

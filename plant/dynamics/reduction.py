@@ -1,15 +1,9 @@
-r"""A switch state in the form of the inner loop: by dense matrices, or by sparse admittances with the loads' tangent.
+"""A switch state in the form of the inner loop: sparse admittances with the loads' tangent.
 
-With the filters' admittances in Y, the network seen from the load branches (voltages V_b, currents I_b)
-and from the inverter terminals (voltages V_G, injections J) is
-
-.. math::
-    V_b = T_{bG} J + s_b - Z_{bb} I_b(V_b), \qquad  V_G = Z_{GG} J + s_G - Z_{Gb} I_b(V_b).
-
-Splitting the load law into its tangent at a point V_lin and the remainder, I_b = i_c + A V_b + B V_b^* + N(V_b), and
-solving for V_b gives x = P J + x_c - Q N(x) on real vectors x = [Re V_b; Im V_b]. N is of second order in the
-deviation from V_lin, so the fixed point converges by about two decades an iteration; the plain current
-injection gains less than one.
+With the filters' admittances in Y, the voltages of branches V_b follow from Y V + C I_b(V_b) = J + sources. Splitting
+the load law into its tangent at a point V_lin and the remainder, I_b = i_c + A V_b + B V_b^* + N(V_b), each iteration
+solves for V with the remainder of the last one. N is of second order in the deviation from V_lin, so the fixed point
+converges by about two decades an iteration; the plain current injection gains less than one.
 
 An island without a source rotates away from nominal, but loads do not depend on the angle (I_b rotates with V_b). So
 each such island is solved in a frame that rotates with its first GFM, and the tangent stays good for the whole run.
@@ -17,136 +11,94 @@ each such island is solved in a frame that rotates with its first GFM, and the t
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import SuperLU, splu
 
 from gridpeers.plant.dynamics.circuit import Circuit, LoadLaw
-from gridpeers.plant.dynamics.island_newton import ROUNDING, DenseIsland, solve_island
+from gridpeers.plant.dynamics.island_newton import ROUNDING, solve_island
 from gridpeers.plant.dynamics.kept_network import WEAK, BlockPattern, kept_network
 from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Integers, Real
 from gridpeers.plant.dynamics.kernel.network_arrays import COPY, Reduced, SparseMaps, factorise_blocks, solve_blocks
-from gridpeers.plant.dynamics.switch_state import SwitchState
-from gridpeers.plant.dynamics.threads import one_thread
+
+FLOATING = 1e-12
+"""Admittance to ground, relative to all of a node's, in an island that single-phase inverters alone feed: else phases
+without an inverter would have no determined voltage."""
+
+EARTHING = 1e3  # admittance (S) with which a GFM earths the neutral of an island that has lost its earth
+
+UNEARTHED = 0.03 / 50.0  # admittance (S) below which a neutral is not earthed: 50 V over 30 mA (IEC 60364-4-41)
+
+INSULATION = 1e-6  # admittance to earth (S) of all neutrals that nothing earths: their voltages must be determined
 
 
-class DenseReduction(SwitchState):
-    """A switch state as small dense matrices between load branches and inverter terminals."""
+class Reduction:
+    """A switch state: its islands, and its admittances with the inverters' filters, reduced to the nodes that matter.
 
-    @one_thread()
-    def __init__(self, circuit: Circuit, y_f: Complex, forming: Flags, online: Flags) -> None:
-        super().__init__(circuit, y_f, forming, online)
-        unknown, place, G, Y, C, held = self.unknown, self.place, self.terminals, self.Y, self.C, self.held
-        C_U = C.tocsr()[unknown].toarray()
-        C_S = C.tocsr()[circuit.sources].toarray()
-        E_G = np.zeros((unknown.size, G.size))
-        E_G[place[G[self.feeding]], self.feeding] = 1.0
-        Y_US = Y[unknown][:, circuit.sources].toarray()
+    `y_f`: filter admittance of each inverter (S per phase); `online`: the connected ones; the others are open.
 
-        if unknown.size:
-            right = np.hstack([E_G, C_U, -Y_US]).astype(complex)
-            columns = splu(Y[unknown][:, unknown].tocsc()).solve(right)
-        else:
-            columns = np.zeros((0, G.size + C_U.shape[1] + C_S.shape[0]), complex)
-        Z_G, Z_C, Z_S = np.split(columns, [G.size, G.size + C_U.shape[1]], axis=1)
-
-        seen = np.flatnonzero(place[G] >= 0)
-        turn = circuit.turn.T.ravel()
-        copies = np.flatnonzero(circuit.copies.T.ravel())
-
-        def at_terminals(of_unknown: Complex) -> Complex:
-            rows = np.zeros((G.size, of_unknown.shape[1]), complex)
-            rows[seen] = of_unknown[place[G[seen]]]
-            rows[copies] *= turn[copies, None]
-            return rows
-
-        self._columns = (Z_G, Z_C, Z_S)
-        self._T_bG, self.Z_bb, self._b_S = C_U.T @ Z_G, C_U.T @ Z_C, C_U.T @ Z_S + C_S.T
-        self._Z_GG, self._Z_Gb, self._G_S = at_terminals(Z_G), at_terminals(Z_C), at_terminals(Z_S)
-        for row, node in enumerate(G):
-            if held[node]:
-                self._G_S[row, np.flatnonzero(circuit.sources == node)[0]] = turn[row]
-
-    def solve_islands(self, J: Complex, source_voltage: Complex, guess: Complex) -> tuple[Complex, tuple[int, ...]]:
-        """Return branch voltages (V) by Newton's method, and the islands without solution, which keep the guess."""
-        at_branches, at_terminals = self.without_load(J, source_voltage)
-        V_b, failed = guess.copy(), []
-        for k in np.flatnonzero(self.live).tolist():
-            own = np.flatnonzero(self.branch_island == k)
-            rows = self.branches[own]
-            loads, nominal = self.circuit.loads.of(rows), self.circuit.V_branch[rows]
-            island = DenseIsland(self.Z_bb[np.ix_(own, own)], loads, nominal, at_branches[own])
-            solution = solve_island(island, guess[own])
-            if solution is None or not np.isfinite(at_terminals[np.tile(self.inverter_island == k, 3)]).all():
-                failed.append(k)
-            else:
-                V_b[own] = solution
-        return V_b, tuple(failed)
-
-    def without_load(self, J: Complex, source_voltage: Complex) -> tuple[Complex, Complex]:
-        """Return voltages (V) of branches and terminals from injections J (n_inv x 3, A) and sources (V), no load."""
-        s_b, s_G = self.source_parts(source_voltage)
-        return self._T_bG @ J.T.ravel() + s_b, self._Z_GG @ J.T.ravel() + s_G
-
-    def terminal_voltages(self, J: Complex, V_b: Complex, source_voltage: Complex) -> Complex:
-        """Return the terminal voltages (V), n_inv x 3, from injections J (A), branch and source voltages (V)."""
-        V_G: Complex = self.without_load(J, source_voltage)[1] - self._Z_Gb @ self.loads.currents(V_b)
-        return V_G.reshape(3, -1).T
-
-    def source_parts(self, source_voltage: Complex) -> tuple[Complex, Complex]:
-        return self._b_S @ source_voltage, self._G_S @ source_voltage
-
-    @one_thread()
-    def linearise(self, V_b: Complex, source_voltage: Complex, theta: Real) -> Reduced:
-        """Return the inner-loop arrays with the loads' tangent at branch voltages (V) and inverters' angles (rad)."""
-        net = self.at_tangent(V_b, theta)
-        s_b, s_G = self.source_parts(source_voltage)
-        m = V_b.size
-        M = np.eye(2 * m) + _linear(self.Z_bb * net.A) + _conjugate_linear(self.Z_bb * net.B)
-        M_inverse = np.linalg.inv(M)
-        return net._replace(
-            PT=np.ascontiguousarray((M_inverse @ _linear(self._T_bG)).T),
-            QT=np.ascontiguousarray((M_inverse @ _linear(self.Z_bb)).T),
-            x_c=M_inverse @ _stack(s_b - self.Z_bb @ net.i_c),
-            GGT=np.ascontiguousarray(_linear(self._Z_GG).T),
-            GBT=np.ascontiguousarray(_linear(self._Z_Gb).T),
-            s_G=_stack(s_G),
-        )
-
-    @one_thread()
-    def all_voltages(self, J: Complex, I_b: Complex, source_voltage: Complex) -> Complex:
-        V = np.zeros(self.circuit.Y.shape[0], complex)
-        Z_G, Z_C, Z_S = self._columns
-        V[self.unknown] = Z_G @ J.T.ravel() - Z_C @ I_b + Z_S @ source_voltage
-        V[self.circuit.sources] = source_voltage
-        return V
-
-
-def _linear(M: Complex) -> Real:
-    """Return the real form of V -> M V on [Re; Im]."""
-    return np.block([[M.real, -M.imag], [M.imag, M.real]])
-
-
-def _conjugate_linear(M: Complex) -> Real:
-    """Return the real form of V -> M V^* on [Re; Im]."""
-    return np.block([[M.real, M.imag], [M.imag, -M.real]])
-
-
-def _stack(V: Complex) -> Real:
-    return np.concatenate([V.real, V.imag])
-
-
-class SparseReduction(SwitchState):
-    """A switch state by its sparse admittances; what it offers is what `DenseReduction` offers."""
+    `unknown`: nodes in live islands, of any admittance, not held by a source; `place`: position of each node among
+    them, or -1; `earthing`: inverters that earth their neutral, because nothing else does in an island of theirs (IEC
+    60364-5-551).
+    """
 
     def __init__(self, circuit: Circuit, y_f: Complex, forming: Flags, online: Flags) -> None:
-        super().__init__(circuit, y_f, forming, online)
+        self.circuit = circuit
+        n_inv = circuit.terminals.shape[0]
+        n = circuit.Y.shape[0]
+        self.count, self.label = circuit.components()
+        self.inverter_island = self.label[circuit.terminals[:, 0]] if n_inv else np.zeros(0, np.int64)
+
+        fed = np.zeros(self.count, bool)
+        fed[self.label[circuit.sources]] = True
+        self.has_source = fed.copy()
+        fed[self.inverter_island[forming & online]] = True
+        self.live = fed  # whether each island has a source or a GFM
+        self.online = online & fed[self.inverter_island]  # inverters that are connected and in a live island
+        self.leader = np.full(self.count, -1, np.int64)
+        for i in reversed(range(n_inv)):
+            if forming[i] and self.online[i] and not self.has_source[self.inverter_island[i]]:
+                self.leader[self.inverter_island[i]] = i
+
+        used = np.diff(circuit.Y.indptr) > 0
+        used[circuit.terminals[self.online].ravel()] = True  # a lone inverter without load has only its filter
+        held = np.zeros(n, bool)
+        held[circuit.sources] = True
+        self.unknown = np.flatnonzero(fed[self.label] & ~held & used)
+        self.place = np.full(n, -1, np.int64)
+        self.place[self.unknown] = np.arange(self.unknown.size)
+
+        C = circuit.C.tocsc()
+        first = C.indices[C.indptr[:-1]] if C.shape[1] else np.zeros(0, np.int64)
+        self.branches = np.flatnonzero(fed[self.label[first]]) if C.shape[1] else first  # branches in live islands
+        self.branch_island = self.label[first[self.branches]]
+        self.loads = circuit.loads.of(self.branches)  # law of the live branches
+
+        G = circuit.terminals.T.ravel()  # of all A, then all B, then all C
+        injects = np.tile(self.online, 3) & ~circuit.copies.T.ravel()
+        y_diagonal = np.zeros(n, complex)
+        np.add.at(y_diagonal, G, np.where(injects, np.tile(y_f, 3), 0.0))
+        whole = np.bincount(self.label[circuit.sources], minlength=self.count) >= 3
+        whole[self.inverter_island[forming & self.online & ~circuit.copies[:, 1]]] = True
+        self.to_ground = np.zeros(n)  # admittance added at each node (S), so that nothing floats
+        if (on_few_phases := fed & ~whole).any():
+            self.to_ground = np.where(on_few_phases[self.label], FLOATING * np.abs(circuit.Y.diagonal()), 0.0)
+            y_diagonal += self.to_ground
+        self.Y = (circuit.Y + sp.diags_array(y_diagonal)).tocsr()
+        following = np.flatnonzero(np.tile(~forming & (circuit.returns < 0), 3) & injects)
+        no_earth = np.zeros(n, complex)
+        np.add.at(no_earth, G[following], np.tile(y_f, 3)[following])
+        formers = np.flatnonzero(forming & self.online & (circuit.returns >= 0))
+        self.earthing = tuple(self._earthing(formers, sp.csr_array(sp.diags_array(no_earth))))
+        self._insulate()
+        self.C = C[:, self.branches]
         self._kept = kept = kept_network(circuit, self.unknown, self.branches, self.C, self.to_ground)
         self._at, self._whole_at = (
             np.where(circuit.copies, COPY, of[circuit.terminals]) for of in (kept.place, self.place)
         )
-        self._feeds = np.zeros(len(circuit.terminals), bool)
-        self._feeds[self.feeding % max(self._feeds.size, 1)] = True
+        self._feeds = np.any((self._whole_at >= 0) & self.online[:, None], axis=1)
         self._filters = np.zeros(kept.nodes.size, complex)
         joined = (self._at >= 0) & self.online[:, None]
         np.add.at(self._filters, self._at[joined], np.broadcast_to(np.asarray(y_f)[:, None], joined.shape)[joined])
@@ -154,24 +106,76 @@ class SparseReduction(SwitchState):
         self.node_island = self.label[kept.nodes]
         self._lu: SuperLU | None = None
 
+    def __deepcopy__(self, memo: object) -> Reduction:
+        """Nothing in it is ever written: copies of a plant share it, as they share its circuit."""
+        return self
+
+    def _earthing(self, formers: Integers, no_earth: sp.csr_array) -> Iterator[int]:
+        """Earth each neutral of these inverters that nothing earths in an island without a source; yield who does.
+
+        A filter of `no_earth` earths nothing: a GFL injects its current whatever the voltage is.
+        """
+        circuit = self.circuit
+        for i in formers.tolist():
+            neutral, island = circuit.returns[i], self.inverter_island[i]
+            own = circuit.sources[self.label[circuit.sources] == island]
+            if self.place[neutral] < 0 or circuit.reference is None or (circuit.reference[own] < 0).any():
+                continue
+            earth = sp.csr_array(([EARTHING], ([neutral], [neutral])), shape=self.Y.shape)
+            earthed = self.Y - no_earth + earth
+            nodes = self.unknown[self.label[self.unknown] == island]
+            at = int(np.searchsorted(nodes, neutral))
+            unit = np.zeros(nodes.size, complex)
+            unit[at] = 1.0
+            seen = 1.0 / splu(sp.csc_matrix(earthed[nodes][:, nodes])).solve(unit)[at]
+            if abs(seen - EARTHING) < UNEARTHED:
+                self.to_ground[neutral] += EARTHING
+                self.Y = self.Y + earth
+                yield i
+
+    def _insulate(self) -> None:
+        """Give the neutrals that nothing earths the admittance of their insulation."""
+        neutrals = self.circuit.neutrals[self.place[self.circuit.neutrals] >= 0]
+        if not neutrals.size:
+            return
+        leak = np.zeros(self.place.size)
+        leak[neutrals] = INSULATION / neutrals.size
+        insulated = (self.Y + sp.diags_array(leak)).tocsr()
+        # with these currents a neutral that nothing earths rises to 1 V, an earthed one hardly
+        rise = splu(sp.csc_array(insulated[self.unknown][:, self.unknown])).solve(leak[self.unknown].astype(complex))
+        floats = neutrals[np.abs(rise[self.place[neutrals]]) > 0.9]
+        if floats.size:
+            leak[np.setdiff1d(neutrals, floats)] = 0.0
+            self.to_ground += leak
+            self.Y = (self.Y + sp.diags_array(leak)).tocsr()
+
     def linearise(self, V_b: Complex, source_voltage: Complex, theta: Real) -> Reduced:
-        net = self.at_tangent(V_b, theta)
-        kept = self._kept
+        """Return the inner loop's arrays with the loads' tangent at branch voltages (V) and inverters' angles (rad)."""
+        kept, loads = self._kept, self.loads
+        A, B = loads.tangent(V_b)
+        i_c = loads.currents(V_b) - A * V_b - B * np.conj(V_b)
         from_sources = kept.C_S.T @ source_voltage
-        drawn = net.i_c + net.A * from_sources + net.B * np.conj(from_sources)
+        drawn = i_c + A * from_sources + B * np.conj(from_sources)
         constant = -(kept.Y_S @ source_voltage) - kept.C @ drawn
-        if not constant.size:
-            return self._without_unknowns(net, from_sources, source_voltage)
-        pattern, matrix = kept.pattern, kept.pattern.matrix(net.A, net.B, self._filters)
+        pattern, matrix = kept.pattern, kept.pattern.matrix(A, B, self._filters)
         factorise_blocks(matrix)
-        return net._replace(
+        return Reduced(
+            S=loads.S,
+            I0=loads.I0,
+            limited_at=loads.limited_at,
+            law=loads.law,
+            i_c=i_c,
+            A=A,
+            B=B,
+            branch_island=self.branch_island,
+            inverter_island=self.inverter_island,
+            leader=self.leader,
+            theta_lin=np.array([theta[k] if k >= 0 else 0.0 for k in self.leader]),
             sparse=SparseMaps(
                 factored=matrix,
                 constant=_interleaved(constant),
-                first=pattern.first,
-                second=pattern.second,
-                a_first=pattern.a_first,
-                a_second=pattern.a_second,
+                ends=pattern.ends,
+                ratios=pattern.ratios,
                 from_sources=from_sources,
                 terminals=self._at,
                 fixed=self._held_voltages(source_voltage),
@@ -179,21 +183,12 @@ class SparseReduction(SwitchState):
                 scratch=np.empty(4 * constant.size),
                 increments=np.zeros((4, 2 * V_b.size)),
                 rate=np.array([1.0, 1.0 / np.min(np.abs(V_b), initial=np.inf)]),
-            )
+            ),
         )
 
-    def _without_unknowns(self, net: Reduced, from_sources: Complex, source_voltage: Complex) -> Reduced:
-        """Return the arrays where nothing is live but what a source holds: the kernel takes the dense ones then."""
-        m, n = 2 * from_sources.size, 2 * self.terminals.size
-        held = (self.circuit.turn * self._held_voltages(source_voltage)).T.ravel()
-        return net._replace(
-            PT=np.zeros((n, m)),
-            QT=np.zeros((m, m)),
-            x_c=np.concatenate([from_sources.real, from_sources.imag]),
-            GGT=np.zeros((n, n)),
-            GBT=np.zeros((m, n)),
-            s_G=np.concatenate([held.real, held.imag]),
-        )
+    def node_voltages(self, J: Complex, V_b: Complex, source_voltage: Complex) -> Complex:
+        """Return every node's voltage (V), 0 in dead islands, from injections (A), branch and source voltages (V)."""
+        return self.all_voltages(J, self.loads.currents(V_b), source_voltage)
 
     def solve_islands(self, J: Complex, source_voltage: Complex, guess: Complex) -> tuple[Complex, tuple[int, ...]]:
         V_b, failed, C = guess.copy(), [], self._kept.C
@@ -281,15 +276,3 @@ class SparseIsland:
 
 def _interleaved(V: Complex) -> Real:
     return np.ascontiguousarray(V, complex).view(float)
-
-
-Reduction = DenseReduction | SparseReduction
-
-MOST_DENSE = 30  # load branches up to which dense matrices are faster: their cost grows with the square of it
-
-
-def reduce_network(circuit: Circuit, y_f: Complex, forming: Flags, online: Flags) -> Reduction:
-    """Return a switch state as it is solved: sparse with many loads, and with a neutral, for small differences."""
-    if circuit.two_ended and (circuit.loads.S.size > MOST_DENSE or circuit.neutrals.size):
-        return SparseReduction(circuit, y_f, forming, online)
-    return DenseReduction(circuit, y_f, forming, online)

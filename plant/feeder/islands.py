@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 
 from gridpeers.plant.dynamics import Dynamics, PlantError, Trip
 from gridpeers.plant.dynamics.kernel.compiled import Flags
-from gridpeers.plant.dynamics.switch_state import SwitchState
+from gridpeers.plant.dynamics.reduction import Reduction
 from gridpeers.plant.equipment.imported_equipment import is_behind
 from gridpeers.plant.known_names import SUBSTATION
 from gridpeers.plant.network import Network
@@ -26,19 +26,19 @@ class Islands:
         self._network = network
         self._inverters = tuple(unit.name for unit in network.inverters)
         self._dead: list[str] = []
-        self._named: tuple[SwitchState, tuple[list[str], list[bool]]] | None = None  # the last `names`
+        self._named: tuple[Reduction, tuple[list[str], list[bool]]] | None = None  # the last `names`
         self._reported: dict[str, str] = {}  # last reported text of each island
 
     def change_loads(self, network: Network) -> None:
         self._network = network
 
-    def names(self, reduction: SwitchState) -> tuple[list[str], list[bool]]:
+    def names(self, reduction: Reduction) -> tuple[list[str], list[bool]]:
         """Return each inverter's island (`GRID`, or the first inverter's name) and whether the substation feeds it."""
         if self._named is None or self._named[0] is not reduction:
             self._named = reduction, self._names(reduction)
         return self._named[1]
 
-    def _names(self, reduction: SwitchState) -> tuple[list[str], list[bool]]:
+    def _names(self, reduction: Reduction) -> tuple[list[str], list[bool]]:
         label = reduction.inverter_island.tolist()
         fed = [bool(reduction.has_source[k]) for k in label]
         first: dict[int, str] = {}
@@ -46,7 +46,7 @@ class Islands:
             first.setdefault(k, GRID if sourced else name)
         return [first[k] for k in label], fed
 
-    def report(self, t: float, closed: frozenset[str], reduction: SwitchState) -> list[PlantEvent]:
+    def report(self, t: float, closed: frozenset[str], reduction: Reduction) -> list[PlantEvent]:
         """Return the events at t (s) of changed islands and newly de-energised buses, with these switches closed."""
         names, _ = self.names(reduction)
         texts = {}
@@ -66,7 +66,7 @@ class Islands:
         self._reported = texts
         return events + self.report_dead(t, closed, reduction)
 
-    def report_dead(self, t: float, closed: frozenset[str], reduction: SwitchState) -> list[PlantEvent]:
+    def report_dead(self, t: float, closed: frozenset[str], reduction: Reduction) -> list[PlantEvent]:
         """Return the event at t (s) of newly de-energised buses, with their inverters and loads."""
         before = set(self._dead)
         self._dead = self._dead_buses(closed, reduction.live[reduction.label])

@@ -127,24 +127,3 @@ def heun(x0: float, d1: float, d: float, h: float, second: bool) -> float:
     if second:
         return x0 + 0.5 * h * (d1 + d)
     return x0 + h * d
-
-
-@compiled
-def multiply_add(AT: Real, x: Real, sign: float, y: Real) -> None:
-    """Add sign * A x to y, A given transposed, in an order that depends on nothing but the sizes, as BLAS may not.
-
-    Rows of AT run along y, so the inner loop vectorises without reordering a sum; four at a time spare traffic on y.
-    """
-    rows, n = AT.shape
-    whole = rows - rows % 4
-    for j in range(0, whole, 4):
-        x0 = sign * x[j]
-        x1 = sign * x[j + 1]
-        x2 = sign * x[j + 2]
-        x3 = sign * x[j + 3]
-        for i in range(n):
-            y[i] += (AT[j, i] * x0 + AT[j + 1, i] * x1) + (AT[j + 2, i] * x2 + AT[j + 3, i] * x3)
-    for j in range(whole, rows):
-        xj = sign * x[j]
-        for i in range(n):
-            y[i] += AT[j, i] * xj

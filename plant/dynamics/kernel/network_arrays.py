@@ -1,6 +1,6 @@
-"""A network in the inner loop, by dense matrices or by sparse factors; what of the latter is compiled.
+"""A network in the inner loop, by sparse factors.
 
-The sparse matrix has blocks of 2 x 2, a node's real and imaginary part: the real form of a reactance alone has a
+The matrix has blocks of 2 x 2, a node's real and imaginary part: the real form of a reactance alone has a
 diagonal of zeros, but its blocks are regular. Blocks are (a, b, c, d) for [[a, b], [c, d]].
 """
 
@@ -24,36 +24,33 @@ class BlockFactors(NamedTuple):
 
 
 @compiled
-def add_tangent(
-    f: BlockFactors,
-    first: Integers,
-    second: Integers,
-    across: Integers,
-    a_first: Real,
-    a_second: Real,
-    A: Complex,
-    B: Complex,
-) -> None:
+def add_tangent(f: BlockFactors, ends: Integers, ratios: Real, across: Integers, A: Complex, B: Complex) -> None:
     """Add what branches draw, A V + B V^* (A), to a matrix before it is factored.
 
-    `across`: entry that couples a branch's two nodes, or -1; the others as in `SparseMaps` and `Reduced`.
+    `across`: entries that couple a branch's nodes, pair by pair, or -1; the others as in `SparseMaps` and `Reduced`.
     """
-    for b in range(first.size):
+    m, most = ends.shape
+    for b in range(m):
         p, q, r, s = A[b].real + B[b].real, B[b].imag - A[b].imag, A[b].imag + B[b].imag, A[b].real - B[b].real
-        for node, ratio in ((first[b], a_first[b]), (second[b], a_second[b])):
+        pair = 0
+        for e in range(most):
+            node = ends[b, e]
             if node >= 0:
-                square = ratio * ratio
+                square = ratios[b, e] * ratios[b, e]
                 f.D[node, 0] += square * p
                 f.D[node, 1] += square * q
                 f.D[node, 2] += square * r
                 f.D[node, 3] += square * s
-        if across[b] >= 0:
-            product = a_first[b] * a_second[b]
-            for entry in (f.L[across[b]], f.U[across[b]]):
-                entry[0] += product * p
-                entry[1] += product * q
-                entry[2] += product * r
-                entry[3] += product * s
+            for other in range(e + 1, most):
+                at = across[b, pair]
+                pair += 1
+                if at >= 0:
+                    product = ratios[b, e] * ratios[b, other]
+                    for entry in (f.L[at], f.U[at]):
+                        entry[0] += product * p
+                        entry[1] += product * q
+                        entry[2] += product * r
+                        entry[3] += product * s
 
 
 @compiled
@@ -127,10 +124,8 @@ class SparseMaps(NamedTuple):
 
     factored: BlockFactors  # of the admittances and the loads' tangent
     constant: Real  # right-hand side (A) without injections: sources, and the constant part of the tangent
-    first: Integers  # position of the node at each branch's beginning, or -1: at a source
-    second: Integers  # the same at its end, or -1: ground, or a source
-    a_first: Real  # ratio with which the first node's voltage counts in the branch's
-    a_second: Real  # the same for the second
+    ends: Integers  # positions of each branch's nodes, or -1: ground, or a source
+    ratios: Real  # ratios with which their voltages count in the branch's
     from_sources: Complex  # part of each branch's voltage that the ideal sources give (V)
     terminals: Integers  # positions of terminals, n_inv x 3, or -1; `COPY` of an inverter's first terminal
     fixed: Complex  # voltages (V) of the terminals that have no position: a source's, or 0
@@ -142,32 +137,19 @@ class SparseMaps(NamedTuple):
     the branch voltages (1/V), for it is proportional to their distance from the tangent's."""
 
 
-_NOTHING, _NOWHERE, _NO_PHASOR = np.zeros(0), np.zeros(0, np.int64), np.zeros(0, np.complex128)
-
-NO_MAPS = SparseMaps(
-    BlockFactors(np.zeros(1, np.int64), _NOWHERE, *(np.zeros((0, 4)) for _ in range(3))),
-    *(_NOTHING, _NOWHERE, _NOWHERE, _NOTHING, _NOTHING, _NO_PHASOR),
-    *(np.zeros((0, 3), np.int64), np.zeros((0, 3), np.complex128), np.zeros(0, np.bool_)),
-    *(_NOTHING, np.zeros((4, 0)), _NOTHING),
-)
-
-
 @compiled
 def branch_voltages(maps: SparseMaps, V: Real, x: Real) -> float:
     """Write [Re V_b; Im V_b] of the branches (V) from the nodes' voltages; return the largest change (V)."""
-    first, second, a_first, a_second = maps.first, maps.second, maps.a_first, maps.a_second
-    from_sources = maps.from_sources
-    m = first.size
+    ends, ratios, from_sources = maps.ends, maps.ratios, maps.from_sources
+    m, most = ends.shape
     change = 0.0
     for b in range(m):
         re, im = from_sources[b].real, from_sources[b].imag
-        i, j = 2 * first[b], 2 * second[b]
-        if i >= 0:
-            re += a_first[b] * V[i]
-            im += a_first[b] * V[i + 1]
-        if j >= 0:
-            re += a_second[b] * V[j]
-            im += a_second[b] * V[j + 1]
+        for e in range(most):
+            i = 2 * ends[b, e]
+            if i >= 0:
+                re += ratios[b, e] * V[i]
+                im += ratios[b, e] * V[i + 1]
         change = max(change, abs(re - x[b]), abs(im - x[m + b]))
         x[b], x[m + b] = re, im
     return change
@@ -176,21 +158,19 @@ def branch_voltages(maps: SparseMaps, V: Real, x: Real) -> float:
 @compiled
 def draw_remainders(maps: SparseMaps, I_b: Complex, i_c: Complex, A: Complex, B: Complex, x: Real, right: Real) -> None:
     """Take what branches draw (A) beyond the tangent at x = [Re V_b; Im V_b] from the currents into their nodes."""
-    first, second, a_first, a_second = maps.first, maps.second, maps.a_first, maps.a_second
-    m = first.size
+    ends, ratios = maps.ends, maps.ratios
+    m, most = ends.shape
     for b in range(m):
         re, im = x[b], x[m + b]
         p, q = A[b].real + B[b].real, B[b].imag - A[b].imag
         r, s = A[b].imag + B[b].imag, A[b].real - B[b].real
         drawn_re = I_b[b].real - i_c[b].real - (p * re + q * im)
         drawn_im = I_b[b].imag - i_c[b].imag - (r * re + s * im)
-        i, j = 2 * first[b], 2 * second[b]
-        if i >= 0:
-            right[i] -= a_first[b] * drawn_re
-            right[i + 1] -= a_first[b] * drawn_im
-        if j >= 0:
-            right[j] -= a_second[b] * drawn_re
-            right[j + 1] -= a_second[b] * drawn_im
+        for e in range(most):
+            i = 2 * ends[b, e]
+            if i >= 0:
+                right[i] -= ratios[b, e] * drawn_re
+                right[i + 1] -= ratios[b, e] * drawn_im
 
 
 @compiled
@@ -209,11 +189,8 @@ def note_increment(maps: SparseMaps, x_0: Real, x: Real) -> None:
         increments[3, i] = x[i] - x_0[i]
 
 
-NO_MATRIX, NO_VECTOR = np.zeros((0, 0)), _NOTHING
-
-
 class Reduced(NamedTuple):
-    """A network at a tangent of its loads; real matrices act on [Re; Im] and are stored transposed, rows contiguous."""
+    """A network at a tangent of its loads."""
 
     S: Complex  # constant power of the live branches (VA)
     I0: Complex  # constant current of the live branches (A)
@@ -226,10 +203,4 @@ class Reduced(NamedTuple):
     inverter_island: Integers  # island of each inverter
     leader: Integers  # inverter whose angle sets each island's frame; -1: it does not rotate
     theta_lin: Real  # that inverter's angle at the point of linearisation (rad)
-    PT: Real = NO_MATRIX  # J to x, (6 n_inv) x (2 m)
-    QT: Real = NO_MATRIX  # N to x, (2 m) x (2 m)
-    x_c: Real = NO_VECTOR  # constant part of x, 2 m (V)
-    GGT: Real = NO_MATRIX  # J to V_G, (6 n_inv) x (6 n_inv)
-    GBT: Real = NO_MATRIX  # I_b to V_G, (2 m) x (6 n_inv)
-    s_G: Real = NO_VECTOR  # constant part of V_G, 6 n_inv (V)
-    sparse: SparseMaps = NO_MAPS  # sparse factors in place of the dense matrices
+    sparse: SparseMaps

@@ -70,7 +70,6 @@ def solve_together(
     x: Real,
     I_b: Complex,
     tolerance: float,
-    work: Real,
     readings: Real,
 ) -> int:
     """Solve network and inverters at the present states; returns the iterations, or -1.
@@ -89,7 +88,7 @@ def solve_together(
     for count in range(MAX_ROUNDS):
         used[:] = J
         reach = max(tolerance, LOOSE * largest * forward.V_b)
-        iterations = solve_within_limits(net, units, rotation, x, I_b, reach, work)
+        iterations = solve_within_limits(net, units, rotation, x, I_b, reach)
         if iterations < 0:
             return -1
         total += iterations if count == 0 else iterations - 1
@@ -137,7 +136,6 @@ def run_second_order_steps(
     if steps == 0:
         return total
     n, m = units.J.shape[0], net.S.size
-    work = np.empty(12 * n + 6 * m)
     I_b = np.empty(m, np.complex128)
     x_0, J_0 = np.empty_like(x), np.empty_like(units.J)
     rotation = np.empty(net.leader.size, np.complex128)
@@ -153,7 +151,7 @@ def run_second_order_steps(
         if solution > 0:
             extrapolate(net.sparse, x)
         turn_frames(units, net, theta, rotation)
-        iterations = solve_together(net, present, forward, rotation, x, I_b, tolerance, work, readings)
+        iterations = solve_together(net, present, forward, rotation, x, I_b, tolerance, readings)
         if iterations < 0:
             x[:] = x_0
             units.J[:] = J_0

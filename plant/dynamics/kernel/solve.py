@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from gridpeers.plant.dynamics.kernel.compiled import A120, Complex, Flags, Integers, Real, compiled, multiply_add
+from gridpeers.plant.dynamics.kernel.compiled import A120, Complex, Flags, Integers, Real, compiled
 from gridpeers.plant.dynamics.kernel.network_arrays import COPY, branch_voltages, draw_remainders, solve_blocks
 
 COLUMNS = ("P", "Q", "V_nom", "n_p", "n_q", "V_low", "V_min", "V_max", "edge", "V_off", "V_off_above")
@@ -106,13 +106,12 @@ def load_currents(S: Complex, I0: Complex, limited_at: Integers, law: Real, x: R
 
 
 @compiled
-def remainder(current: complex, V_b: complex, i_c: complex, A: complex, B: complex) -> complex:
-    return current - i_c - A * V_b - B * V_b.conjugate()
+def solve_network(net: Any, J: Complex, rotation: Complex, x: Real, I_b: Complex, V: Complex, tolerance: float) -> int:
+    """Solve for the terminal voltages; returns the iterations, or -1 if there is no finite solution to the tolerance.
 
-
-@compiled
-def solve_sparse(net: Any, J: Complex, rotation: Complex, x: Real, I_b: Complex, V: Complex, tolerance: float) -> int:
-    """Solve as `solve_network` does, with the factors of a sparse matrix."""
+    `rotation`: exp(-j angle) into each island's frame; `x`, `I_b`: branch voltages (V) and currents (A) in it: first
+    guess, then solution; `tolerance`: largest change of a branch voltage in the last iteration (V).
+    """
     maps = net.sparse
     n, u = J.shape[0], maps.constant.size
     right, base = maps.scratch[:u], maps.scratch[u:]
@@ -157,71 +156,6 @@ def solve_sparse(net: Any, J: Complex, rotation: Complex, x: Real, I_b: Complex,
     return iterations if np.isfinite(size) else -1
 
 
-@compiled
-def solve_network(
-    net: Any, J: Complex, rotation: Complex, x: Real, I_b: Complex, V: Complex, tolerance: float, work: Real
-) -> int:
-    """Solve for the terminal voltages; returns the iterations, or -1 if there is no finite solution to the tolerance.
-
-    `rotation`: exp(-j angle) into each island's frame; `x`, `I_b`: branch voltages (V) and currents (A) in it: first
-    guess, then solution; `tolerance`: largest change of a branch voltage in the last iteration (V); `work`: room for 12
-    n_inv + 6 m numbers.
-    """
-    if net.sparse.constant.size:
-        return solve_sparse(net, J, rotation, x, I_b, V, tolerance)
-    n = J.shape[0]
-    m = net.S.size
-    n3, m2 = 3 * n, 2 * m
-    j, base, trial, rest, V_G = (
-        work[: 2 * n3],
-        work[2 * n3 : 2 * n3 + m2],
-        work[2 * n3 + m2 : 2 * n3 + 2 * m2],
-        work[2 * n3 + 2 * m2 : 2 * n3 + 3 * m2],
-        work[2 * n3 + 3 * m2 : 4 * n3 + 3 * m2],
-    )
-    for i in range(n):
-        turn = rotation[net.inverter_island[i]]
-        for phase in range(3):
-            turned = J[i, phase] * turn
-            j[phase * n + i], j[n3 + phase * n + i] = turned.real, turned.imag
-
-    base[:] = net.x_c
-    multiply_add(net.PT, j, 1.0, base)
-    iterations = 0
-    while m > 0:
-        iterations += 1
-        load_currents(net.S, net.I0, net.limited_at, net.law, x, I_b)
-        for b in range(m):
-            N = remainder(I_b[b], complex(x[b], x[m + b]), net.i_c[b], net.A[b], net.B[b])
-            rest[b], rest[m + b] = N.real, N.imag
-        trial[:] = base
-        multiply_add(net.QT, rest, -1.0, trial)
-        change = 0.0
-        for b in range(m2):
-            change = max(change, abs(trial[b] - x[b]))
-            x[b] = trial[b]
-        if change <= tolerance:
-            break
-        if iterations >= MAX_ITERATIONS or not change < 1e12:
-            return -1
-
-    V_G[:] = net.s_G
-    multiply_add(net.GGT, j, 1.0, V_G)
-    if m > 0:
-        load_currents(net.S, net.I0, net.limited_at, net.law, x, I_b)
-        for b in range(m):
-            rest[b], rest[m + b] = I_b[b].real, I_b[b].imag
-        multiply_add(net.GBT, rest, -1.0, V_G)
-    size = 0.0
-    for i in range(n):
-        back = rotation[net.inverter_island[i]].conjugate()
-        for phase in range(3):
-            V[i, phase] = complex(V_G[phase * n + i], V_G[n3 + phase * n + i]) * back
-            size += abs(V_G[phase * n + i]) + abs(V_G[n3 + phase * n + i])
-    # not a number is no change either: the loop above takes it for converged
-    return iterations if np.isfinite(size) else -1
-
-
 EXACT, SETTLED = 1e-13, 1e-11
 """Largest change of an injection (pu of its rated current) at which to end: at once, and after `PATIENCE`."""
 
@@ -253,11 +187,10 @@ def settle_powers(
     (A); `delivers`: inverters whose injection is to be found; `balanced`: those of equal powers.
     """
     n = J.shape[0]
-    work = np.empty(12 * n + 6 * net.S.size)
     still = np.ones(net.leader.size, np.complex128)
     change = 0.0
     for rounds in range(1, most + 1):
-        if solve_network(net, J, still, x, I_b, V, tolerance, work) < 0:
+        if solve_network(net, J, still, x, I_b, V, tolerance) < 0:
             return NO_NETWORK, change
         if rounds > 1 and (change < EXACT or (rounds > PATIENCE and change < SETTLED)):
             return rounds, change

@@ -43,11 +43,11 @@ def limit_currents(gfm: Any, gfm_at: Integers, online: Flags, J: Complex, V: Com
 
 
 @compiled
-def solve_on(net: Any, units: Any, rotation: Complex, x: Real, I_b: Complex, tolerance: float, work: Real) -> int:
+def solve_on(net: Any, units: Any, rotation: Complex, x: Real, I_b: Complex, tolerance: float) -> int:
     """Solve until no phase is beyond its limit, after one was; return the iterations, or -1 as `solve_network`."""
     total = 0
     for _ in range(MAX_LIMITING):
-        iterations = solve_network(net, units.J, rotation, x, I_b, units.V, tolerance, work)
+        iterations = solve_network(net, units.J, rotation, x, I_b, units.V, tolerance)
         if iterations < 0:
             return -1
         total += iterations
@@ -58,13 +58,11 @@ def solve_on(net: Any, units: Any, rotation: Complex, x: Real, I_b: Complex, tol
 
 
 @compiled
-def solve_within_limits(
-    net: Any, units: Any, rotation: Complex, x: Real, I_b: Complex, tolerance: float, work: Real
-) -> int:
+def solve_within_limits(net: Any, units: Any, rotation: Complex, x: Real, I_b: Complex, tolerance: float) -> int:
     """Solve the network with every phase within its limit; `step` has these lines in its loop, which is faster."""
     units.limiting[:] = False
     limit_currents(units.gfm, units.gfm_at, units.online, units.J, units.V, units.limiting)
-    return solve_on(net, units, rotation, x, I_b, tolerance, work)
+    return solve_on(net, units, rotation, x, I_b, tolerance)
 
 
 FAILURES = 3
@@ -81,7 +79,6 @@ def run_steps(begin: int, steps: int, h: float, tolerance: float, net: Any, unit
     and V of the second solution.
     """
     n, m = units.J.shape[0], net.S.size
-    work = np.empty(12 * n + 6 * m)
     I_b = np.empty(m, np.complex128)
     x_0 = np.empty_like(x)
     rotation = np.empty(net.leader.size, np.complex128)
@@ -97,11 +94,11 @@ def run_steps(begin: int, steps: int, h: float, tolerance: float, net: Any, unit
         extrapolate(net.sparse, x)
         units.limiting[:] = False
         limit_currents(units.gfm, units.gfm_at, units.online, units.J, units.V, units.limiting)
-        iterations = solve_network(net, units.J, rotation, x, I_b, units.V, tolerance, work)
+        iterations = solve_network(net, units.J, rotation, x, I_b, units.V, tolerance)
         if iterations >= 0:
             surplus = limit_currents(units.gfm, units.gfm_at, units.online, units.J, units.V, units.limiting)
             if surplus > tolerance:
-                more = solve_on(net, units, rotation, x, I_b, tolerance, work)
+                more = solve_on(net, units, rotation, x, I_b, tolerance)
                 iterations = iterations + more if more >= 0 else -1
         if iterations < 0:
             x[:] = x_0

@@ -9,7 +9,7 @@ import pytest
 import scipy.sparse as sp
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from gridpeers.plant.dynamics import Circuit, Dynamics, island_parts, reduction, threads
+from gridpeers.plant.dynamics import Circuit, Dynamics, island_parts, threads
 from gridpeers.plant.dynamics.circuit import LoadLaw
 from gridpeers.plant.dynamics.kernel.compiled import Real
 from gridpeers.plant.dynamics.threads import one_thread
@@ -51,11 +51,6 @@ def readings(dynamics: Dynamics) -> Real:
         dynamics.inverters.set_points[:, 0] = 0.2 + 0.01 * np.arange(len(dynamics.inverters)) * (k + 1)
         rows.append(dynamics.run(50))
     return np.concatenate(rows)
-
-
-@pytest.fixture(autouse=True)
-def _sparse(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reduction, "MOST_DENSE", 0)
 
 
 @pytest.mark.parametrize("PART", [6, 10])

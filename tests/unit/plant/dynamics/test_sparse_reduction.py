@@ -1,4 +1,4 @@
-"""The reduction by sparse factors: nodes taken out, blocks factored, the same numbers as by dense matrices."""
+"""The reduction by sparse factors: nodes taken out, blocks factored."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from gridpeers.plant.dynamics import power_flow_at_rest, reduction
+from gridpeers.plant.dynamics import power_flow_at_rest
 from gridpeers.plant.dynamics.kept_network import BlockPattern, eliminated, elimination_order
 from gridpeers.plant.dynamics.kernel.network_arrays import factorise_blocks, solve_blocks
 from gridpeers.plant.dynamics.kernel.solve import NO_NETWORK
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.network import Network
-from gridpeers.plant.plant_config import Method, PlantSettings, SwitchEvent
+from gridpeers.plant.plant_config import PlantSettings, SwitchEvent
 from gridpeers.plant.tables import read_feeder
 
 EVENTS = (
@@ -22,26 +22,17 @@ EVENTS = (
 )
 
 
-def rows(
-    monkeypatch: pytest.MonkeyPatch, most_dense: int, method: Method
-) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    """Return what is recorded of the microgrid feeder through its switchings, solved in one form."""
-    monkeypatch.setattr(reduction, "MOST_DENSE", most_dense)
-    plant = Plant(Network(read_feeder("microgrid123")), PlantSettings(events=EVENTS, method=method), 0.02, 0.02)
+def rows() -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    """Return what is recorded of the microgrid feeder through its switchings."""
+    plant = Plant(Network(read_feeder("microgrid123")), PlantSettings(events=EVENTS), 0.02, 0.02)
     for _ in range(40):
         plant.advance()
     return np.array(plant.take_rows())
 
 
-@pytest.mark.parametrize("method", ["first-order", "second-order"])
-def test_both_forms_give_the_same_run(monkeypatch: pytest.MonkeyPatch, method: Method) -> None:
-    """Frequency, powers and voltages through islanding, load loss and reclosing differ by rounding alone."""
-    np.testing.assert_allclose(rows(monkeypatch, 0, method), rows(monkeypatch, 10_000, method), rtol=1e-9, atol=1e-3)
-
-
 def test_a_start_to_which_the_tangent_does_not_lead_is_found_by_newton(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the frozen tangent fails, e.g. across a limit of the loads' law, the operating point is the same."""
-    plain, failures = rows(monkeypatch, 0, "first-order"), iter([True, False] * 3)
+    plain, failures = rows(), iter([True, False] * 3)
     settle = power_flow_at_rest.settle_powers
     monkeypatch.setattr(
         power_flow_at_rest,
@@ -49,7 +40,7 @@ def test_a_start_to_which_the_tangent_does_not_lead_is_found_by_newton(monkeypat
         lambda *words: (NO_NETWORK, 0.0) if next(failures, False) else settle(*words),
     )
 
-    np.testing.assert_allclose(rows(monkeypatch, 0, "first-order"), plain, rtol=1e-9, atol=1e-3)
+    np.testing.assert_allclose(rows(), plain, rtol=1e-9, atol=1e-3)
     assert not next(failures, False)
 
 

@@ -10,7 +10,7 @@ import pytest
 from msgspec.structs import replace
 
 from gridpeers.plant.dynamics import PlantError
-from gridpeers.plant.dynamics.reduction import DenseReduction
+from gridpeers.plant.dynamics.reduction import Reduction
 from gridpeers.plant.equipment import InverterRow, Load, Regulator, Switch
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.feeder.circuits import Circuits
@@ -21,10 +21,10 @@ from gridpeers.plant.tables import read_feeder
 from tests.unit.plant.networks import PAPER_ISLANDS, feeder, opened, three_phase_bus
 
 
-def reduced(network: Network, closed: frozenset[str], *, off: tuple[str, ...] = ()) -> DenseReduction:
+def reduced(network: Network, closed: frozenset[str], *, off: tuple[str, ...] = ()) -> Reduction:
     """The reduction of a switch state, with some inverters disconnected."""
     units = network.inverters
-    return DenseReduction(
+    return Reduction(
         Circuits(network).of(closed),
         np.full(len(units), 0.1 - 1.0j),
         np.array([unit.kind == "GFM" for unit in units]),

@@ -160,14 +160,14 @@ def test_switches_and_loads_of_one_step_change_at_once() -> None:
 def test_networks_of_scheduled_loads_are_factored_before_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
     """In wall-clock time an event must not make its step late."""
     factored: list[int] = []
-    real = live_network.reduce_network
+    real = live_network.Reduction
 
     def counted(*arguments: Any) -> Any:
         factored.append(p.tick)
         return real(*arguments)
 
     p = plant("microgrid123", ISLANDED, loads=(*every_load(0.04, 0.9), *every_load(0.08, 1.0)))
-    monkeypatch.setattr(live_network, "reduce_network", counted)
+    monkeypatch.setattr(live_network, "Reduction", counted)
     run(p, 0.1)
     assert factored == []
     p.set_load("48", LoadSetting(factor=2.0))
