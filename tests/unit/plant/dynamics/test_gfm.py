@@ -98,22 +98,6 @@ def test_power_step_on_a_stiff_bus() -> None:
     assert p.max() < 0.3003
 
 
-def test_the_default_filter_is_critically_damped() -> None:
-    """Row 8: with the default filter the P-f loop has the poles -50 +- j1.5 1/s."""
-    plant = on_stiff_bus(GFM_D, h=0.0002)
-    plant.inverters.set_points[0, 0] = 0.001
-
-    filtered = []
-    for _ in range(300):
-        plant.run(5)
-        filtered.append(float(plant.inverters.gfm_state["p"][0]) / 0.001)
-    t = 0.001 * np.arange(1, 301)
-    a, b = 50.0, 1.5
-    expected = 1.0 - np.exp(-a * t) * (np.cos(b * t) + a / b * np.sin(b * t))
-
-    assert np.abs(np.array(filtered) - expected).max() < 0.02
-
-
 def test_two_gfm_share_by_their_set_points() -> None:
     """Row 9: equal droops split what set-points leave over equally."""
     plant = pair(GFM_A, GFM_A, 1.8)

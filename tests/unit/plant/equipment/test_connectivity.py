@@ -81,15 +81,6 @@ def test_copies_have_the_voltages_of_the_one(tmp_path: Path) -> None:
     assert len(three.inverters) == 27
 
 
-def test_imported_feeders_can_be_copied(tmp_path: Path) -> None:
-    """Elements by their admittance are copied as lines are."""
-    pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")
-    one = Feeder.from_opendss(Path(__file__).parents[3] / "feeders" / "ieee13.dss")
-    two = Feeder.read(joined_copies(one, 2, "671").save(tmp_path / "two"))
-
-    assert len(two.solve()) == 2 * len(one.solve()) + 3
-
-
 @pytest.mark.parametrize(
     ("copies", "joint", "text"),
     [

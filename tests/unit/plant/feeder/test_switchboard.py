@@ -172,16 +172,6 @@ def test_the_same_unit_behind_a_grounded_winding_starts(tmp_path: Path) -> None:
     Plant(Network(scaled(tmp_path, GROUNDED, GENERATOR, 1.0)), PlantSettings(), 0.02, 0.02)
 
 
-def test_loads_that_are_too_much_together_are_not_named(tmp_path: Path) -> None:
-    """Fifteen loads of 60 kW, each of which the transformer can feed alone, are more than it can carry."""
-    many = "\n".join(f"New Load.l{k} bus1=d phases=3 kv=0.48 kw=20 kvar=10 vminpu=0.1 vlowpu=0.05" for k in range(30))
-    feeder = scaled(tmp_path, GROUNDED, many, 1.0)
-    parts = tuple(replace(part, S=3.0 * part.S) for part in feeder.load_parts)
-
-    with pytest.raises(PlantError, match="the load may be more than the network can carry: try smaller loads"):
-        Plant(Network(replace(feeder, load_parts=parts)), PlantSettings(), 0.02, 0.02)
-
-
 def islanded() -> Plant:
     """Give the microgrid feeder, islanded for a second."""
     p = plant(*opened(0.1, "13-152"))

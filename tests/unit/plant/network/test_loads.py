@@ -13,9 +13,8 @@ from gridpeers.plant.dynamics.circuit import PlantError
 from gridpeers.plant.dynamics.inverters import Inverters
 from gridpeers.plant.dynamics.power_flow_at_rest import PowerFlow
 from gridpeers.plant.equipment import Bus, Feeder, Line, LineConfig, Load, Source, Switch
-from gridpeers.plant.equipment.imported_equipment import LinearElement
 from gridpeers.plant.network import Network, solve_power_flow
-from gridpeers.plant.network.merging import DELTA, Merge
+from gridpeers.plant.network.merging import Merge
 from gridpeers.plant.tables import read_feeder
 from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, V_B, Z_B, circuit, inverter
 from tests.unit.plant.networks import diagonal, feeder, three_phase_bus
@@ -94,14 +93,6 @@ def test_delta_branch_currents_are_differences() -> None:
     I_ab, I_bc, I_ca = np.conj(np.array([S, 2 * S, 3 * S]) / (V - np.roll(V, -1)))
 
     np.testing.assert_allclose(drawn(network, V), [I_ab - I_ca, I_bc - I_ab, I_ca - I_bc], rtol=1e-12)
-
-
-def test_nominal_angles_are_those_of_the_nominal_voltages() -> None:
-    """phi0 and V_nom of every branch of the feeder are its voltage at nominal phasors."""
-    network = Network(read_feeder("microgrid123"))
-    loads = network.loads()
-
-    np.testing.assert_allclose(loads.voltages(network.nominal), loads.V_nom * np.exp(1j * loads.phi0), rtol=1e-12)
 
 
 def test_dead_loads_draw_nothing() -> None:
@@ -185,40 +176,6 @@ def test_feeder_without_source_has_no_power_flow() -> None:
     """Without a substation there is no slack, and the error says so."""
     with pytest.raises(ValueError, match='feeder "test" has no source'):
         solve_power_flow(Network(feeder(buses=(three_phase_bus("1"),))), frozenset())
-
-
-@pytest.mark.parametrize("seed", [434, 1017, 2071])
-def test_a_section_with_next_to_nothing_to_ground_is_solved_as_far_as_rounding_lets(seed: int) -> None:
-    """Behind a delta winding its voltage to ground may change by more than 1e-8 pu for ever; that is no overload."""
-    rng = np.random.default_rng(seed)
-    g = -1j * 10.0 ** rng.uniform(-11, -7)
-    y_transformer, y_line = (complex(*rng.uniform(5, most, 2) * (1, -1)) for most in (50, 5000))
-    across = DELTA.T @ DELTA
-    line = y_line * np.linalg.inv(np.full((3, 3), 0.3j) + (0.7 + 0.9j) * np.eye(3))
-    behind = y_transformer * across + g * np.eye(3)
-    matrices = {
-        "12": np.block([[y_transformer * across, -y_transformer * across], [-y_transformer * across, behind]]),
-        "23": np.block([[line, -line], [-line, line]]),
-    }
-    network = Network(
-        feeder(
-            buses=tuple(three_phase_bus(name) for name in "123"),
-            elements=tuple(
-                LinearElement(
-                    name=ends,
-                    nodes=tuple((bus, phase) for bus in ends for phase in "ABC"),
-                    Y=tuple(tuple(map(complex, row)) for row in matrix),
-                )
-                for ends, matrix in matrices.items()
-            ),
-            loads=(Load(bus="3", connection="D", model="P", S=(200e3 + 100e3j, 100e3 + 0j, 50e3 + 30e3j)),),
-            source=Source(bus="1", V_pu=1.0, angle=0.3),
-        )
-    )
-
-    V = solve_power_flow(network, network.closed0).V.reshape(3, 3)
-
-    assert np.abs(np.abs(V @ DELTA.T) / 2400.0 / np.sqrt(3.0) - 1.0).max() < 0.05
 
 
 REACTANCE = 1.0

@@ -2,7 +2,6 @@
 
 from typing import Any
 
-import msgspec
 import numpy as np
 import pytest
 
@@ -115,19 +114,6 @@ def test_matrix_is_symmetric_and_separates_islands(network: Network) -> None:
     assert np.array_equal(label[entries.row], label[entries.col])
 
 
-def test_only_representatives_have_entries(network: Network) -> None:
-    """Rows and columns of nodes that follow another one are empty; each representative is its own, at ratio 1."""
-    merge = network.merge(network.closed0)
-    followers = np.setdiff1d(np.arange(len(network.nodes)), merge.representatives)
-    Y = network.admittance(network.closed0)
-
-    assert len(followers) > 0
-    assert abs(Y[followers]).sum() == abs(Y[:, followers]).sum() == 0.0
-    assert np.all(merge.ratio[merge.representatives] == 1.0)
-    terminals = [network.index(inverter.bus, phase) for inverter in network.inverters for phase in "ABC"]
-    assert np.isin(terminals, merge.representatives).all()
-
-
 def test_merging_keeps_power(standard: Network) -> None:
     """Power at the representatives equals power at all nodes, also across regulators: ideal devices take none."""
     merge = standard.merge(standard.closed0)
@@ -151,27 +137,6 @@ def test_regulators_hold_their_ratio(standard: Network) -> None:
     }
 
     assert list(gain.values()) == pytest.approx([1 + 0.00625 * tap for tap in (7, -1, 0, -1, 8, 5)], rel=1e-14)
-
-
-def test_ideal_switches_are_the_limit_of_small_impedances(standard: Network) -> None:
-    """Very short lines in place of the closed switches give the same voltages, only less exactly."""
-    table = standard.feeder
-    short = LineConfig(name="short", phases="ABC", Z=diagonal(1e-3j), B=diagonal(0.0))
-    lines = [
-        Line(name=s.name, from_bus=s.from_bus, to_bus=s.to_bus, phases=s.phases, config="short", length=1e-3)
-        for s in table.switches
-        if s.closed
-    ]
-    other = Network(
-        msgspec.structs.replace(
-            table, switches=(), lines=(*table.lines, *lines), line_configs=(*table.line_configs, short)
-        )
-    )
-
-    ideal = solve_power_flow(standard, standard.closed0).V
-    nearly = solve_power_flow(other, frozenset(), tolerance=1e-9).V
-
-    assert 1e-6 < np.abs(ideal - nearly).max() < 5e-3
 
 
 def test_parallel_regulator_and_switch_are_an_error() -> None:

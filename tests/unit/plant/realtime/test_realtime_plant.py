@@ -5,11 +5,10 @@ from __future__ import annotations
 import pytest
 from msgspec.structs import replace
 
-from gridpeers.plant.plant_node import MOST_RECORDERS
 from gridpeers.plant.realtime.pacer import FIRST, RealTimePacer, sentence
 from gridpeers.plant.realtime.realtime_plant import COMMANDS, LEAD
 from gridpeers.wire.driver.drive import StoppedError
-from gridpeers.wire.messages import Answer, Command, LoadSetting, Measurement, Stop, Telemetry, Waiting
+from gridpeers.wire.messages import Answer, Command, Measurement, Stop, Telemetry, Waiting
 from tests.toy.toy_configs import toy_configs
 from tests.unit.plant.realtime.realtime_lab import KEYS, T_C, Lab, running
 
@@ -173,30 +172,6 @@ def test_an_ended_run_stays_for_a_recorder_that_stood_still() -> None:
     assert lab.side.finished
 
 
-def test_of_thousands_of_recorders_some_are_noted_and_the_needed_one_always() -> None:
-    """The run begins with the recorder that it waits for, whoever else claims to be one; the others are counted."""
-    lab = Lab(recorders=("r",))
-    lab.join("inv1", "inv2", "inv3")
-    for i in range(1_000):
-        lab.side.appeared(KEYS.alive_recorder(f"r{i}"), lab.now)
-    assert lab.side.phase == "gathering"
-    lab.side.appeared(KEYS.alive_recorder("r"), lab.now)
-
-    assert lab.side.phase == "running"
-    assert lab.side.rejects.counts == {"excess": 1_000 - MOST_RECORDERS}
-
-
-def test_percentiles_are_those_of_the_delays() -> None:
-    """Delays of 0 to 99 hundredths of a period: nobody is late, and the percentiles are where they should be."""
-    pacer = RealTimePacer(1.0, now=10.0)
-    for i in range(100):
-        pacer.note(pacer.due + i / 100)
-    report = pacer.report()
-
-    assert (report.steps, report.late, report.slipped) == (100, 0, 0.0)
-    assert [report.p50, report.p95, report.p99, report.worst] == pytest.approx([0.50, 0.95, 0.99, 0.99])
-
-
 def test_pace_is_not_kept_if_more_than_one_percent_is_late() -> None:
     """Of the steps so far in a run without an end, after the first of them; it is news only once."""
     pacer = RealTimePacer(1.0, now=0.0)
@@ -239,17 +214,6 @@ def test_commands_are_done_and_answered() -> None:
     assert [event.text for event in lab.events("switch")] == ["sw1: open", "sw1: open"]
 
 
-def test_a_load_is_set_and_a_status_has_it() -> None:
-    """The answer says the power; the status has it until the run ends."""
-    lab = running()
-    set_ = lab.ask("load", "load1", load=LoadSetting(P=2e3, Q=-1e3))
-    wrong = lab.ask("load", "load7", load=LoadSetting(factor=0.5))
-
-    assert (set_.ok, set_.text) == (True, "load1: 2000-1000j VA, at t = 0.00 s")
-    assert (wrong.ok, wrong.text) == (False, 'no load "load7"; loads are load1')
-    assert lab.ask("status").data["loads"] == {"load1": [2e3, -1e3]}
-
-
 @pytest.mark.parametrize(("verb", "argument", "text"), [
     ("open", "sw7", 'no switch "sw7"; switches are sw1'),
     ("load", "load1", "load load1: nothing is to be set; give a factor, or real or reactive power"),
@@ -279,17 +243,6 @@ def test_who_watches_hears_of_an_event_at_once() -> None:
     lab.step(10)
     assert "sw1: close" in [event.text for message in lab.take(Telemetry) for event in message.events]
     assert lab.ask("status").data["switches"] == {"sw1": True}
-
-
-def test_a_run_is_ended_once() -> None:
-    """A second order to end a run that ends already is refused, and does not end it anew."""
-    lab = running()
-    lab.step()
-    answers = [lab.ask("down"), lab.ask("down")]
-
-    assert [(answer.ok, answer.text) for answer in answers][1] == (False, "the run is ending")
-    assert answers[0].ok
-    assert [message.final for message in lab.take(Telemetry)].count(True) == 1
 
 
 def test_who_asks_without_end_is_answered_a_bounded_number_of_times() -> None:

@@ -149,22 +149,6 @@ def test_an_agent_that_has_no_measurement_is_told_from_one_that_is_frozen(at: in
     ]
 
 
-def test_nothing_is_remembered_of_who_has_gone() -> None:
-    """A name that comes again begins anew, on both ends of a path that was cut."""
-    silence = SilenceDetector(max_age=0.25, T_c=0.02, period=0.02)
-    for name in NAMES:
-        silence.joined(name)
-    assert list(silence.take(0.0)) == []
-    silence.reported(status("inv1", {"inv2": 3.0}))
-    silence.forget("inv2")
-    silence.joined("inv2")
-
-    for tick in range(1, 20):
-        for name in NAMES:
-            silence.heard(name)
-        assert list(silence.take(0.02 * tick)) == []
-
-
 @pytest.mark.parametrize("period", [0.02, 0.001])
 def test_who_was_never_heard_is_told_of_once_both_had_time_to_meet(period: float) -> None:
     """-1 means never: a second of wall time after a join, at every speed, that is news."""
