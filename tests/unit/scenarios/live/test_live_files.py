@@ -32,7 +32,6 @@ from gridpeers.scenarios.results.metrics_file import RunMetrics
 from gridpeers.scenarios.results.record import Recorded
 from gridpeers.scenarios.schema import ScenarioModel, find_scenario, load_scenario
 from gridpeers.scenarios.schema.participants import netem_of, setup_of
-from gridpeers.scenarios.schema.scenario_model import LONGEST_RUN
 from gridpeers.wire.messages import PLANT, LinkRequest
 
 
@@ -71,15 +70,6 @@ def test_the_folder_of_a_live_run_has_a_scenario_that_is_as_long(
     assert [len(entries) for entries in (again.cases["IV"].netem.links, again.cases["IV"].netem.nodes)] == (
         [1, 0] if end < 7.0 else [2, 1]
     )
-
-
-def test_a_live_run_of_hours_is_cut_to_the_longest_scenario() -> None:
-    """No scenario may be longer than an hour, and the head of the file says that the run was."""
-    scenario, remarks = ended_scenario(islanding(), 2.0 * LONGEST_RUN)
-
-    assert scenario.time.end_s == LONGEST_RUN
-    assert any("It lasted 7200.00 s." in remark for remark in remarks)
-    assert "No scenario may be longer than 3600 s." in remarks
 
 
 def test_a_run_that_is_interrupted_while_it_is_judged_has_its_length_in_its_scenario(

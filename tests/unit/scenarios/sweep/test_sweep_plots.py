@@ -13,8 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gridpeers.scenarios.catalogue_files import CATALOGUE
-from gridpeers.scenarios.record.journal_reader import values_of
-from gridpeers.scenarios.results.plots.run_figures import draw_all, figures_of
+from gridpeers.scenarios.sweep import sweep_plots
 from gridpeers.scenarios.sweep.sweep_case import FATE
 from gridpeers.scenarios.sweep.sweep_plots import curves, indexes_of, spread_of
 from gridpeers.scenarios.sweep.sweep_table import label_of
@@ -61,9 +60,9 @@ def test_plots_are_chosen_by_what_is_varied(
     """One parameter, or a text, or random draws: curves; two numbers on a grid: a map; repeats are no axes."""
     drawn = table(parameters)
 
-    assert figures_of(drawn) == figures
+    assert sweep_plots.figures_of(drawn) == figures
     assert indexes_of(drawn) == {"event1": ["MPSI"]}
-    files = draw_all(drawn, tmp_path)
+    files = sweep_plots.draw_all(drawn, tmp_path)
     assert len(files) == len(figures)
     assert all(file.stat().st_size > 5000 for file in files)
 
@@ -74,9 +73,9 @@ def test_a_sweep_of_which_nothing_ran_is_drawn_too(tmp_path: Path) -> None:
     grid: dict[str, list[Any]] = {"a": [1, 1, 2, 2], "b": [0.1, 0.2, 0.1, 0.2]}
     bare = table(grid).drop(columns=["event1.MPSI", "event1.p.inv1"])
 
-    assert draw_all(bare, tmp_path) == ()
-    assert len(draw_all(table(grid, MPSI=column, t_restore_s=column), tmp_path)) == 1
-    assert len(draw_all(table({"a": [1, 2, 3, 4]}, MPSI=column, t_restore_s=column), tmp_path)) == 1
+    assert sweep_plots.draw_all(bare, tmp_path) == ()
+    assert len(sweep_plots.draw_all(table(grid, MPSI=column, t_restore_s=column), tmp_path)) == 1
+    assert len(sweep_plots.draw_all(table({"a": [1, 2, 3, 4]}, MPSI=column, t_restore_s=column), tmp_path)) == 1
 
 
 def test_axes_say_what_is_varied_in_words_with_units_and_no_key_of_the_file() -> None:
@@ -98,7 +97,7 @@ def test_a_time_that_never_came_counts_as_later_than_all_others(runs: list[tuple
     times = [t for _, t in runs]
     rows = pd.DataFrame({"a": [a for a, _ in runs], "event1.t_restore_s": times, "event1.MPSI": times})
 
-    spread = spread_of(rows["a"], values_of(rows, "event1.t_restore_s"))
+    spread = spread_of(rows["a"], sweep_plots.values_of(rows, "event1.t_restore_s"))
 
     for a in spread.index:
         row, mine = spread.loc[a], sorted(np.inf if t is None else t for b, t in runs if b == a)
@@ -107,4 +106,4 @@ def test_a_time_that_never_came_counts_as_later_than_all_others(runs: list[tuple
         assert row["never"] == mine.count(np.inf)
         came = [t for t in mine if t < np.inf]
         assert [row["low"], row["high"]] == ([came[0], came[-1]] if came else pytest.approx([np.nan] * 2, nan_ok=True))
-    assert np.isnan(values_of(rows, "event1.MPSI")).sum() == sum(t is None for _, t in runs)
+    assert np.isnan(sweep_plots.values_of(rows, "event1.MPSI")).sum() == sum(t is None for _, t in runs)
