@@ -17,7 +17,7 @@ from gridpeers.plant.realtime.pacer import sentence
 from gridpeers.plant.simulators import SIMULATORS
 from gridpeers.scenarios.results.claims import NO_BENCHMARK, benchmark_of
 from gridpeers.scenarios.results.figure_processes import drawn_on_all_cores
-from gridpeers.scenarios.results.metrics_file import Clock, case_facts, metrics_json
+from gridpeers.scenarios.results.metrics_file import case_facts, metrics_json
 from gridpeers.scenarios.results.record import Recorded
 from gridpeers.scenarios.results.run_files import broken_if_ended, no_room, refusal, set_complete, shown, write_whole
 from gridpeers.scenarios.run_case import run_case
@@ -68,7 +68,9 @@ def _logged(request: Request, progress: Progress) -> RunReport:
 
 def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
     scenario, folder, place = request.scenario, request.folder, shown(request.folder)
-    text = to_toml(scenario, _as_run(request))
+    package = SIMULATORS.resolve(scenario.plant.simulator).package
+    as_run = {"driver": request.driver} | versions() | ({package: version_of(package)} if package else {})
+    text = to_toml(scenario, as_run)
     write_whole(folder / "scenario.toml", text)
     recorded, notes = {}, []
     pacing: dict[str, Pacing] = {}
@@ -119,6 +121,12 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
         for case, record in cases.items()
     }
     write_whole(folder / FILE, verdicts_json(checks))
+    if request.clock == "wall":
+        notes.append("in wall-clock time no two runs are the same: each has its own delays")
+    else:
+        why = "something happened in it that the scenario does not tell"
+        unlike_any = [case for case, one in recorded.items() if not one.reproducible]
+        notes += [f"case {case} cannot be reproduced: {why}" for case in unlike_any]
     with ExitStack() as beside:
         if request.lasting and stop.raised is None:
             from gridpeers.scenarios.results.plots.drawing import drawing_of
@@ -139,7 +147,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
             benchmark=benchmark,
             checks=checks,
             failures={case: law_failures(record.events) for case, record in recorded.items()},
-            notes=[*notes, *_notes(recorded, request.clock)],
+            notes=notes,
             folder=place + "/" if request.lasting else "",
         )
         write_whole(folder / "report.txt", plain(report))
@@ -165,16 +173,3 @@ def _compared(request: Request, recorded: Mapping[str, Recorded]) -> dict[str, D
         )
         for case, record in recorded.items()
     }
-
-
-def _notes(recorded: Mapping[str, Recorded], clock: Clock) -> list[str]:
-    if clock == "wall":
-        return ["in wall-clock time no two runs are the same: each has its own delays"]
-    why = "something happened in it that the scenario does not tell"
-    return [f"case {case} cannot be reproduced: {why}" for case, one in recorded.items() if not one.reproducible]
-
-
-def _as_run(request: Request) -> dict[str, Any]:
-    package = SIMULATORS.resolve(request.scenario.plant.simulator).package
-    own = {package: version_of(package)} if package else {}
-    return {"driver": request.driver} | versions() | own

@@ -145,14 +145,9 @@ def as_in(scenario: ScenarioModel, feeder: Feeder) -> Feeder:
 
 
 def _switch_events(scenario: ScenarioModel) -> tuple[SwitchEvent, ...]:
-    return tuple(
-        SwitchEvent(
-            t=event.t_s,
-            switch=switch,
-            action="close" if closes else "open",
-            synchronised=event.synchronised and closes,
-        )
-        for event in scenario.events
-        for closes, switches in ((False, event.open), (True, event.close))
-        for switch in switches
-    )
+    events = []
+    for event in scenario.events:
+        t, waits = event.t_s, event.synchronised
+        events += [SwitchEvent(t=t, switch=name, action="open") for name in event.open]
+        events += [SwitchEvent(t=t, switch=name, action="close", synchronised=waits) for name in event.close]
+    return tuple(events)

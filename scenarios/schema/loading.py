@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import msgspec
+from msgspec.structs import replace
 
 from gridpeers.plant.equipment import F_NOM, Feeder
 from gridpeers.plant.simulators import SIMULATORS
@@ -120,14 +120,18 @@ def check_tables(
     """
     scenario = read_tables(data, problems)
     if not scenario.name:
-        scenario = msgspec.structs.replace(scenario, name=name_of(path.stem))
+        scenario = replace(scenario, name=name_of(path.stem))
     check_times(scenario, problems)
     check_names(scenario, problems)
     scenario = with_folders(scenario, path.parent)
     check_benchmark(scenario, problems)
     check_measures(scenario, problems)
     check_laws(scenario, problems)
-    scenario = with_delays(_with_feeder_path(scenario, path.parent), path.parent, problems)
+    feeder_path = scenario.plant.feeder
+    if feeder_path not in feeders() and is_folder(path.parent / feeder_path):  # processes may start elsewhere
+        plant = replace(scenario.plant, feeder=str((path.parent / feeder_path).resolve()))
+        scenario = replace(scenario, plant=plant)
+    scenario = with_delays(scenario, path.parent, problems)
     feeder = _feeder_of(scenario, problems, read_feeder)
     check_step(scenario, feeder, problems)
     check_protection(scenario, feeder.f_nom if feeder else F_NOM, problems)
@@ -156,14 +160,6 @@ def _malformed(file: str, text: str, reason: str) -> str:
     match = re.search(r"\(at line (\d+)", reason)
     line = min(int(match[1]), len(lines)) if match else len(lines)
     return f"{file}:{line}: not valid TOML: {reason.partition(' (at')[0]}: {lines[line - 1].strip()}"
-
-
-def _with_feeder_path(scenario: ScenarioModel, folder: Path) -> ScenarioModel:
-    feeder = scenario.plant.feeder
-    if feeder not in feeders() and is_folder(folder / feeder):
-        plant = msgspec.structs.replace(scenario.plant, feeder=str((folder / feeder).resolve()))
-        return msgspec.structs.replace(scenario, plant=plant)
-    return scenario
 
 
 def _feeder_of(scenario: ScenarioModel, problems: Problems, read_feeder: ReadFeeder) -> Feeder | None:

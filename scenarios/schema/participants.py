@@ -8,7 +8,7 @@ from pathlib import Path
 
 import msgspec
 
-from gridpeers.netem.schema.netem import Netem, NodeFault
+from gridpeers.netem.schema.netem import Netem
 from gridpeers.netem.schema.trace_file import with_traces
 from gridpeers.plant.equipment import Feeder, InverterRow
 from gridpeers.plant.equipment.connectivity import SwitchOperations, islands_after
@@ -205,7 +205,13 @@ def check_netem(scenario: ScenarioModel, feeder: Feeder | None, problems: Proble
     def wrong_in(netem: Netem, noted: set[str]) -> list[Problem]:
         nodes = []
         for i, node in enumerate(netem.nodes):
-            nodes += _wrong_node(f"node[{i}]", node, T_c)
+            ticks = node.from_s / T_c
+            if node.kill and (ticks < 0.5 or abs(ticks - round(ticks)) > 1e-6):
+                text = f"{node.from_s:g} s is no multiple of T_c_s = {T_c:g} s after 0: agents die at ticks; "
+                nodes.append(Problem(f"node[{i}].from_s", f"{text}write {max(1, round(ticks)) * T_c:g}"))
+            if node.skew is not None and (node.from_s or node.to_s is not None):
+                text = "a clock is skewed for the whole run; leave out from_s and to_s"
+                nodes.append(Problem(f"node[{i}].skew", text))
             if scenario.security == "mtls" and node.lies is not None and node.lies.in_name_of:
                 nodes.append(Problem(f"node[{i}].lies.in_name_of", _KEPT_OUT))
         return netem.problems(names, microgrids, end_s, noted) + [it for it in nodes if it.path not in noted]
@@ -217,18 +223,6 @@ def check_netem(scenario: ScenarioModel, feeder: Feeder | None, problems: Proble
         if not (_noted("", problems) or _noted(path, problems) or is_calm(case.netem)):
             for problem in wrong_in(netem_of(scenario, name), set()):
                 problems.add(_place(problem.path, scenario.netem, path), problem.text)
-
-
-def _wrong_node(path: str, node: NodeFault, T_c: float) -> list[Problem]:
-    found = []
-    ticks = node.from_s / T_c
-    if node.kill and (ticks < 0.5 or abs(ticks - round(ticks)) > 1e-6):
-        near = max(1, round(ticks)) * T_c
-        text = f"{node.from_s:g} s is no multiple of T_c_s = {T_c:g} s after 0: agents die at ticks; write {near:g}"
-        found.append(Problem(f"{path}.from_s", text))
-    if node.skew is not None and (node.from_s or node.to_s is not None):
-        found.append(Problem(f"{path}.skew", "a clock is skewed for the whole run; leave out from_s and to_s"))
-    return found
 
 
 def _noted(prefix: str, problems: Problems) -> set[str]:

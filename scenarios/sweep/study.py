@@ -90,11 +90,16 @@ class SweepFolder:
         journal = self.path / JOURNAL
         if journal.exists() and not journal.is_file():  # to read a pipe would take for ever
             raise FolderError(f"{shown(journal)}: is no file; remove it, or give another folder by --out")
-        return rows_in(self.path, SweepRow, self._problem) if journal.exists() else {}
-
-    def _problem(self, row: SweepRow) -> str:
         last = self._size - 1
-        return "" if 0 <= row.number <= last else f"this sweep has runs 0 to {last}, none {row.number}; remove the line"
+
+        def problem(row: SweepRow) -> str:
+            return (
+                ""
+                if row.number in range(self._size)
+                else f"this sweep has runs 0 to {last}, none {row.number}; remove the line"
+            )
+
+        return rows_in(self.path, SweepRow, problem) if journal.exists() else {}
 
 
 def _check(folder: Path, whole: Mapping[str, object]) -> bool:

@@ -36,7 +36,6 @@ from gridpeers.scenarios.sweep.axes import (
 from gridpeers.scenarios.sweep.paths import PathError, Tree, flatten, put, steps
 from gridpeers.scenarios.sweep.sweep_model import Sweep
 from gridpeers.wire.schema.table_schema import problems_of
-from gridpeers.wire.wording import suggestion
 
 
 @dataclass(frozen=True)
@@ -118,18 +117,13 @@ def checked_runs(
             chosen = msgspec.structs.replace(scenario, cases={case: scenario.cases[case] for case in cases})
             runs += [Run(i, case, chosen, setting.shown) for case in cases]
     for (path, text), numbers in list(wrong.items())[:MOST_LISTED]:
-        at = _origin(path, origin)
+        around = [key for key in origin if path == key or path.startswith((f"{key}.", f"{key}["))]
+        at = origin[max(around, key=len)] if around else path
         inside = f"{path}: " if path and not at.endswith(path) else ""
         problems.add(at, inside + text + _in_samples(numbers, settings))
     if len(wrong) > MOST_LISTED:
         problems.add("", f"and {len(wrong) - MOST_LISTED} more problems of this kind in other samples")
     return runs, tuple(feeders.values())
-
-
-def _origin(path: str, origin: Mapping[str, str]) -> str:
-    """Return the key of the sweep file that a key of the scenario was set by, or a table around it."""
-    around = [key for key in origin if path == key or path.startswith((f"{key}.", f"{key}["))]
-    return origin[max(around, key=len)] if around else path
 
 
 def _in_samples(numbers: Sequence[int], settings: Sequence[Setting]) -> str:
@@ -198,7 +192,9 @@ def _base(sweep: Sweep, path: Path, problems: Problems) -> BaseScenario:
 
 def _plan(sweep: Sweep, text: str, axes: Sequence[Axis], base: BaseScenario, problems: Problems) -> Plan:
     scenario = base.scenario
-    cases = _cases(sweep, scenario, problems)
+    for case in sweep.cases:
+        problems.unknown("cases", "case", case, scenario.cases)
+    cases = tuple(case for case in scenario.cases if case in sweep.cases) or tuple(scenario.cases)
     names = [row.name for row in inverters_of(scenario, base.feeder)]
     fixed = dict(flatten(sweep.set))
     axes = [*axes, *graph_axes(sweep.graph, names, cases, problems)]
@@ -227,14 +223,6 @@ def _plan(sweep: Sweep, text: str, axes: Sequence[Axis], base: BaseScenario, pro
         runs=tuple(runs),
         fingerprint=fingerprint(runs, feeders),
     )
-
-
-def _cases(sweep: Sweep, scenario: ScenarioModel, problems: Problems) -> tuple[str, ...]:
-    for case in sweep.cases:
-        if case not in scenario.cases:
-            problems.add("cases", f'no case "{case}"; {suggestion(case, scenario.cases, "cases")}')
-    chosen = tuple(case for case in scenario.cases if case in sweep.cases)
-    return chosen or tuple(scenario.cases)
 
 
 def _origins(axes: Sequence[Axis], problems: Problems) -> dict[str, str]:
