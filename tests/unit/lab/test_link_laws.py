@@ -14,11 +14,10 @@ from scipy import stats
 
 from gridpeers.lab.link_laws import LinkLaws, LinkTest, blocks_of, improbable, law, link_tests
 from gridpeers.netem.draws import RESTART
-from gridpeers.netem.fault_schedule import Heal
 from gridpeers.netem.ledger import LinkTrace
-from gridpeers.netem.models.delay import Constant, Lognormal, Normal, Pareto, Trace, Uniform
+from gridpeers.netem.models.delay import Lognormal, Normal, Pareto, Trace, Uniform
 from gridpeers.netem.models.loss import GilbertElliott, Markov
-from gridpeers.netem.models.medium import Cut, Flap
+from gridpeers.netem.models.medium import Flap
 from gridpeers.netem.receiver import Receiver
 from gridpeers.netem.schema.fault import PROFILES, Fault
 from gridpeers.netem.schema.netem import Netem
@@ -145,13 +144,6 @@ def test_the_law_of_a_count_is_the_sum_over_all_patterns(name: str) -> None:
     assert law(PATTERNS[name], blocks_of(seq), bursts=True) == pytest.approx(bursts, abs=1e-13)
 
 
-def test_what_cannot_be_tested_says_why() -> None:
-    """Delays under a flap that holds have a reason and no verdict."""
-    (found,) = held_against(traced(masked := {"delay": 0.1, "flap": Flap(up_s=1.0, down_s=1.0, hold=True)}), masked)
-
-    assert (found.what, found.realised, found.p) == ("delay", "not tested: flap on it", None)
-
-
 def test_loss_is_judged_by_what_met_it_in_its_time() -> None:
     """Messages that a cut dropped are left out; two losses one after the other are two tests."""
     netem = Netem(
@@ -172,17 +164,6 @@ def test_loss_is_judged_by_what_met_it_in_its_time() -> None:
         ("cut", "nothing passes", 250),
     ]
     assert improbable(found, LEVEL) == []
-
-
-def test_of_a_message_judged_twice_the_last_verdict_counts() -> None:
-    """A message that a healed cut let go is in the check once, with the delay it had in the end."""
-    to = Receiver("inv2", Netem(links=(Fault(on="* -> inv2", delay=Constant(delay_s=0.1)),)), MICROGRIDS)
-    to.apply(Fault(on="* -> inv2", cut=Cut(hold=True)))
-    to.offer("inv1", 0, 0.0, 0.0, b"x")
-    to.apply(Heal(on="* -> inv2", from_s=0.0, kinds=("cut",)))
-    (found,) = held_against(to.take_trace(), {"delay": 0.1})
-
-    assert (found.n, found.p) == (1, 1.0)
 
 
 # ---------------------------------------------------------------- a fault of a user

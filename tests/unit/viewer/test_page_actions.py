@@ -17,7 +17,6 @@ from gridpeers.netem.schema.netem import Netem
 from gridpeers.scenarios.emulation.link_data import EVERYTHING, EmulationConfig, LinkCommand
 from gridpeers.scenarios.live.run_address import ENDPOINT, RUN, RunAddress
 from gridpeers.scenarios.schema import load_scenario
-from gridpeers.scenarios.schema.scenario_model import LoadChange, ScenarioModel
 from gridpeers.viewer.live_pages import OwnAgents
 from gridpeers.viewer.page_actions import ActionClient, ActionKind, PageAction, scenario_form
 from gridpeers.wire.codec import decode, encode
@@ -181,15 +180,6 @@ def test_the_number_that_is_shown_is_the_one_that_is_done(
     assert effect(again) == effect(clicked)
 
 
-def test_the_command_is_written_as_the_page_was_called(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A program that is not on the path is shown with its own."""
-    program = tmp_path / "gridpeers"
-    program.touch()
-    monkeypatch.setattr("sys.argv", [str(program), "view"])
-
-    assert command_line("stop", "inv4", *WHERE.words) == f"{program} stop inv4"
-
-
 def test_to_start_an_agent_is_the_command_too(monkeypatch: pytest.MonkeyPatch) -> None:
     """The process is `gridpeers agent` at the run of the page."""
     begun: list[list[str]] = []
@@ -232,31 +222,6 @@ end_s = 2.0
 secondary = "all"
 graph = "full"
 """
-
-
-def of_event(scenario: ScenarioModel, key: str) -> Any:
-    """A key of the one event of a scenario."""
-    (event,) = scenario.events
-    return getattr(event, key)
-
-
-@pytest.mark.parametrize(
-    ("action", "key", "value"),
-    [
-        (PageAction(kind="open", subject="13-152"), "open", ("13-152",)),
-        (PageAction(kind="close", subject="18-135"), "close", ("18-135",)),
-        (PageAction(kind="synchronise", subject="18-135"), "synchronised", True),
-        (PageAction(kind="stop", subject="inv4"), "leave", ("inv4",)),
-        (PageAction(kind="start", subject="inv10"), "join", ("inv10",)),
-        (PageAction(kind="load", subject="48", factor=1.5), "load", {"48": LoadChange(factor=1.5)}),
-        (PageAction(kind="load", subject="48", P_kW=300, Q_kvar=-9), "load", {"48": LoadChange(P_kW=300, Q_kvar=-9)}),
-    ],
-)
-def test_an_event_of_the_page_is_one_of_a_scenario(action: PageAction, key: str, value: Any, tmp_path: Path) -> None:
-    """With a label and a time it loads, and has what was clicked."""
-    entry = scenario_form(action).replace("[[event]]", '[[event]]\nlabel = "mine"\nt_s = 1.0')
-
-    assert of_event(load_scenario(written(tmp_path, SCENARIO + entry))[0], key) == value
 
 
 @pytest.mark.parametrize(("kind", "value"), [("cut", 0.0), ("delay", 0.1), ("loss", 0.25)])

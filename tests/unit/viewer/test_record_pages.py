@@ -181,21 +181,3 @@ def test_pages_get_what_they_ask_for_and_no_more(whole: Path) -> None:
     assert not refused["ok"]
     assert refused["text"].startswith("there was no agent inv99")
     pages.close()
-
-
-def test_a_record_that_has_gone_is_a_sentence(whole: Path, tmp_path: Path) -> None:
-    """A page whose folder is moved away asks on; each answer says what is wrong, and the server goes on."""
-    folder = tmp_path / "run"
-    (folder / "case").mkdir(parents=True)
-    shutil.copy(whole, folder / "case")
-    pages = RecordPages(RecordedRun(folder))
-    page = Talk(pages)
-    page.news()
-    folder.rename(tmp_path / "moved")
-
-    asked = page.ask(at=0.5, agent="inv4")
-
-    assert asked == {"problem": f"{folder}: the folder is gone"}
-    (tmp_path / "moved").rename(folder)
-    assert page.ask(at=0.5, agent="inv4")["decision"]["ok"]
-    pages.close()

@@ -33,21 +33,6 @@ loss = 0.5
 """
 """Nine agents that island at 0.2 s; one link is cut from 0.5 s on, another loses half of its messages."""
 
-WITH_LOADS = (
-    ISLANDED.partition("[[link]]")[0].replace("end_s = 1.6", "end_s = 0.8")
-    + """
-[[event]]
-label = "more"
-t_s = 0.4
-load = { 48 = { factor = 1.5 } }
-[[event]]
-label = "table"
-t_s = 0.6
-load = { 48 = { factor = 1.0 } }
-"""
-)
-"""The same without faults; a load is set, and set back."""
-
 
 @pytest.fixture(scope="module")
 def record(tmp_path_factory: pytest.TempPathFactory) -> RunRecord:
@@ -137,15 +122,6 @@ def test_switches_eachevents_are_those_of_the_time(view: RecordView) -> None:
     assert view.events[0].text == "switch 13-152 opened"
 
 
-def test_loads_are_those_of_the_time(tmp_path: Path) -> None:
-    """A load that was set has its power from then on, also going back, until it is as in its table again."""
-    view = RecordView(recorded_in_chunks(WITH_LOADS, tmp_path))
-
-    loads = [view.frame(t).loads for t in (0.38, 0.4, 0.58, 0.6, 0.4)]
-
-    assert loads == [{}, {"48": (315e3, 225e3)}, {"48": (315e3, 225e3)}, {}, loads[1]]
-
-
 def test_a_page_gets_what_it_lacks(view: RecordView) -> None:
     """Points of a later time continue those that a page has; together they are those of one request."""
     whole, first = view.frame(1.5).points, view.frame(0.75)
@@ -189,21 +165,6 @@ def test_without_the_feeder_the_inverters_steachin_a_ring(record: RunRecord, tmp
     assert view.map.branches == ()
     assert "gone is not here" in view.missing[-1]
     assert view.frame(0.3).inverters[0].P is not None
-
-
-def test_agents_that_join_eachleave(tmp_path: Path) -> None:
-    """An agent is there from its first decision to its last one."""
-    (tmp_path / "it.toml").write_text(
-        '[time]\nend_s = 0.8\n[case.case]\nsecondary = "all"\ngraph = "full"\n'
-        '[[event]]\nlabel = "one"\nt_s = 0.4\nleave = ["inv3"]\n[[event]]\nlabel = "two"\nt_s = 0.6\njoin = ["inv3"]\n',
-        encoding="utf-8",
-    )
-    view = RecordView(recorded_run(tmp_path / "it.toml", "case", tmp_path / "case"))
-
-    def absent(t: float) -> set[str]:
-        return {one.name for one in view.frame(t).inverters if one.note == "no agent"}
-
-    assert [absent(t) for t in (0.38, 0.42, 0.58, 0.62)] == [set(), {"inv3"}, {"inv3"}, set()]
 
 
 def test_long_steps_leave_no_gaps(tmp_path: Path) -> None:

@@ -177,16 +177,6 @@ def test_what_is_late_or_off_is_decided_here(view: RunView) -> None:
     assert frame.speed == 4.0
 
 
-def test_links_into_a_silent_agent_are_not_shown(view: RunView) -> None:
-    """What it said is not of now."""
-    view.status(status("inv1", used=("inv2",)), 1.0)
-    _, cursor = view.frame(Cursor(), 1.0)
-    view.forget_silent(1.1)
-    assert view.frame(cursor, 1.1)[0].links == {}
-    view.forget_silent(5.0)
-    assert view.frame(cursor, 5.0)[0].links == {"inv1": ()}
-
-
 def test_switches_and_loads_come_when_they_change(view: RunView) -> None:
     """An event asks for them, a page gets them once, and those of a new plant begin anew."""
     pacing = Pacing(steps=1, late=0, p50=0.0, p95=0.0, p99=0.0, worst=0.0, slipped=0.0)

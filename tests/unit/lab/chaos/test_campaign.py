@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 import shutil
 import sys
 from contextlib import nullcontext
@@ -62,20 +61,6 @@ def test_a_planted_bug_is_found_and_shrunk(elsewhere: Path, monkeypatch: pytest.
     assert f"frequency, run {failure.row.number}: {failure.simplest.violated['frequency']}" in [*summary.lines()]
     assert again == base_in(failure.file).scenario
     assert "frequency" in run_scenario(base_in(failure.file)).violated
-
-
-def test_a_law_that_fails_violates_its_check(elsewhere: Path) -> None:
-    """Also where the run ends with it; the file and the line of the law are named."""
-    (elsewhere / "fails.py").write_text(
-        BREAKS.replace("def step", "def step(self, *_):\n        1 / 0\n\n    def never")
-    )
-    for top in ("", 'on_law_failure = "stop"\n'):
-        (elsewhere / "small.toml").write_text(SMALL.format(extra=f'law = "fails:Breaks"\n{top}'))
-
-        violated = run_scenario(base_in(elsewhere / "small.toml")).violated
-
-        assert re.search(r"law fails:Breaks \(fails.py:\d+\): step at t = ", violated["law_failed"])
-        assert "ends" not in violated
 
 
 def test_a_failure_can_be_moved_with_the_law_check_and_feeder_that_it_names(

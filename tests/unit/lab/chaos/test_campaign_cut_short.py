@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import tempfile
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ from msgspec.structs import replace
 
 from gridpeers.lab.chaos import campaign as campaigns
 from gridpeers.lab.chaos import chaos_run
-from gridpeers.lab.chaos.campaign import Campaign, run_campaign, shrink_number
+from gridpeers.lab.chaos.campaign import shrink_number
 from gridpeers.lab.chaos.chaos_folder import ChaosFolder
 from gridpeers.lab.chaos.chaos_run import run_scenario
 from gridpeers.lab.chaos.machine_error import MachineError
@@ -61,26 +60,6 @@ def test_ctrl_c_keeps_what_there_is(elsewhere: Path, monkeypatch: pytest.MonkeyP
     assert len(rows_of(elsewhere / "out")) == 2
     assert "2 of 9 runs" in (elsewhere / "out" / "report.txt").read_text(encoding="utf-8")
     assert (elsewhere / "out" / "status.txt").read_text(encoding="utf-8").startswith("broken: interrupted")
-
-
-def test_workers_that_are_ended_leave_no_folder(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Theirs are in one of the campaign, which goes with it; those of other campaigns stay."""
-    base = base_in(small(elsewhere))
-    (tmp := elsewhere / "tmp").mkdir()
-    (others := tmp / "gridpeers-chaos-others").mkdir()
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp))
-
-    def killed(text: str, seed: int, number: int, schedule: Any, driver: str, within: Path) -> Any:
-        (within / "gridpeers-chaos-of-worker").mkdir()
-        assert within.parent == tmp
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(campaigns, "run_number", killed)
-    folder = ChaosFolder(elsewhere, base, 8, "")
-    with pytest.raises(KeyboardInterrupt):
-        run_campaign(Campaign(base=base, seed=8, runs=3), folder, lambda of: nullcontext(lambda what, done: None))
-
-    assert [*tmp.iterdir()] == [others]
 
 
 def test_a_full_disk_is_told_and_the_folder_says_broken(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -160,23 +139,3 @@ def test_without_room_nothing_is_shrunk(elsewhere: Path, monkeypatch: pytest.Mon
     with pytest.raises(MachineError, match="No space left on device"):
         shrink_number(base.text, 8, 3, "frequency", "inprocess")
     assert full.asked == 1
-
-
-@pytest.mark.parametrize(
-    ("out", "said"),
-    [
-        ("small.toml", "--out small.toml: this is a file; give a new or an empty folder"),
-        ("small.toml/new/one", "small.toml/new/one: cannot be made or written: Not a directory; give another folder"),
-        (".", "--out .: the folder is not empty; give a new or an empty one"),
-    ],
-)
-def test_a_folder_that_cannot_be_used_is_refused_before_the_first_run(
-    out: str, said: str, elsewhere: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Exit code 2, and no run is done for nothing."""
-    small(elsewhere)
-    monkeypatch.setattr(chaos_run, "run_case", full := FullDisk(0))
-    code, text = invoke("chaos", "small.toml", "--out", out)
-
-    assert (code, said in " ".join(text.split())) == (2, True), text
-    assert full.asked == 0

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import os
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from gridpeers.lab.chaos import campaign as campaigns
-from gridpeers.lab.chaos import chaos_run
-from gridpeers.lab.chaos.campaign import Campaign, run_campaign
 from gridpeers.lab.chaos.chaos_folder import ChaosFolder, kept_rows
 from gridpeers.lab.chaos.chaos_run import ChaosRow
 from gridpeers.lab.chaos.disturbance import Disturbance
 from gridpeers.scenarios.results.run_files import LOCK, locked
-from gridpeers.scenarios.run_request import BrokenRunError
 from tests.command_line import invoke
 from tests.unit.lab.chaos.bases import base_in
 from tests.unit.lab.chaos.small_campaign import rows_of, small
@@ -63,25 +59,6 @@ def test_all_that_a_campaign_had_is_there_when_it_goes_on(elsewhere: Path) -> No
     assert kept_rows(elsewhere, base, 3, "inprocess", 9) == folder.rows
     assert len(folder.rows) == 3
     assert kept_rows(elsewhere, base, 3, "processes", 9) == {}, "none of them was done with processes"
-
-
-def test_an_error_that_is_no_utf_8_is_kept(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its bytes are escapes in the journal, the table and the report, and the campaign goes on with it."""
-
-    def broken(*words: Any) -> Any:
-        raise BrokenRunError(os.fsdecode(b"case IV: caf\xe9 ended"))
-
-    base = base_in(small(elsewhere))
-    monkeypatch.setattr(chaos_run, "run_case", broken)
-    row = chaos_run.run_schedule(base, (), 3000000)
-    (elsewhere / "out").mkdir()
-    folder = ChaosFolder(elsewhere / "out", base, 3, "gridpeers chaos small", {0: row}, 1)
-    folder.add(row)
-    run_campaign(Campaign(base=base, seed=3, runs=1), folder, lambda of: nullcontext(lambda what, done: None))
-
-    assert kept_rows(elsewhere / "out", base, 3, "inprocess", 1) == folder.rows
-    assert rows_of(elsewhere / "out")[0]["why"] == r"case IV: caf\udce9 ended"
-    assert r"ends, run 0: case IV: caf\udce9 ended" in (elsewhere / "out" / "report.txt").read_text(encoding="utf-8")
 
 
 def test_two_campaigns_never_write_in_one_folder(elsewhere: Path) -> None:

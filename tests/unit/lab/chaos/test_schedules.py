@@ -27,7 +27,6 @@ from tests.unit.lab.chaos.bases import NAMES, base_in, base_named
 from tests.unit.lab.chaos.small_campaign import SMALL
 
 CUT = Disturbance(table="link", entry={"on": "* <-> *", "from_s": 2.0, "to_s": 3.0, "cut": True})
-KILL = Disturbance(table="node", entry={"name": "inv1", "from_s": 2.0, "kill": True})
 LEAVE = Disturbance(table="event", entry={"t_s": 2.0, "leave": ["inv2"]}, back={"t_s": 3.0, "join": ["inv2"]})
 
 

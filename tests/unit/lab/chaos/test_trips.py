@@ -11,7 +11,6 @@ from gridpeers.lab.chaos import chaos_run
 from gridpeers.lab.chaos.chaos_checks import JUDGED_S, WITHIN_S
 from gridpeers.lab.chaos.chaos_folder import ChaosFolder
 from gridpeers.lab.chaos.chaos_run import (
-    LONGER_RUNS,
     ChaosRow,
     JudgedRun,
     restored_from,
@@ -148,23 +147,6 @@ def test_a_collapse_excuses_no_other_island(monkeypatch: pytest.MonkeyPatch) -> 
     assert row.violated["frequency"] == _verdict("inv7").sentence
     assert row.collapse == COLLAPSED.text
     assert _run(monkeypatch, LASTS, LASTS, "inv7").collapse == ""
-
-
-def test_a_run_that_never_settles_says_so(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Inverters that trip again in each longer run: the last is judged too early, and its line in chaos.csv tells."""
-
-    def judged(base: ChaosBase, scenario: ScenarioModel, row: ChaosRow, *rest: object) -> JudgedRun:
-        return JudgedRun(row, restored_s=row.since_s + 9.0)
-
-    base = base_named("islanding")
-    monkeypatch.setattr(chaos_run, "_judged", judged)
-    row = run_schedule(base, (), 1)
-    folder = ChaosFolder(tmp_path, base, 1, "gridpeers chaos islanding")
-    folder.add(row)
-    folder.write_table()
-
-    assert row.unsettled.startswith(f"inverters trip and return: after {LONGER_RUNS} runs still judged from")
-    assert row.unsettled in (tmp_path / "chaos.csv").read_text(encoding="utf-8")
 
 
 def test_only_first_trips_within_two_control_periods_come_before_any_control() -> None:

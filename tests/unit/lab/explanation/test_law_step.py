@@ -53,21 +53,6 @@ def step_of(decided: RecordedDecision, *before: RecordedDecision) -> LawStep:
     return step
 
 
-def test_the_terms_add_up_to_the_step() -> None:
-    """Each neighbour has a term in both sums; without a limit hit there is nothing else."""
-    decided = decision(neighbour("inv2", 9), neighbour("inv3", 9))
-
-    step = step_of(decided)
-
-    assert step.problem == ""
-    for of, before, after in zip((step.P_set, step.V_set), decided.before, decided.after, strict=True):
-        base = 100e3 if of is step.P_set else 277.0
-        assert (of.before, of.after) == (pytest.approx(before / base), pytest.approx(after / base))
-        assert abs(of.rest) <= 1e-12
-        assert of.limits == 0.0
-        assert {term.neighbour for term in of.terms} == {"", "inv2", "inv3"}
-
-
 @pytest.mark.parametrize("quantity", ["P_set", "V_set"])
 @pytest.mark.parametrize("off", [1e-11, -1e-9])
 def test_a_step_that_is_off_is_told(quantity: str, off: float) -> None:
@@ -82,48 +67,6 @@ def test_a_step_that_is_off_is_told(quantity: str, off: float) -> None:
     assert [term.name for term in step.P_set.terms] == [term.name for term in step.V_set.terms] == ["step"]
     assert abs(step.P_set.rest) <= 1e-15
     assert abs(step.V_set.rest) <= 1e-15
-
-
-def test_a_limit_takes_what_is_beyond_it() -> None:
-    """The terms would go on; what the limit takes back is negative, and the set-point is the limit."""
-    control = replace(ALL_FULL, gains=replace(ALL_FULL.gains, P_set_max=0.5001))
-    decided = decision(neighbour("inv2", 9), config=agent_config("inv1", control))
-
-    step = step_of(decided)
-
-    assert step.problem == ""
-    assert (step.P_set.after, step.P_set.high) == (pytest.approx(0.5001), 0.5001)
-    assert step.P_set.limits == pytest.approx(0.0001 - sum(term.value for term in step.P_set.terms))
-    assert step.P_set.limits < -1e-6
-    assert step.V_set.limits == 0.0
-
-
-def test_a_law_with_a_memory_is_made_again_from_its_start(monkeypatch: pytest.MonkeyPatch) -> None:
-    """From its last start: what was before it has forgotten, and on hold, or in another process, it was not asked."""
-    of_law(Counting(), monkeypatch)
-    first = [decision(tick=tick, state=None) for tick in (1, 2)]
-    hold = decision(tick=3, action="hold", state=None)
-    later = [decision(tick=tick, state=None) for tick in (4, 5)]
-    last = decision(tick=6)
-    states = [replace(last.state, seq=each.tick) for each in (*first, hold, *later)]
-    before = [
-        RecordedDecision(**vars(each) | {"state": state})
-        for each, state in zip((*first, hold, *later), states, strict=True)
-    ]
-    third = RecordedDecision(**vars(last) | {"state": replace(last.state, P_set=5e4 + 3 * 100.0, V_set=277.0)})
-
-    step = step_of(third, *before)
-
-    assert step.problem == ""
-    assert step.P_set.step == pytest.approx(0.003)
-    wrong = "computed again, the law makes another step"
-    restarted = [RecordedDecision(**vars(each) | {"restarted": each.tick == 5}) for each in before]
-    assert step_of(third, *restarted).problem.startswith(wrong)
-    others = [
-        RecordedDecision(**vars(each) | {"state": replace(each.state, epoch=2)}) if each.tick > 3 else each
-        for each in before
-    ]
-    assert step_of(third, *others).problem.startswith(wrong)
 
 
 def test_a_law_that_names_no_terms_has_one(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,11 +8,10 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from gridpeers.lab.explanation.unheard import WORDS, missed, reason, rejections, verdicts
+from gridpeers.lab.explanation.unheard import WORDS, missed, reason, verdicts
 from gridpeers.netem.ledger import LinkTrace, Outcome
 from gridpeers.scenarios.record.message_index import MessageOnWire, on_wire
 from gridpeers.wire.codec import encode
-from gridpeers.wire.journal import MessageReference, ReceivedMessage, RejectedCount
 from gridpeers.wire.messages import OFF
 from tests.toy.toy_configs import ALL_FULL, agent_config
 from tests.unit.lab.explanation.decisions import decision, neighbour, record_of, state
@@ -67,24 +66,6 @@ def test_a_state_that_was_not_meant_to_be_heard_says_so_itself(changes: dict[str
     assert fate_of("loss", **changes) == f"1 state since: 1 {WORDS[why]}"
 
 
-def test_without_a_verdict_only_the_number_is_told() -> None:
-    """States after the last one heard up to half a period before the decision: those of another life count too."""
-
-    def messages(name: str, *, since: float, until: float, kind: str) -> Iterator[MessageOnWire]:
-        assert (name, kind) == ("inv2", "State")
-        assert (since, until) == (0.1, pytest.approx(0.19))
-        return iter((*sent("inv2", 5, 6, 7), *sent("inv2", 0, epoch=2)))
-
-    record = record_of(messages=messages)
-
-    assert missed(record, EVERY, EVERY.neighbours[0], {}, {}) == "3 states since"
-    rejected = {"inv2": [(7, "ghost", 1), (4, "stale", 1), (-1, "corrupt", 1)], "inv3": [(8, "ghost", 1)]}
-    text = missed(record, EVERY, EVERY.neighbours[0], {}, rejected)
-    assert text == '3 states since: 1 rejected as "ghost", 1 rejected as "corrupt"'
-    empty = record_of(messages=lambda *words, **more: iter(()))
-    assert missed(empty, EVERY, EVERY.neighbours[0], {}, {}) == "no state since"
-
-
 def test_messages_that_were_dropped_unread_are_all_told() -> None:
     """Nobody knows who sent them: as many as the neighbour sent may be its own, and late ones are older ones."""
     record = record_of(messages=lambda *words, **more: iter(sent("inv2", 5, 6, 7)))
@@ -97,24 +78,6 @@ def test_messages_that_were_dropped_unread_are_all_told() -> None:
     )
     text = missed(none, EVERY, EVERY.neighbours[0], {}, {"inv2": [(-1, "excess", 1)]})
     assert text == 'no state since; 1 message on its key rejected as "excess"'
-
-
-def test_what_was_rejected_is_known_by_its_sender() -> None:
-    """States alone; one whose bytes are noted has no number that can be trusted, and many have one entry."""
-    entries = [
-        MessageReference(None, "state/inv2", 1, 5, "stale"),
-        MessageReference(None, "state/inv2", 1, 6),
-        ReceivedMessage(None, "state/inv3", b"noise", "corrupt"),
-        ReceivedMessage(None, "command", b"noise", "corrupt"),
-        RejectedCount(1.0, "state/inv3", "excess", 12),
-        RejectedCount(1.0, "command", "excess", 12),
-    ]
-    record = record_of(entries=lambda agent, *, since, until: iter(entries))
-
-    assert rejections(record, "inv1", 0.0, 1.0) == {
-        "inv2": [(5, "stale", 1)],
-        "inv3": [(-1, "corrupt", 1), (-1, "excess", 12)],
-    }
 
 
 def test_each_reason_has_its_words() -> None:

@@ -121,16 +121,6 @@ def test_late_neighbours_destabilise_a_star_around_a_leader_alone(graph: str) ->
     assert (max(radii) < 1.0) == (graph != "star")
 
 
-def test_the_star_around_a_leader_has_a_limit() -> None:
-    """A swing of its set-points decays with the delay of the limit and grows with one control period more."""
-    case = inverters("star")
-    n = round(delay_limit(case, "neighbours") / case.T_c) - 1
-
-    assert n * case.T_c == pytest.approx(0.46)
-    assert Loop(inverters=case, ticks=Ticks(link=n)).spectral_radius < 1.0
-    assert Loop(inverters=case, ticks=Ticks(link=n + 1)).spectral_radius > 1.0
-
-
 def test_what_the_law_never_moves_is_counted() -> None:
     """Each part of the graph beyond the first keeps one difference for ever; it is no instability."""
     apart = dataclasses.replace(inverters("full"), A=np.kron(np.eye(3), 1.0 - np.eye(3)))

@@ -163,16 +163,3 @@ def test_link_commands_stay_or_are_left_out(tmp_path: Path) -> None:
     assert (rows, events) == told(list(nobody.telemetry()))
     assert rows != told(list(record.telemetry()))[0]
     assert again(record, Changes(without_link_commands=True, since=0.6)) == told(list(record.telemetry()))
-
-
-def test_a_record_that_is_cut_off_ends_where_all_journals_do(plain: RunRecord, tmp_path: Path) -> None:
-    """Up to there the rows are those of the record, and there are none that nobody has recorded."""
-    whole = plain.path.read_bytes()
-    (tmp_path / "run.mcap").write_bytes(whole[: len(whole) * 3 // 4])
-    record = RunRecord.open(tmp_path)
-
-    rows, _ = again(record)
-
-    recorded = told(list(record.telemetry()))[0]
-    assert 5 < len(rows) <= len(recorded)
-    assert rows == recorded[: len(rows)]

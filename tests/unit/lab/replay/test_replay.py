@@ -10,21 +10,19 @@ import pytest
 from msgspec.structs import replace
 
 from gridpeers.lab.replay.changes import lossless, spliced, without_loss
-from gridpeers.lab.replay.recorded_process import JournalParts, RecordedProcess, RecordedStep, ReplayError, processes_of
+from gridpeers.lab.replay.recorded_process import JournalParts, RecordedProcess, RecordedStep, processes_of
 from gridpeers.lab.replay.replay import (
     ComparedRows,
-    Difference,
     ReplayedPart,
     message_difference,
     replay,
-    row_difference,
 )
 from gridpeers.lab.replay.replayed_process import agent_again
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.netem.schema.partition import Partition
 from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.wire.journal import MessageReference, ProcessEvent, ReceivedMessage, RejectedCount, Token, WakeUp
+from gridpeers.wire.journal import ReceivedMessage, RejectedCount
 from gridpeers.wire.messages import State, Telemetry
 from gridpeers.wire.plugins.plugin import plugin_of
 from tests.record.fake_clock import FakeClockRun, fake_clock_record
@@ -88,50 +86,12 @@ def test_another_gain_is_named_where_it_first_acts(record: RunRecord) -> None:
     assert ISLANDING <= done.difference.t < 0.2
 
 
-def test_of_a_record_that_is_cut_off_what_there_is_is_replayed(record: RunRecord, tmp_path: Path) -> None:
-    """The rest cannot be compared, and is no difference."""
-    whole = record.path.read_bytes()
-    (tmp_path / "run.mcap").write_bytes(whole[: len(whole) * 2 // 3])
-    cut = RunRecord.open(tmp_path)
-
-    parts = parts_of(cut)
-
-    assert all(part.difference is None for of in parts.values() for part in of)
-    assert 0 < parts["plant"][0].count < parts_of(record)["plant"][0].count
-    assert parts["plant"][0].t_end == pytest.approx(cut.t_end, abs=0.25)
-
-
-@pytest.mark.parametrize("level", ["decisions", "physics"])
-def test_a_record_without_arrivals_is_refused(level: str, record: RunRecord) -> None:
-    """It says which ones are missing."""
-    other = RunRecord.open(record.path)
-    other.info = replace(other.info, level=level)
-
-    with pytest.raises(ReplayError, match=f'recorded with record = "{level}"'):
-        replay(other, ToyPlant)
-
-
 # -------------------------------------------------------------------- the processes of a record
 
 
 def steps_of(record: RunRecord, name: str) -> list[tuple[RecordedProcess, list[RecordedStep]]]:
     """The lives of a process, with their steps."""
     return [(each, list(each.steps())) for each in processes_of(record) if each.name == name]
-
-
-def test_the_steps_of_a_process_are_its_calls(record: RunRecord) -> None:
-    """From its start on, in the order of time; each has what was sent in it, and the last one says that it is that."""
-    ((_, steps),) = steps_of(record, "inv1")
-
-    assert isinstance(steps[0].entry, ProcessEvent)
-    assert steps[0].entry.kind == "start"
-    assert {type(step.entry) for step in steps} == {ProcessEvent, Token, MessageReference, ReceivedMessage, WakeUp}
-    assert [step.due for step in steps] == sorted(step.due for step in steps)
-    assert [step.last for step in steps] == [False] * (len(steps) - 1) + [True]
-    states = [sent.key for step in steps for sent in step.sent]
-    assert set(states) == {"state/inv1"}
-    assert len(states) == len(list(record.messages(sender="inv1", kind="State")))
-    assert all(isinstance(step.entry, WakeUp) for step in steps if step.sent)
 
 
 @pytest.mark.parametrize(("missing", "told"), [(2, "lacks 1 of its parts"), (0, "begins")])
@@ -209,18 +169,6 @@ def test_the_first_field_that_differs_is_named(changes: dict[str, Any], found: t
 
     assert (None if difference is None else (difference.quantity, difference.unit)) == found
     assert difference is None or (difference.name, difference.t) == ("inv1", 0.06)
-
-
-def test_the_first_number_of_a_row_that_differs_is_named() -> None:
-    """By inverter, quantity and unit; a row with another number of columns is of another run."""
-    row = (0.5, *(float(k) for k in range(12)))
-    other = (*row[:9], row[9] + 1.0, row[10] + 1.0, *row[11:])
-
-    assert row_difference(("inv1", "inv2"), row, other) == Difference("inv2", 0.5, "Q", 8.0, 9.0, "var")
-    assert row_difference(("inv1", "inv2"), row, row) is None
-    short = row_difference(("inv1", "inv2"), row, row[:-1])
-    assert short is not None
-    assert (short.quantity, short.recorded, short.replayed) == ("the number of columns", 13, 12)
 
 
 def test_rows_are_compared_up_to_a_time(record: RunRecord) -> None:
