@@ -1,4 +1,7 @@
-"""One run of a campaign: from its schedule to its verdict. Nothing that a run can do ends it."""
+"""One run of a campaign: from its schedule to its verdict, less what a collapse that no control prevents excuses.
+
+Nothing that a run can do ends the campaign.
+"""
 
 from __future__ import annotations
 
@@ -11,15 +14,17 @@ from typing import NamedTuple
 import msgspec
 
 from gridpeers.lab.chaos.chaos_checks import RESTORED, WITHIN_S
-from gridpeers.lab.chaos.collapse import Collapse, collapses_at_changes, unexcused
 from gridpeers.lab.chaos.disturbance import Schedule
 from gridpeers.lab.chaos.disturbed_scenario import ChaosBase
 from gridpeers.lab.chaos.machine_error import MachineError, machine_error
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment.connectivity import bus_islands
 from gridpeers.scenarios.checks.check_registry import LAW_FAILED
-from gridpeers.scenarios.checks.check_verdict import CheckVerdict
+from gridpeers.scenarios.checks.check_verdict import SHOWN_VIOLATIONS, CheckVerdict
 from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.checks.judging import judge_case
 from gridpeers.scenarios.results.event_windows import CaseRecord
+from gridpeers.scenarios.results.island_membership import closed_switches
 from gridpeers.scenarios.results.recorded_events import tripped_by, tripped_inverters
 from gridpeers.scenarios.run_case import run_case
 from gridpeers.scenarios.run_request import BrokenRunError, Driver, LawStopError, Request
@@ -35,6 +40,12 @@ it repeats to the byte; processes give the bytes of one process."""
 LONGER_RUNS = 6
 """Most times that a run with trips is done, each longer than the one before: inverters stay off after three trips
 without a minute in service between."""
+
+
+PERIODS = 2
+"""Control periods after a change within which trips are a collapse. The first measurement that shows the change is
+taken at the end of the first period. What an agent decides on it acts during the second one, before any agent has heard
+of the change from another, or has measured what a decision did."""
 
 
 class ChaosRow(msgspec.Struct, frozen=True, kw_only=True):
@@ -217,3 +228,57 @@ def _judged(
     present = zip(history.inverters, history.present[-1].tolist(), strict=True)
     off = frozenset(name for name, on in present if not on)
     return JudgedRun(row, restored_s, collapses_at_changes(scenario, base.feeder, recorded.events), off, verdicts)
+
+
+# -------------------------------------------------------------------- collapses
+
+
+class Collapse(NamedTuple):
+    label: str
+    text: str
+    inverters: frozenset[str]
+    """Inverters of the islands in which inverters tripped, as the switches were then."""
+
+
+def collapses_at_changes(scenario: ScenarioModel, feeder: Feeder, events: Iterable[PlantEvent]) -> tuple[Collapse, ...]:
+    """Return the collapses of a run, one for each change that makes inverters trip within `PERIODS`.
+
+    The first trip of an inverter counts alone: who has tripped before may trip again for the reason of that time.
+    """
+    rows = (*feeder.inverters, *feeder.spares)
+    bus_of = {row.name: row.bus for row in rows}
+    longest = PERIODS * scenario.time.T_c_s + 1e-9
+    switched: list[PlantEvent] = []
+    tripped: set[str] = set()
+    found: dict[str, Collapse] = {}
+    for event in events:
+        if event.kind == "switch":
+            switched.append(event)
+        first = set(tripped_by(event)) - tripped
+        tripped |= first
+        since = [change.label for change in scenario.events if -1e-9 <= event.t - change.t_s <= longest]
+        if not first or not since:
+            continue
+        label, buses = since[-1], {bus_of[name] for name in first}
+        islands = [each for each in bus_islands(feeder, closed_switches(feeder, switched)) if each & buses]
+        members = frozenset(row.name for row in rows if any(row.bus in island for island in islands))
+        before = found.get(label, Collapse(label, f"{label}: at t = {event.t:g} s {event.text}", frozenset()))
+        found[label] = before._replace(inverters=before.inverters | members)
+    return tuple(found.values())
+
+
+def unexcused(verdicts: Iterable[CheckVerdict], excused: frozenset[str]) -> dict[str, str]:
+    """Return the failed checks of what control restores, with the sentence of what inverters violate that count.
+
+    A sentence is empty if only excused inverters violate the check. A violation that names no inverter counts.
+    """
+    found = {}
+    for verdict in verdicts:
+        if verdict.status == "failed" and verdict.check in RESTORED:
+            rest = tuple(violation for violation in verdict.violations if violation.agent not in excused)
+            count = verdict.count - len(verdict.violations) + len(rest)
+            beyond = "" if rest else f"{count} violations, beyond the {SHOWN_VIOLATIONS} that a verdict keeps"
+            reason = verdict.reason or beyond
+            of_others = msgspec.structs.replace(verdict, violations=rest, count=count, reason=reason)
+            found[verdict.check] = of_others.sentence if count or verdict.reason else ""
+    return found

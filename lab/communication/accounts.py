@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 from itertools import takewhile
 from math import inf, nextafter
 
-from gridpeers.lab.communication.sent_states import Link, SentState, SentStates
-from gridpeers.lab.communication.uses import Uses
+from gridpeers.lab.communication.sent_states import Link, SentState, SentStates, Uses
 from gridpeers.scenarios.record.decision_entries import Hole, inside
 
 MOST_WAITING = 6000

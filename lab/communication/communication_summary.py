@@ -17,8 +17,15 @@ from types import MappingProxyType
 from gridpeers.lab.communication.accounts import ArrivalAccount, ArrivalAccounts, Missing, TickAccounts
 from gridpeers.lab.communication.heals import Heal, Heals
 from gridpeers.lab.communication.record_pass import RecordSink, end_of, opened, read_into
-from gridpeers.lab.communication.sent_states import Link, SentState, SentStates
-from gridpeers.lab.communication.uses import DecidedStates, DecidedTicks, NeighbourUse, Uses
+from gridpeers.lab.communication.sent_states import (
+    DecidedStates,
+    DecidedTicks,
+    Link,
+    NeighbourUse,
+    SentState,
+    SentStates,
+    Uses,
+)
 from gridpeers.netem.ledger import LinkCounts, LinkTrace
 from gridpeers.scenarios.record.decision_entries import Hole
 from gridpeers.scenarios.record.record_info import RecordInfo

@@ -9,8 +9,7 @@ from math import inf
 
 import msgspec
 
-from gridpeers.lab.communication.sent_states import Link, SentState, SentStates, StateWindow
-from gridpeers.lab.communication.uses import Uses
+from gridpeers.lab.communication.sent_states import Link, SentState, SentStates, StateWindow, Uses
 from gridpeers.netem.ledger import LinkTrace
 from gridpeers.netem.schema.fault import Span
 from gridpeers.netem.schema.pattern import Link as LinkEnds

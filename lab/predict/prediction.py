@@ -22,12 +22,19 @@ from gridpeers.lab.predict.closed_form import (
     settling,
     settling_in_ticks,
 )
+from gridpeers.lab.predict.droop_runs import (
+    IslandStep,
+    LoadError,
+    VarResponse,
+    load_steps,
+    var_delay_limit,
+    var_response,
+    var_spectral_radius,
+)
 from gridpeers.lab.predict.inverter_group import InverterGroup, inverter_group_of
 from gridpeers.lab.predict.linear_model import Loop, delay_limit
-from gridpeers.lab.predict.load_steps import IslandStep, LoadError, load_steps
 from gridpeers.lab.predict.robustness import robustness
 from gridpeers.lab.predict.times import Times, predicted_times
-from gridpeers.lab.predict.var_response import VarResponse, var_delay_limit, var_response, var_spectral_radius
 from gridpeers.plant.equipment import Feeder
 from gridpeers.runs.choices import with_cases
 from gridpeers.scenario import Scenario, as_scenario

@@ -7,11 +7,10 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
+from gridpeers.lab.predict.droop_runs import VarResponse, load_steps, var_delay_limit, var_growth, var_response
 from gridpeers.lab.predict.inverter_group import InverterGroup, inverter_group_of
 from gridpeers.lab.predict.linear_model import Loop, Ticks, delay_limit
-from gridpeers.lab.predict.load_steps import load_steps
 from gridpeers.lab.predict.times import LoadStep, Times, predicted_times, sharing_index
-from gridpeers.lab.predict.var_response import VarResponse, var_delay_limit, var_growth, var_response
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.tables import read_feeder

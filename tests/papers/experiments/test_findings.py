@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from gridpeers.lab.predict.var_response import var_growth
+from gridpeers.lab.predict.droop_runs import var_growth
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.papers.singhal2022.experiments.outage_experiments import predicted
 from gridpeers.plant.equipment import F_NOM

@@ -12,12 +12,13 @@ from gridpeers.lab.chaos.chaos_checks import JUDGED_S, WITHIN_S
 from gridpeers.lab.chaos.chaos_folder import ChaosFolder
 from gridpeers.lab.chaos.chaos_run import (
     ChaosRow,
+    Collapse,
     JudgedRun,
+    collapses_at_changes,
     restored_from,
     run_scenario,
     run_schedule,
 )
-from gridpeers.lab.chaos.collapse import Collapse, collapses_at_changes
 from gridpeers.lab.chaos.disturbance import Disturbance
 from gridpeers.lab.chaos.disturbed_scenario import ChaosBase
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict, Violation

@@ -8,8 +8,7 @@ from typing import Any
 import pytest
 
 from gridpeers.lab.communication.heals import Heal, Heals
-from gridpeers.lab.communication.sent_states import SentState, SentStates
-from gridpeers.lab.communication.uses import NeighbourUse, Uses
+from gridpeers.lab.communication.sent_states import NeighbourUse, SentState, SentStates, Uses
 from gridpeers.netem.ledger import LinkTrace
 
 T_C = 0.02

@@ -5,10 +5,9 @@ from __future__ import annotations
 import pytest
 
 import gridpeers as gp
+from gridpeers.lab.predict.droop_runs import VarResponse, load_steps, var_delay_limit, var_response
 from gridpeers.lab.predict.linear_model import delay_limit
-from gridpeers.lab.predict.load_steps import load_steps
 from gridpeers.lab.predict.times import LoadStep, predicted_times
-from gridpeers.lab.predict.var_response import VarResponse, var_delay_limit, var_response
 from gridpeers.scenarios.schema import load_scenario
 from tests.unit.lab.predict.predicted_graphs import inverters, on_the_plant, scenario_of
 
