@@ -17,19 +17,13 @@ GONE = 0.5
 
 
 class AgentMoment(NamedTuple):
-    """An agent at its last decision before a time."""
-
     name: str
     t: float
-    """Run time of the decision (s)."""
     island: str
-    """Name of its island."""
     neighbours: tuple[str, ...]
-    """In-neighbours that it had met."""
     ages: tuple[float, ...]
     """Age (s of run time) of the last state of each; -1 if none was heard."""
     used: tuple[str, ...]
-    """Neighbours in its sums."""
     idle: bool
     """Whether it was paused, without a measurement, or its law had failed."""
     known: bool = True
@@ -39,22 +33,18 @@ class AgentMoment(NamedTuple):
 
 
 class AgentMoments:
-    """Find the last decisions of all agents at any time."""
-
     def __init__(self, record: RunRecord) -> None:
         self._index, self._info, self._entries = record.index, record.info, record.entries_of_decisions
         self._gone = max(GONE * max(1.0, self._info.plant.speed), 2.5 * self._info.T_c)
         self._sent_in = lru_cache(maxsize=64)(self._read_sent)
 
     def at(self, t: float) -> dict[str, AgentMoment]:
-        """Return the agents that were there at a run time (s), by name."""
         if self._info.level == "physics":
             return {}
         found = (self._in_ticks if self._info.simulated else self._live)(t)
         return self._perhaps_there(t) | {moment.name: moment for moment in found}
 
     def sent(self, since: float, until: float) -> Counter[str]:
-        """Return how many states each agent sent to its neighbours after a run time (s) and up to another one."""
         counts: Counter[str] = Counter()
         for part in self._index.near(since, until):
             for name, times in self._sent_in(part).items():

@@ -25,8 +25,6 @@ from gridpeers.wire.messages import LinkReport, LinkRequest
 
 
 class LinkFaults:
-    """Say what the emulated links of a run did at a time."""
-
     def __init__(self, record: RunRecord) -> None:
         self._index = record.index
         self._config = _config_of(record)
@@ -55,7 +53,6 @@ class LinkFaults:
         return found
 
     def _renew(self, config: EmulationConfig) -> None:
-        """Make the schedules anew if there are more commands."""
         if self._parts == self._index.parts:
             return
         parts, self._parts = range(max(self._parts, 0), self._index.parts), self._index.parts
@@ -84,7 +81,6 @@ class LinkFaults:
         return counts
 
     def _read_verdicts(self, part: int) -> dict[tuple[str, str], tuple[list[float], list[float]]]:
-        """Return of each link when messages of a part were sent, and when those that were dropped."""
         found: dict[tuple[str, str], tuple[list[float], list[float]]] = defaultdict(lambda: ([], []))
         for report in self._index.of_type("link_reports", LinkReport, (part,)):
             try:
@@ -99,7 +95,6 @@ class LinkFaults:
 
 
 def _config_of(record: RunRecord) -> EmulationConfig | None:
-    """Return the faults of a run; None if it had no emulated links."""
     trees = (record.info.plant.links, *(config.links for config in record.info.agents))
     tree = next((tree for tree in trees if tree), None)
     try:

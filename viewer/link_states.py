@@ -22,8 +22,6 @@ AGE_STEP = 0.05
 
 
 class LinkView(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """One link, as the page shows it."""
-
     src: str
     state: State
     age: float
@@ -51,7 +49,6 @@ class LinkStates:
         self._lost: dict[tuple[str, str], float] = {}
 
     def clear(self) -> None:
-        """Forget all: another run has begun."""
         self.__init__(self._age_step)  # type: ignore[misc]
 
     def status(self, message: AgentStatus, now: float) -> None:
@@ -71,7 +68,6 @@ class LinkStates:
             self._sent[name] = now, sent, _two_digits(rate)
 
     def accounts(self, receiver: str, statuses: Mapping[str, LinkStatus]) -> None:
-        """Take the states of the emulated links into a receiver, by sender."""
         for src, now in statuses.items():
             before = self._accounts.get(receiver, {}).get(src)
             if now.counts is None or before is None or before.counts is None:
@@ -83,11 +79,9 @@ class LinkStates:
 
     @property
     def any_impaired(self) -> bool:
-        """Whether any receiver says that a link to it has an emulated fault."""
         return any(status.impaired for status in self._status.values())
 
     def into(self, receiver: str, islands: Mapping[str, str], max_age: float) -> tuple[LinkView, ...]:
-        """Return the links into an agent, which uses no state beyond an age (s); islands as far as they are known."""
         status = self._status.get(receiver)
         if status is None:
             return ()
@@ -122,5 +116,4 @@ class LinkStates:
 
 
 def _two_digits(value: float) -> float:
-    """Round, so that what hardly changes is not sent again."""
     return float(f"{value:.2g}")

@@ -45,7 +45,6 @@ class LivePages:
         self._agents.close()
 
     def talk(self, socket: WebSocket) -> tuple[Talk, Talk]:
-        """Return what sends a page its frames, and what carries out its actions."""
         loop = asyncio.get_running_loop()
 
         def wake() -> None:
@@ -60,7 +59,6 @@ class LivePages:
         return self._send(socket), self._receive(socket)
 
     async def _send(self, socket: WebSocket) -> None:
-        """Send frames; those that a slow page has no room for are left out, as each says all that is new."""
         hello = {"run": self._where.run, "where": str(self._where), "control": self._control, "silent_s": SILENT}
         await send(socket, as_json({"hello": hello}))
         cursor, drawn, news = Cursor(), False, asyncio.Event()
@@ -84,7 +82,6 @@ class LivePages:
             self._news.discard(news)
 
     async def _receive(self, socket: WebSocket) -> None:
-        """Carry out what a page asks for, one after another."""
         loop = asyncio.get_running_loop()
         async for text in texts(socket):
             await send(socket, as_json({"done": await loop.run_in_executor(self._worker, self._do, text)}))
@@ -146,7 +143,6 @@ class OwnAgents:
         return endings
 
     def close(self) -> None:
-        """Let all leave; end those that do not."""
         for process, _ in self._started.values():
             process.send_signal(signal.SIGTERM)
         for process, log in self._started.values():

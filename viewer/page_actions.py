@@ -25,8 +25,6 @@ FIND = 1.5
 
 
 class PageAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A click."""
-
     kind: ActionKind
     subject: Text = ""
     """The switch, the agent, the load, or one end of the link."""
@@ -35,11 +33,8 @@ class PageAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     value: float = 0.0
     """Delay (s) or probability of a loss."""
     factor: float | None = None
-    """Factor on a load's power in its table."""
     P_kW: float | None = None
-    """Real power of a load at nominal voltage (kW)."""
     Q_kvar: float | None = None
-    """Reactive power of a load at nominal voltage (kvar)."""
 
     def __post_init__(self) -> None:
         for name in (self.subject, self.other):
@@ -80,7 +75,6 @@ class PageAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 
 
 def _exact(value: float) -> str:
-    """Return the shortest number that is read back as the same one."""
     return repr(value).removesuffix(".0")
 
 
@@ -114,12 +108,10 @@ class ActionClient:
         return f"{result.text}; from t = {result.t:.2f} s on" if result.changes_links else result.text
 
     def close(self) -> None:
-        """Close the session."""
         if self._client is not None:
             self._client.close()
 
     def _at_the_run(self) -> RunClient:
-        """Return a client whose plant is there."""
         if self._client is None:
             self._client = RunClient(self._where)
         for _ in self._client.take(0.0):  # tokens that went since the last action

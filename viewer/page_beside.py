@@ -24,13 +24,11 @@ LEAVING = 5.0
 
 
 def require_page() -> None:
-    """End with a clear line if the packages of the page are not installed."""
     modules = dict.fromkeys(("starlette", "uvicorn", "websockets"), "the page")
     require(modules, "install it: pip install 'gridpeers[view]'")
 
 
 def page_socket(port: int | None) -> socket.socket:
-    """Return a socket for the page; or end with a clear line, before anything is started."""
     require_page()
     from gridpeers.scenarios.live.run_address import UsageError
     from gridpeers.viewer.page_server import listen
@@ -56,11 +54,8 @@ def page_beside(folder: Path, listening: socket.socket, name: str) -> Iterator[N
 
 
 class PageConfig(msgspec.Struct, frozen=True, kw_only=True):
-    """Configuration of the process (JSON on its standard input)."""
-
     path: str
     descriptor: int
-    """File descriptor of the socket on which the page is opened."""
 
 
 @contextmanager

@@ -34,7 +34,6 @@ HEARTBEAT = 0.25
 """Longest time (s) between two frames: a page that hears nothing for a second knows that its numbers are old."""
 
 SILENT = 1.0
-"""Time (s) without a word from its server after which a page shows nothing as of now: four heartbeats."""
 
 FASTEST = 0.05
 
@@ -196,7 +195,6 @@ def _answer(text: str, status: int = 200, kind: str = "text/html", **headers: st
 
 
 async def texts(socket: WebSocket) -> AsyncIterator[str]:
-    """Yield the texts that a page sends until it goes; what is no text is nobody's question."""
     while (message := await socket.receive())["type"] != "websocket.disconnect":
         if (text := message.get("text")) is not None:
             yield text

@@ -32,13 +32,11 @@ if TYPE_CHECKING:
 
 class RecordQuestion(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     case: Text = ""
-    """Case; the latest without one."""
     at: float | None = None
     """Run time (s); None asks for the end, as far as the run has come."""
     since: float = -1.0
     """Run time (s) of the last point that the page has, and that is before `at`; -1 asks for all points."""
     agent: Text = ""
-    """Agent whose decision is asked for; none without a name."""
 
 
 class RecordPage:
@@ -62,12 +60,10 @@ class RecordPages:
         self._worker.shutdown(cancel_futures=True)
 
     def talk(self, socket: WebSocket) -> tuple[Talk, Talk]:
-        """Return what answers a page, and what takes its questions."""
         page = RecordPage()
         return self._send(socket, page), self._receive(socket, page)
 
     async def _send(self, socket: WebSocket, page: RecordPage) -> None:
-        """Answer questions, and tell now and then how far the record has come."""
         loop, told = asyncio.get_running_loop(), float("-inf")
         where = str(self._run.path)
         hello = {"run": where, "where": where, "control": False, "record": True, "silent_s": SILENT}
@@ -146,12 +142,10 @@ class RecordPages:
 
 
 def _time_of(question: RecordQuestion, view: RecordView) -> float:
-    """Return the run time (s) that a page asks for, within the record."""
     return view.known_end if question.at is None else min(max(0.0, question.at), view.record.t_end)
 
 
 def _of(view: RecordView) -> dict[str, Any]:
-    """Return what a page needs to know of a record once."""
     info = view.record.info
     return {
         "scenario": info.scenario,
@@ -207,7 +201,6 @@ class RecordedRun:
 
     @property
     def cases(self) -> tuple[str, ...]:
-        """Cases that have a record, in the order in which they ran."""
         return tuple(self._files())
 
     def view(self, case: str = "") -> RecordView:
@@ -252,7 +245,6 @@ class RecordedRun:
         return {case: file for case, (_, file) in sorted(files.items(), key=lambda each: (each[1][0], each[0]))}
 
     def _is_coming(self) -> bool:
-        """Return whether the folder says that its run goes on."""
         try:
             return (self.path / "status.txt").read_text(encoding="utf-8").startswith("running")
         except (OSError, UnicodeDecodeError):

@@ -30,10 +30,8 @@ from gridpeers.viewer.strips import LENGTH
 from gridpeers.wire.messages import PLANT, AgentStatus, Pacing, PlantEvent, Telemetry
 
 WINDOW = 1.0
-"""Time (s) before a moment over which messages are counted."""
 
 AGE_STEP = 0.001
-"""Step of the ages of links (s)."""
 
 _UNSEEN = {"phase": "running", "waits_for": "", "lateness": 0.0} | dict.fromkeys(
     ("epoch", "seq", "received", "rejected", "lost", "ticks", "missed"), 0
@@ -77,7 +75,6 @@ class RecordView:
 
     @property
     def events(self) -> list[EventView]:
-        """All events so far, in their order; numbers begin with 1."""
         index = self.record.index
         for message in index.of_type("telemetry", Telemetry, range(self._parts, index.parts)):
             self._plant_events += message.events
@@ -87,7 +84,6 @@ class RecordView:
         return self._events
 
     def frame(self, t: float, since: float = -1.0) -> Frame:
-        """Return what the page shows at a run time (s); its strips only have points after `since` (s)."""
         agents = self._moments.at(t)
         view = RunView(self.record.info.run, AGE_STEP)
         for config in self._configs.values():
@@ -124,7 +120,6 @@ class RecordView:
         )
 
     def decision(self, agent: str, t: float) -> str:
-        """Return how an agent decided at a run time (s), as `gridpeers why` does."""
         self.events  # noqa: B018  reads them, if there are more
         return str(ROOMS.resolve("explain")(self.record, agent, t, tuple(self._plant_events)))
 

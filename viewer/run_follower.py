@@ -62,7 +62,6 @@ class RunFollower:
             return self._view.frame(cursor, monotonic())
 
     def feeder_map(self) -> msgspec.Raw | None:
-        """Return the one-line diagram as JSON; None until it has come."""
         with self._lock:
             return None if self._view.feeder_map is None else msgspec.Raw(msgspec.json.encode(self._view.feeder_map))
 
@@ -85,7 +84,6 @@ class RunFollower:
                 self._on_news()
 
     def _questions(self, now: float) -> list[str]:
-        """Return the verbs to ask the plant with now."""
         if not self._client.plant:
             return []
         asked = []
@@ -103,7 +101,6 @@ class RunFollower:
         self._client.publish(self._client.keys.for_verb(verb), encode(command))
 
     def _take_other(self, key: str, payload: bytes) -> None:
-        """Take answers of the plant and of receivers of links, and the one-line diagram."""
         if key == self._client.keys.feeder_map:
             diagram = read_feeder_map(payload)
             with self._lock:

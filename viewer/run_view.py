@@ -47,21 +47,16 @@ class Frame(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     t: float | None
     pace: str
     speed: float = 1.0
-    """Run time per wall time (s/s)."""
     inverters: tuple[InverterStatus, ...]
-    """Present values; those of the plant only if the run is live."""
     reset: bool = False
     """Whether all that the page has is of another run."""
     names: tuple[str, ...] = ()
     """Inverters in the order of the points; with the points of the first frame, or when they change."""
     f_nom: float = 0.0
-    """Nominal frequency (Hz); 0 if it is not known."""
     points: tuple[Point, ...] = ()
     events: tuple[EventView, ...] = ()
     links: dict[str, tuple[LinkView, ...]] = {}
-    """Links into each agent whose links have changed."""
     switches: dict[str, bool] | None = None
-    """Position of each switch, if any has changed: whether it is closed."""
     loads: dict[str, tuple[float, float]] | None = None
     """Real (W) and reactive power (var) of each load that was set in this run, if any has changed."""
 
@@ -72,7 +67,6 @@ class RunView:
     def __init__(self, run: str, age_step: float = AGE_STEP) -> None:
         self._monitor = RunMonitor(run)
         self.feeder_map: FeederMap | None = None
-        """The one-line diagram; None until it has come."""
         self.wants_status = True
         """Whether to ask the plant for its status: at first, after a change of switches or loads, after a restart."""
         self._liveness, self._strips, self._links = Liveness(), Strips(), LinkStates(age_step)
@@ -97,7 +91,6 @@ class RunView:
 
     @property
     def any_impaired(self) -> bool:
-        """Whether any link has an emulated fault, so that its account is of interest."""
         return self._links.any_impaired
 
     def config(self, config: AgentConfig) -> None:
@@ -148,7 +141,6 @@ class RunView:
                 self._note_links(name, ())
 
     def frame(self, cursor: Cursor, now: float) -> tuple[Frame, Cursor]:
-        """Return what is new since a cursor, and the next cursor."""
         reset = cursor.run != self._run
         if reset:
             cursor = Cursor(run=self._run)
@@ -249,7 +241,6 @@ class Liveness:
         return another
 
     def token(self, *, there: bool, now: float) -> None:
-        """Note whether the plant's token is there (now is the client's clock, s)."""
         if there:
             self._gone_at = None
         elif self._gone_at is None:

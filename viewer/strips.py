@@ -41,7 +41,6 @@ class Strips:
     def add(
         self, inverters: tuple[str, ...], rows: Sequence[tuple[float, ...]], configs: Mapping[str, AgentConfig]
     ) -> None:
-        """Take rows of telemetry; per-unit values need the nameplates of all inverters."""
         for row in rows:
             if row[0] + 1e-9 >= self._due:
                 self._due = next_due(row[0], len(inverters))

@@ -20,7 +20,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -61,14 +61,16 @@ class Path:
     """m_p P_set of each inverter (pu frequency), shape (T, N)."""
 
 
-@dataclass(kw_only=True)
-class _Delays:
+class _Delays(NamedTuple):
+    """Ticks, spread out; rows are receivers."""
+
     link: list[list[int]]
     measurement: list[int]
     setpoint: list[int]
     loss: list[list[float]]
-    lossy: list[tuple[int, int]] = field(default_factory=list)
-    depth: int = 1
+    lossy: list[tuple[int, int]]
+    """(receiver, sender) of links that lose and carry something."""
+    depth: int
     """H: how many past set-points of everybody the loop needs."""
 
 
@@ -82,27 +84,17 @@ class Loop:
 
     @cached_property
     def _delays(self) -> _Delays:
-        inverters, names, ticks = self.inverters, self.inverters.names, self.ticks
-        found = _Delays(
-            link=[[_of(ticks.link, (src, dst)) for src in names] for dst in names],
-            measurement=[_of(ticks.measurement, name) for name in names],
-            setpoint=[_of(ticks.setpoint, name) for name in names],
-            loss=[[_of(ticks.loss, (src, dst)) for src in names] for dst in names],
-        )
-        every = (ticks.own, *found.measurement, *found.setpoint, *(n for row in found.link for n in row))
-        if any(n < 0 or n != int(n) for n in every):
-            raise ValueError(f"a delay is a whole number of control periods, 0 or more, got {min(every)}")
-        wrong = [p for row in found.loss for p in row if not 0.0 <= p < 1.0]
-        if wrong:
+        heard, names, ticks = self.inverters.heard, self.inverters.names, self.ticks
+        link = [[_of(ticks.link, (src, dst)) for src in names] for dst in names]
+        loss = [[_of(ticks.loss, (src, dst)) for src in names] for dst in names]
+        measurement, setpoint = ([_of(of, name) for name in names] for of in (ticks.measurement, ticks.setpoint))
+        late = (ticks.own, *setpoint, *(n for row in link for n in row))
+        if any(n < 0 or n != int(n) for n in (*late, *measurement)):
+            raise ValueError(f"a delay is a whole number of control periods, 0 or more, got {min(*late, *measurement)}")
+        if wrong := [p for row in loss for p in row if not 0.0 <= p < 1.0]:
             raise ValueError(f"loss is a probability from 0 to below 1, got {wrong[0]:g}; write 0.3 for 30 %")
-        found.lossy += [
-            (i, j)
-            for i in range(inverters.n)
-            for j in range(inverters.n)
-            if inverters.heard[i, j] and found.loss[i][j] > 0.0
-        ]
-        found.depth = 1 + max(ticks.own, *found.setpoint, *(n for row in found.link for n in row))
-        return found
+        lossy = [(i, j) for i, row in enumerate(loss) for j, p in enumerate(row) if heard[i, j] and p > 0.0]
+        return _Delays(link, measurement, setpoint, loss, lossy, depth=1 + max(late))
 
     @property
     def _heard(self) -> Floats:
