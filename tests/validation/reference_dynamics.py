@@ -27,9 +27,7 @@ from gridpeers.plant.plant_config import PlantSettings
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-TURN = np.exp(-2j * np.pi / 3.0 * np.arange(3))
-"""Phases A, B, C of a balanced set."""
-
+TURN = np.exp(-2j * np.pi / 3.0 * np.arange(3))  # phases A, B, C of a balanced set
 GFM_STATES = ("p", "q", "v", "x_over", "x_under", "y_over", "y_under", "e", "theta")
 GFL_STATES = ("w_i", "theta", "f_m", "P_f", "V_m", "Q_f", "cd_A", "cq_A", "cd_B", "cq_B", "cd_C", "cq_C")
 
@@ -152,23 +150,14 @@ class GflEquations(_Kind):
         )
 
 
-EXACT = 1e-12
-"""Largest change of a voltage in the last iteration (pu of the largest)."""
+EXACT = 1e-12  # largest change of a voltage in the last iteration (pu of the largest)
 
 
 class NetworkEquations:
-    """The part of a circuit with voltage; all other nodes are 0.
+    """The part of a circuit with voltage; all other nodes are 0, and loads are constant power and constant current.
 
-    Parameters
-    ----------
-    circuit
-        The network; its loads are constant power and constant current.
-    y_f
-        Filter admittances (S) of the terminals in `formed`.
-    formed
-        Terminals (n x 3 nodes) behind internal voltages.
-    fed
-        Terminals that currents are injected into.
+    `y_f` are the filter admittances (S) of the terminals `formed` (n x 3 nodes), which are behind internal voltages;
+    currents are injected into the terminals `fed`.
     """
 
     def __init__(self, circuit: Circuit, y_f: Complex, formed: NDArray[np.int64], fed: NDArray[np.int64]) -> None:
@@ -194,8 +183,7 @@ class NetworkEquations:
         self.formed, self.fed, self._y_f = place[formed], place[fed], y_f
         self._Y, self._drawn = reduced[:, : K.size], reduced[:, K.size :] @ circuit.source_voltage
         self._Y[self.formed, self.formed] += y_f[:, None]
-        self.nodes = K
-        """Nodes whose voltages are the unknowns."""
+        self.nodes = K  # nodes whose voltages are the unknowns
         self.rotates = not circuit.sources.size
         self._factors: tuple[Real, NDArray[np.int32]] | None = None
 
@@ -241,8 +229,7 @@ class NetworkEquations:
         return step
 
 
-RELATIVE, ABSOLUTE = 1e-7, 1e-8
-"""Tolerances of the integration (pu, rad, Hz)."""
+RELATIVE, ABSOLUTE = 1e-7, 1e-8  # tolerances of the integration (pu, rad, Hz)
 
 
 class DaeDynamics(Dynamics):

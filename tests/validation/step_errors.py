@@ -18,14 +18,11 @@ from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.schema.configs import configs
 from tests.validation.reference_dynamics import reference_plant
 
-STEPS = (0.004, 0.002, 0.001, 0.0005, 0.00025, 0.000125)
-"""Integration steps h (s); rows are compared every `STEPS[0]`."""
-
-EVENTS = (
+STEPS = (0.004, 0.002, 0.001, 0.0005, 0.00025, 0.000125)  # integration steps h (s); rows are compared every `STEPS[0]`
+EVENTS = (  # those of the scenario islanding, closer together
     SwitchEvent(t=0.1, switch="13-152", action="open"),
     SwitchEvent(t=0.5, switch="60-160", action="open"),
 )
-"""Those of the scenario islanding, closer together."""
 
 QUANTITIES = {"f": "Hz", "P": "pu", "Q": "pu", "V": "pu"}
 

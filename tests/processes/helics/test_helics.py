@@ -142,12 +142,11 @@ def test_a_broker_that_is_missing_is_one_line() -> None:
         scenario.run("IV")
 
 
-BROKER = (
+BROKER = (  # A broker that prints its warnings, as `helics_broker` does
     "import sys, helics\n"
     "broker = helics.helicsCreateBroker('zmq', '', f'-f {sys.argv[2]} --localinterface={sys.argv[1]}')\n"
     "helics.helicsBrokerWaitForDisconnect(broker, 30000)\n"
 )
-"""A broker that prints its warnings, as `helics_broker` does."""
 
 
 def test_a_broker_of_others_warns_of_no_topic_that_may_be_missing() -> None:

@@ -9,9 +9,7 @@ from gridpeers.bridges.gridlabd.gridlabd_process import solved_model
 from gridpeers.bridges.gridlabd.read_glm import read_glm
 from gridpeers.plant.network import Network, solve_power_flow
 
-TOLERANCE = 1e-6
-"""Largest difference that the tests allow (pu of nominal voltage)."""
-
+TOLERANCE = 1e-6  # largest difference that the tests allow (pu of nominal voltage)
 HEAD = """clock { timezone UTC0; starttime '2000-01-01 00:00:00'; stoptime '2000-01-02 00:00:00'; }
 module powerflow { solver_method NR; line_capacitance true; }
 object node { name sub; phases ABCN; bustype SWING; nominal_voltage 7200;
@@ -30,7 +28,6 @@ object load { name c_SHORT; phases ABCPHASE; nominal_voltage 277; LOAD }
 """
 
 WYE = "constant_power_A 60000+20000j; constant_current_B 150-60j; constant_impedance_C 1.5+0.5j;"
-
 CENTRE_TAP = """object transformer_configuration { name ct; connect_type SINGLE_PHASE_CENTER_TAPPED; power_rating 25;
   powerB_rating 25; primary_voltage 7200; secondary_voltage 120; impedance 0.006+0.0136j; impedance1 0.012+0.0204j;
   impedance2 0.012+0.0204j; shunt_impedance 5000+2000j; }
@@ -47,7 +44,7 @@ object triplex_load { name zip; phases BS; nominal_voltage 120; parent tm; base_
   current_pf_12 0.9; impedance_pf_12 1; power_fraction_12 0.5; current_fraction_12 0.3; impedance_fraction_12 0.2; }
 """
 
-TRANSFORMERS = "".join(
+TRANSFORMERS = "".join(  # transformers of every connection, a centre-tapped one with its service, a regulator
     [
         HEAD,
         *(
@@ -71,9 +68,8 @@ object load { name at_r; phases ABCN; parent r; nominal_voltage 7200; constant_p
 """,
     ]
 )
-"""Transformers of every connection, a centre-tapped one with its service, a regulator."""
 
-LOADS = (
+LOADS = (  # loads of every kind and connection, at buses of either connection, and capacitors
     HEAD
     + """object load { name wye; phases ABCN; parent b; nominal_voltage 7200; constant_power_A 1e5+3e4j;
   constant_current_B -4-10j; constant_impedance_C 500+150j; }
@@ -95,9 +91,8 @@ object capacitor { name around; parent d; phases ABCD; phases_connected ABCD; no
   capacitor_A 60000; capacitor_B 50000; capacitor_C 40000; switchA CLOSED; switchB CLOSED; switchC CLOSED; }
 """
 )
-"""Loads of every kind and connection, at buses of either connection, and capacitors."""
 
-SWITCHES = (
+SWITCHES = (  # switches that are open and closed, a recloser, a fuse
     HEAD
     + """object switch { name sw; phases ABCN; from b; to nc; status CLOSED; }
 object load { name nc; phases ABCN; nominal_voltage 7200; constant_power_A 1e5+3e4j; constant_power_C 5e4; }
@@ -110,9 +105,8 @@ object fuse { name lateral; phases AN; from nf; to ng; current_limit 1000; }
 object load { name ng; phases AN; nominal_voltage 7200; constant_power_A 3e4+2e4j; }
 """
 )
-"""Switches that are open and closed, a recloser, a fuse."""
 
-ASYMMETRIC = (
+ASYMMETRIC = (  # lines with z12 unlike z21, in a ring with a switch, with an open end
     HEAD.replace("z21 0.16+0.50j", "z21 0.26+0.30j")
     .replace("z31 0.15+0.42j", "z31 0.05+0.60j")
     .replace("z32 0.15+0.38j", "z32 0.22+0.45j")
@@ -130,7 +124,6 @@ object node { name nothing; phases ABCN; nominal_voltage 7200; }
 """
     + SECONDARY.replace("SHORT", "low").replace("CONNECT", "WYE_WYE").replace("PHASE", "N").replace("LOAD", WYE)
 )
-"""Lines with z12 unlike z21, in a ring with a switch, with an open end."""
 
 
 def write(folder: Path, text: str, name: str = "feeder.glm") -> Path:

@@ -11,7 +11,6 @@ from gridpeers.plant.equipment.inverter_parameters import BOUNDS_OF_SET_POINTS, 
 from gridpeers.wire.schema.table_schema import Field, fields_of
 
 ROW = {"name": "inv1", "bus": "13", "P_rated_kW": "600", "m_p_pu": "0.01", "m_q_pu": "0.05"}
-
 KEYS = [
     (kind, field)
     for kind, cls in PARAMETERS_OF.items()

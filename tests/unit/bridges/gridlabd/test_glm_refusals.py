@@ -37,14 +37,11 @@ def problems(path: Path, **options: list[str]) -> tuple[str, ...]:
 ONE_LINE = {
     "no module": ("object node { name a; }\n", "feeder.glm:1: class 'node' is not known"),
     "nothing of a feeder": ("module tape;\n", "feeder.glm: does not load GridLAB-D's powerflow"),
-    "an unknown class": (HEAD + "object foo { name v; }\n", "feeder.glm:9: class 'foo' is not known"),
-    "broken syntax": (HEAD + "object load { name l1; phases ABQ; }\n", "feeder.glm:9: "),
     "an include that is not there": (
         HEAD + '#include "gone.glm"\n',
         "feeder.glm:9: #include failed",
     ),
     "a program": (HEAD + "#system rm -rf nothing\n", "feeder.glm:9: #system would run or load a program"),
-    "a script": (HEAD + "script on_init do;\n", "feeder.glm:9: script on_init would run or load a program"),
     "no substation": (HEAD.replace("bustype SWING;", ""), "NR: no swing bus found"),
     "two substations": (
         HEAD + NODE.replace("NAME", "s2").replace("phases", "bustype SWING; phases") + line("l2", "b", "s2"),
@@ -88,8 +85,7 @@ ONE_LINE = {
 }
 
 
-OF_THE_WHOLE = ("nothing of a feeder", "no substation", "no solution")
-"""Problems that no line of a model has."""
+OF_THE_WHOLE = ("nothing of a feeder", "no substation", "no solution")  # problems that no line of a model has
 
 
 @pytest.mark.parametrize("what", ONE_LINE)

@@ -31,7 +31,6 @@ object capacitor { name cap; parent n; phases ABCN; pt_phase ABC; phases_connect
 OUTPUT = "Control OUTPUT_VOLTAGE; control_level INDIVIDUAL; band_center 7440; band_width 120;"
 BY_HAND = "control MANUAL;"
 VOLT = "control VOLT; control_level BANK; voltage_set_high 7500; voltage_set_low 7300;"
-
 CONTROLS = {
     "output voltage, phase by phase": (OUTPUT, "", BY_HAND),
     "drop of the line": (

@@ -11,7 +11,6 @@ New Load.bc bus1=c.2.3 phases=1 conn=delta kv=0.48 kw=40 kvar=10 model=5
 """Uneven loads at bus c that need no ground."""
 
 T = "New Transformer.t phases=3 windings=2 xhl=4 %loadloss=1 kvs=(12.47 0.48) kvas=(500 500)"
-
 TRANSFORMERS = {
     "wye-wye": f"{T} buses=(b c) conns=(wye wye)\n{LOADS}",
     "delta-wye": f"{T} buses=(b c) conns=(delta wye)\n{LOADS}",
@@ -87,7 +86,7 @@ New Reactor.ground bus1=c.4 phases=1 r=0.1 x=0
 New Load.n bus1=d.1.4 phases=1 kv=0.277 kw=30 kvar=5""",
 }
 
-MODELS = {
+MODELS = {  # every load model, with what it needs beside its number
     1: "model=1",
     2: "model=2",
     3: "model=3",
@@ -97,7 +96,6 @@ MODELS = {
     7: "model=7",
     8: "model=8 zipv=(0.3 0.5 0.2 0.1 0.6 0.3 0)",
 }
-"""Every load model, with what it needs beside its number."""
 
 CONNECTIONS = {
     "three phases, wye": "bus1=c phases=3 conn=wye kv=0.48",

@@ -11,10 +11,7 @@ from gridpeers.bridges.opendss import read_opendss
 from gridpeers.plant.network import Network, solve_power_flow
 
 LETTERS = "ABC456789"
-
-TOLERANCE = 1e-6
-"""Largest difference that the tests allow (pu of nominal voltage)."""
-
+TOLERANCE = 1e-6  # largest difference that the tests allow (pu of nominal voltage)
 SOURCE = """Clear
 Set DefaultBaseFrequency=60
 New Circuit.test bus1=s basekv=12.47 pu=1.02 angle=10 r1=0.1 x1=0.5 r0=0.2 x0=0.9

@@ -21,9 +21,7 @@ from tests.unit.bridges.opendss.opendss_solutions import (
 pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")
 
 LOAD = "New Load.l bus1=c phases=3 kv=0.48 kw=90 kvar=30"
-
 FLOATING = "New Line.z bus1=e bus2=d r1=.1 x1=.1 r0=.1 x0=.1\nNew Load.d bus1=d kv=0.48 kw=10"
-
 SPUR = "New Line.y phases=1 bus1=c.1 bus2=f.1 r1=.1 x1=.1 r0=.1 x0=.1"
 
 

@@ -34,10 +34,6 @@ ONE_LINE = {
     "UPFC": ("New UPFC.u bus1=c bus2=d refkv=0.277", "elements of class upfc are not supported"),
     "two sources": ("New Vsource.two bus1=c basekv=0.48", "vsource.two: a second source"),
     "a line of no length": ("New Line.z bus1=c bus2=d r1=0.1 x1=0.1 length=0", 'Matrix Inversion Error for Line "z"'),
-    "a line of no impedance": (
-        "New Line.z bus1=c bus2=d r1=0 x1=0 r0=0 x0=0 c1=0 c0=0",
-        'Matrix Inversion Error for Line "z"',
-    ),
     "a load on a missing phase": (
         "New Line.z phases=1 bus1=c.1 bus2=d.1 r1=.1 x1=.1 r0=.1 x0=.1\nNew Load.d bus1=d.2 phases=1 kv=0.277 kw=9",
         "load.d: node 2 of bus d is connected to nothing but loads: a phase that does not come there",
@@ -46,7 +42,6 @@ ONE_LINE = {
         "New Load.d bus1=c.1.2.3.4 phases=3 kv=0.48 kw=10",
         "node 4 of bus c",
     ),
-    "a load at no bus": ("New Load.d bus1=nowhere kv=0.48 kw=10", "load.d: node 1, 2, 3 of bus nowhere"),
     "a floating section": (
         "New Line.z bus1=e bus2=d r1=.1 x1=.1 r0=.1 x0=.1\nNew Load.d bus1=d kv=0.48 kw=10",
         "buses e, d (first e.1, e.2, e.3): no path to the source, even with all switches closed",
@@ -82,14 +77,9 @@ ONE_LINE = {
         "New Transformer.t buses=(c d) kvs=(0.48 0) kvas=(99 99)",
         "transformer.t: kv of winding 2 must be above 0, got 0 kV",
     ),
-    "a bank without voltage": ("New Capacitor.k bus1=c kv=0 kvar=9", "capacitor.k: kv must be above 0, got 0 kV"),
     "a source without voltage": ("Edit Vsource.source pu=0", "vsource.source: pu and basekv must be above 0, got 0"),
     "a circuit without frequency": ("Set Frequency=0", "the circuit's frequency: 0 Hz is not plausible"),
     "a script that includes itself": ("Redirect Master.dss", "Master.dss:11: includes itself"),
-    "an element defined twice": (
-        "New Load.l bus1=c kv=0.48 kw=9\nNew Load.l bus1=c kv=0.48 kw=8",
-        'Master.dss:12: Warning: Duplicate new element definition: "Load.l"',
-    ),
     "another linecode": (
         "New Line.l bus1=c bus2=d linecode=nope",
         'Master.dss:11: Line.l.LineCode: LineCode object "nope"',
@@ -97,8 +87,7 @@ ONE_LINE = {
 }
 
 
-OF_THE_WHOLE = ("no solution", "a winding that floats")
-"""Problems that no line of a script has."""
+OF_THE_WHOLE = ("no solution", "a winding that floats")  # problems that no line of a script has
 
 
 @pytest.mark.parametrize("what", ONE_LINE)
@@ -153,11 +142,14 @@ def test_a_script_without_a_circuit_is_told(tmp_path: Path) -> None:
     path.write_text("Clear\nSet DefaultBaseFrequency=60\n")
     assert problems(path) == ("x.dss: makes no circuit; a script has a line New Circuit.name",)
 
-    path.write_bytes(bytes(range(256)) * 200)
-    assert len(problems(path)) <= 4
+    for data in (bytes(range(256)) * 200, b"module powerflow;\nobject node { name a; phases ABCN; }\n"):
+        path.write_bytes(data)
+        assert len(problems(path)) <= 4
 
     (missing,) = problems(tmp_path / "missing.dss")
     assert "there is no such file" in missing
+    (folder,) = problems(tmp_path)
+    assert "is a folder; name the file in it" in folder
 
 
 def test_a_source_of_one_phase_is_told(tmp_path: Path) -> None:
@@ -188,19 +180,6 @@ def test_a_missing_wheel_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert problems(write(tmp_path, LINE)) == (
         "reading .dss files needs the OpenDSS engine; install it: pip install 'gridpeers[opendss]'",
     )
-
-
-def test_a_folder_is_no_script(tmp_path: Path) -> None:
-    """A folder, an empty file and a model for another program end in few lines."""
-    (tmp_path / "folder.dss").mkdir()
-    assert "is a folder; name the file in it" in problems(tmp_path / "folder.dss")[0]
-
-    path = tmp_path / "x.dss"
-    path.write_text("")
-    assert problems(path) == ("x.dss: makes no circuit; a script has a line New Circuit.name",)
-
-    path.write_text("module powerflow;\nobject node { name a; phases ABCN; nominal_voltage 2400; }\n")
-    assert len(problems(path)) <= 4
 
 
 @pytest.mark.parametrize(("script", "bases", "note"), [
