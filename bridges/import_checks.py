@@ -13,7 +13,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from gridpeers.plant.equipment import NODES, PHASES, Feeder
+from gridpeers.plant.equipment import NODES, PHASES, Bus, Feeder, Source, Switch
 from gridpeers.plant.equipment.connectivity import Connectivity, Node, by_bus, connected
 from gridpeers.plant.equipment.imported_equipment import BEHIND, LinearElement, LoadPart, bus_behind
 from gridpeers.plant.tables.feeder_columns import PART_CURRENT, power_of
@@ -36,8 +36,35 @@ def number_of(letter: str) -> str:
 
 
 def element_of(name: str, nodes: Sequence[Node], Y: Any) -> LinearElement:
-    """Return a linear element between nodes, by its admittance matrix (S)."""
     return LinearElement(name=name, nodes=tuple(nodes), Y=tuple(map(tuple, np.asarray(Y, complex).tolist())))
+
+
+def bus_rows(
+    places: Mapping[str, tuple[float, float, float]],
+    added: Mapping[str, str],
+    elements: Sequence[LinearElement],
+    switches: Sequence[Switch],
+    parts: Sequence[LoadPart],
+    source: Source | None,
+) -> tuple[Bus, ...]:
+    """Return the buses to which anything is connected, with the phases that are used.
+
+    `places` have the nominal voltage (V) and coordinates of each bus, in order. A bus in `added` follows the one that
+    is given there, and has its place, unless it has one of its own.
+    """
+    used = {node for row in elements for node in row.nodes} | {(part.bus, p) for part in parts for p in part.ends}
+    used |= {(bus, p) for row in switches for bus in (row.from_bus, row.to_bus) for p in row.phases}
+    used |= {(source.bus, p) for p in PHASES} if source else set()
+    after: dict[str, list[str]] = {name: [name] for name in places if name not in added}
+    for name, like in added.items():
+        after[like].append(name)
+    found = []
+    for like, names in after.items():
+        for name in names:
+            V_nom, x, y = places.get(name) or places[like]
+            if phases := "".join(letter for letter in NODES if (name, letter) in used):
+                found.append(Bus(name=name, phases=phases, V_nom=V_nom, x=x, y=y))
+    return tuple(found)
 
 
 def path_problems(path: Path) -> list[str]:
@@ -238,7 +265,6 @@ def _idle_parts(feeder: Feeder, supported: Collection[Node]) -> list[LoadPart]:
 
 
 def _named(feeder: Feeder, section: Collection[Node], name_node: Callable[[str], str]) -> str:
-    """Return the first buses of a section, and the nodes that it has of the first."""
     nodes = [(bus.name, letter) for bus in feeder.buses for letter in bus.phases if (bus.name, letter) in section]
     buses = list(dict.fromkeys(bus for bus, _ in nodes))
     first = ", ".join(f"{bus}.{name_node(letter)}" for bus, letter in nodes if bus == buses[0])

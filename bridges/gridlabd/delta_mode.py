@@ -74,7 +74,6 @@ class GridlabdCore:
             function.restype, function.argtypes = result, arguments
 
     def clock(self) -> int:
-        """Return the time (s)."""
         return ctypes.c_int64.in_dll(self._library, "global_clock").value
 
     def module(self, name: str) -> Any:
@@ -116,7 +115,6 @@ class GridlabdInverter:
         self._P_set, self._V_set = core.doubles(name, "Pset" if forming else "Pref"), core.doubles(name, "Vset")
 
     def read(self) -> Reading:
-        """Give its reading."""
         V = [abs(complex(*phase)) for phase in self._V]
         set_points = self._P_set[0], self._V_set[0]
         f = sum(each[0] for each in self._f) / len(self._f)
@@ -128,7 +126,6 @@ class NotImportableError(Exception):
 
 
 def gridlabd_package() -> ModuleType:
-    """Return the package gridlabd."""
     try:
         package = importlib.import_module("gridlabd")
         _ = package.DirectGridLabD, package.GLDErrorCode
@@ -160,7 +157,6 @@ class Simulation:
         self._wait()
 
     def advance(self, steps: int) -> list[list[Reading]]:
-        """Take steps; returns the readings after each."""
         self._left, self._steps = steps, []
         self._go.release()
         self._wait()
@@ -203,7 +199,6 @@ class Simulation:
 
 
 def answers(requests: Iterator[dict[str, Any]]) -> Iterator[dict[str, Any]]:
-    """Answer requests, the first of which loads the model."""
     first = next(requests)
     simulation = Simulation(first["load"], first["inverters"])
     yield {}
@@ -225,7 +220,6 @@ def end_with(parent: int) -> None:
 
 
 def main() -> None:
-    """Serve until standard input ends."""
     end_with(int(sys.argv[1]))
     out = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)  # GridLAB-D prints to standard output

@@ -124,7 +124,6 @@ def write_glm(
 
 
 def read_tables(folder: Path) -> dict[str, list[dict[str, str]]]:
-    """Return the rows of each table of a folder, by the file's name without its end."""
     found = {}
     for path in sorted(folder.glob("*.csv")):
         with path.open(newline="", encoding="utf-8") as file:

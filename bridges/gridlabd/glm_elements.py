@@ -11,7 +11,7 @@ import numpy as np
 
 from gridpeers.bridges.gridlabd.glm_text import SWITCHES
 from gridpeers.bridges.import_checks import element_of
-from gridpeers.plant.equipment import Bus, Switch
+from gridpeers.plant.equipment import Switch
 from gridpeers.plant.equipment.imported_equipment import LinearElement, LoadPart, bus_behind, cut_off
 
 Matrix = np.ndarray[Any, np.dtype[np.complex128]]
@@ -52,10 +52,8 @@ class GlmElements:
         self.switches: list[Switch] = []
         self.used: set[str] = set()
         self.added: dict[str, str] = {}  # buses that are not in the model, and the bus before each
-        self._phases: dict[str, str] = {}  # of added buses
 
     def add(self, branch: dict[str, Any]) -> None:
-        """Take a branch over."""
         kind, name = branch["class"], f"{branch['class']}.{branch['name']}"
         closed = "" if branch["open"] else "".join(p for k, p in enumerate(LETTERS) if branch["Y_from"][k, k])
         wanted = {name, branch["name"]} & self._wanted
@@ -82,25 +80,10 @@ class GlmElements:
         Between them is an ideal transformer for each phase: what stands against it is next to no impedance.
         """
         stiff = bus_behind(bus, "swing")
-        self.added[stiff], self._phases[stiff] = bus, LETTERS
+        self.added[stiff] = bus
         Y = STIFF * np.block([[np.diag(abs(ratios) ** 2), np.diag(-ratios.conj())], [np.diag(-ratios), np.eye(3)]])
         self.rows.append(element_of(f"swing.{bus}", [(name, p) for name in (stiff, bus) for p in LETTERS], Y))
         return stiff
-
-    def bus_rows(self, used: set[str], places: Mapping[str, tuple[float, float]]) -> tuple[Bus, ...]:
-        """Return the buses in the solver's order, each with those that are added beside it."""
-        beside: dict[str, list[tuple[str, str]]] = {}
-        for name, like in self.added.items():
-            beside.setdefault(like, []).append((name, self._phases[name]))
-        found = []
-        for bus in self._buses:
-            x, y = places[bus["name"]]
-            own = [(bus["name"], letters_of(bus["phases"]))] if bus["name"] in used else []
-            found += [
-                Bus(name=name, phases=letters, V_nom=bus["V_nom"], x=x, y=y)
-                for name, letters in [*own, *beside.get(bus["name"], ())]
-            ]
-        return tuple(found)
 
     def _add_switch(
         self, name: str, branch: dict[str, Any], letters: str, blocks: Matrix, *, closed: bool, suffix: str = ""
@@ -108,7 +91,7 @@ class GlmElements:
         """Put an ideal switch before a branch, or before one of its phases."""
         bus, short = self._buses[branch["from"]]["name"], branch["name"] + suffix
         behind = bus_behind(bus, short)
-        self.added[behind], self._phases[behind] = bus, letters
+        self.added[behind] = bus
         self._append(name + suffix, branch, blocks, behind)
         self.switches.append(
             Switch(name=f"{bus}-{behind}", alias=short, from_bus=bus, to_bus=behind, phases=letters, closed=closed)
@@ -201,7 +184,6 @@ def load_parts(name: str, bus: Mapping[str, Any], takes: Mapping[tuple[str, str]
 
 
 def shunt(name: str, bus: str, takes: Mapping[tuple[str, str], complex]) -> LinearElement:
-    """Return a capacitor that has admittances (S), as an element."""
     ends = {branch: LEGS.get(branch) or (branch[0], branch[1:]) for _, branch in takes}
     letters = sorted({letter for pair in ends.values() for letter in pair if letter})
     Y = np.zeros((len(letters), len(letters)), complex)

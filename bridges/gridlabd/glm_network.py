@@ -214,7 +214,6 @@ def _loads(rows: Iterable[TableRow], V_nom: Mapping[str, float]) -> list[str]:
 
 
 def _capacitors(rows: Iterable[TableRow], V_nom: Mapping[str, float]) -> list[str]:
-    """Capacitor banks, as the constant impedances that they are."""
     blocks = []
     for number, row in enumerate(rows):
         V = float(row["V_rated_kV_LN"]) * 1e3
@@ -225,6 +224,5 @@ def _capacitors(rows: Iterable[TableRow], V_nom: Mapping[str, float]) -> list[st
 
 
 def _load(name: str, bus: str, V_nom: Mapping[str, float], values: Mapping[str, complex]) -> str:
-    """One load object at a bus, with its powers, currents or impedances by GridLAB-D's names."""
     phases = "".join(sorted({phase for key in values for phase in key.rpartition("_")[2]})) + "N"
     return block("load", name=f"{name}_{bus}", parent=f"n{bus}", phases=phases, nominal_voltage=V_nom[bus], **values)

@@ -196,7 +196,6 @@ class GridlabdPlant(RecordedPlant):
         return Reduction(circuit, np.zeros(forming.size, complex), forming, np.ones(forming.size, bool))
 
     def _in_units(self, name: str, reading: NDArray[np.float64]) -> tuple[float, ...]:
-        """Convert a reading to Hz, W, var, V, W, V."""
         unit, (f, P, Q, V, P_set, V_set, *_) = self._units[name], reading.tolist()
         return f, P, Q, V, P_set * (unit.P_rated if unit.kind == "GFM" else 1.0), V_set * unit.V_nom
 

@@ -104,12 +104,10 @@ class ModelCore(GridlabdCore):
     """GridLAB-D's shared library: objects' heads, flags and properties by raw pointer."""
 
     def find(self, name: bytes) -> int | None:
-        """Return an object's address."""
         address: int | None = self._library.object_find_name(name)
         return address
 
     def stop_after(self, seconds: int) -> None:
-        """Let the simulation end so long (s) after its first moment."""
         start, stop = (ctypes.c_int64.in_dll(self._library, f"global_{which}time") for which in ("start", "stop"))
         stop.value = start.value + seconds
 
@@ -121,7 +119,6 @@ class ModelCore(GridlabdCore):
         return head
 
     def has(self, name: str, key: str) -> bool:
-        """Return whether an object has a property."""
         return bool(self._library.object_get_addr(self.find(name.encode()), key.encode()))
 
     def object_of(self, name: str, key: str) -> str:
@@ -134,7 +131,6 @@ class ModelCore(GridlabdCore):
         return ctypes.c_uint32.from_address(self._address(name, key)).value
 
     def complex(self, name: str, key: str) -> complex:
-        """Return a complex property."""
         return complex(*self.doubles(name, key, 2))
 
 

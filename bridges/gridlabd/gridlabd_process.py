@@ -91,7 +91,6 @@ class DeltaModeProcess:
         return self._answer(request, self._deadline)
 
     def close(self) -> None:
-        """End the process, at any time and as often as you like."""
         self._process.close()
         self._folder.close()
 
@@ -144,7 +143,6 @@ def solved_model(path: Path) -> dict[str, Any]:
 
 
 def _solved(path: Path, *options: str) -> tuple[dict[str, Any], str]:
-    """Return the answer of GridLAB-D's process, and the lines that it printed."""
     with closing(TransientFolder("gridpeers-gridlabd-")) as folder:
         result = folder.path / "result.pickle"
         try:

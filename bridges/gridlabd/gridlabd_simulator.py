@@ -23,13 +23,10 @@ _OTHERWISE = 'or use simulator = "gridpeers"'
 
 
 class GridlabdSimulator(Simulator):
-    """GridLAB-D in its delta mode."""
-
     package = "gridlabd"
     words = 'the plant of simulator "gridlabd"'
 
     def start(self, config: PlantConfig, feeder: Feeder) -> LivePlant:
-        """Start GridLAB-D on a feeder, with the powers of our operating point."""
         from gridpeers.bridges.gridlabd.export_glm import write_tables
         from gridpeers.bridges.gridlabd.gridlabd_plant import GridlabdPlant  # scenarios are checked without it
         from gridpeers.plant.feeder import Plant
@@ -53,7 +50,6 @@ class GridlabdSimulator(Simulator):
             )
 
     def check(self, scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
-        """Note what a scenario asks for beyond GridLAB-D's delta mode and our model of it."""
         for text in unrepresentable(feeder):
             path = "plant.feeder" if scenario.plant.f_nom_Hz is None else "plant.f_nom_Hz"
             problems.add(path, f"{text}; change it, {_OTHERWISE}")
@@ -86,7 +82,6 @@ class GridlabdSimulator(Simulator):
         _check_supply(scenario, feeder, problems)
 
     def starting(self, table: None) -> str:
-        """Return what to tell a person who waits for the start."""
         return (
             "still starting: GridLAB-D solves the feeder and comes to rest before t = 0; the first run ever compiles "
             "our operating point before that, which takes some 10 seconds ..."

@@ -29,8 +29,8 @@ from gridpeers.bridges.gridlabd.glm_text import (
 from gridpeers.bridges.gridlabd.gridlabd_power_flow import PV, SWING
 from gridpeers.bridges.gridlabd.gridlabd_process import solved_model
 from gridpeers.bridges.import_checks import (
-    BEYOND,
     MATCH,
+    bus_rows,
     checked,
     difference,
     left_out_by,
@@ -95,7 +95,6 @@ class _GlmReader:
         return f"{self._classes[name]}.{name}"
 
     def read(self, f_nom: float | None, switches: Sequence[str]) -> Feeder:
-        """Return the feeder, or raise a FeederError with every problem."""
         model, problems = self._model, self._problems
         if f_nom is not None and f_nom != model["f_nom"]:
             problems.append(
@@ -129,12 +128,12 @@ class _GlmReader:
             refuse_if(self._path, problems, self._places)
         assert source is not None
         rows = [*elements.rows, *shunts]
-        used = {bus for row in rows for bus, _ in row.nodes} | {part.bus for part in parts} | {source.bus}
-        used |= {bus for switch in elements.switches for bus in (switch.from_bus, switch.to_bus)}
+        at = {row["name"]: row["place"] for row in model["objects"]}
+        places = {name: (bus["V_nom"], *at[name]) for name, bus in self._buses.items()}
         feeder = Feeder(
             name=self._path.stem,
             load_set="main",
-            buses=elements.bus_rows(used, {row["name"]: row["place"] for row in model["objects"]}),
+            buses=bus_rows(places, elements.added, rows, elements.switches, parts, source),
             switches=tuple(elements.switches),
             source=source,
             f_nom=model["f_nom"],
@@ -150,7 +149,6 @@ class _GlmReader:
         return with_plain_names(feeder, elements.added)
 
     def _judge_classes(self) -> None:
-        """Note a problem for each object that cannot be represented, and those that stay as they are."""
         known = DATA | WATCHING | LINEAR | SWITCHES | set(CHILD_OF_BUS)
         for name, kind in self._classes.items():
             if name in self._left_out:
@@ -169,7 +167,6 @@ class _GlmReader:
                 self._problems.append(f"{called}: objects of class {kind} are not supported; {hint}")
 
     def _note_settling(self) -> None:
-        """Note how far GridLAB-D has gone on, and what its regulators and capacitors have done."""
         settling = self._model.get("settling")
         if not settling:
             return
@@ -214,7 +211,6 @@ class _GlmReader:
         return mended
 
     def _loads(self) -> tuple[list[LinearElement], list[LoadPart]]:
-        """Return capacitors and loads, bus by bus."""
         at_bus: dict[str, list[str]] = {bus: [] for bus in self._buses}
         for name in self._model["takes"]:
             if bus := self._bus_of(name):
@@ -246,7 +242,6 @@ class _GlmReader:
         return name
 
     def _source(self, elements: GlmElements) -> Source | None:
-        """Return the substation: the bus whose voltage is given."""
         # a SWING_PQ takes over only where no SWING is
         given = [n for n, bus in self._buses.items() if bus["type"] == SWING and n not in self._left_out]
         second = [n for n, bus in self._buses.items() if bus["type"] == PV or n in given[1:]]
@@ -269,19 +264,7 @@ class _GlmReader:
 
     def _compare(self, feeder: Feeder) -> None:
         """Note a problem if our power flow does not have GridLAB-D's voltages: something acts that we do not know."""
-        V_nom = {bus.name: bus.V_nom for bus in feeder.buses}
-        nodes = {(bus.name, letter) for bus in feeder.buses for letter in bus.phases}
         theirs = {(name, p): V for name, bus in self._buses.items() for p, V in voltages_of(bus).items()}
-        theirs = {node: V for node, V in theirs.items() if node in nodes}
-        (bus, phase), highest = max(theirs.items(), key=lambda item: abs(item[1]) / V_nom[item[0][0]])
-        if abs(highest) > BEYOND * V_nom[bus]:
-            alone = [name for name in self._buses if name not in V_nom]
-            hint = f"nothing leads to bus {', '.join(alone[:3])}" if alone else "some section has no source"
-            self._problems.append(
-                f"bus {bus}: GridLAB-D's power flow has {abs(highest) / V_nom[bus]:.2g} pu: {hint}; take it out of the "
-                "model, or connect it"
-            )
-            return
         try:
             worst, (bus, phase) = difference(feeder, theirs)
         except ArithmeticError as error:

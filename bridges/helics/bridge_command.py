@@ -81,7 +81,6 @@ def helics(
 
 
 def _outside(text: str, known: list[str], spec: ScenarioModel) -> tuple[str, ...]:
-    """Return the inverters that others control."""
     listed = [name.strip() for name in text.split(",")]
     names = known if text == "all" else [] if text == "none" else listed
     for name in names:

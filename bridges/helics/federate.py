@@ -119,7 +119,6 @@ class HelicsFederate:
         raise HelicsError(f"HELICS, {self._when}: {late}{where}; end what hangs, or raise {key}")
 
     def _answer(self, until: float) -> dict[str, Any] | None:
-        """Return the next answer of the process; None at a time of `monotonic` (s)."""
         try:
             return self._process.answer(until)
         except ProcessEndedError as how:
@@ -128,7 +127,6 @@ class HelicsFederate:
             raise HelicsError(f"HELICS, {self._when}: our federate {name} {how}; {last or 'no word'}") from None
 
     def _explained(self, error: str, doing: str) -> str:
-        """Return an error of HELICS with what it means."""
         broker = self._settings.broker
         if error.startswith("no broker"):
             return f"{error}; start one: helics_broker -f 2, or --start-broker of gridpeers bridge helics"

@@ -52,7 +52,6 @@ class Federate:
         self.publishers: dict[str, set[str]] = {}  # by federate: our subscriptions that it publishes
 
     def join(self, request: dict[str, Any]) -> dict[str, Any]:
-        """Start the broker if asked for, and connect to it."""
         helics, host, port = self.helics, request["host"], request["port"]
         self.name = request["name"]
         if request["federates"]:
@@ -78,7 +77,6 @@ class Federate:
         return {}
 
     def begin(self, request: dict[str, Any]) -> dict[str, Any]:
-        """Register all topics, wait for the whole federation, and tell which topics nobody publishes."""
         helics = self.helics
         for key, kind, unit in request["publications"]:
             code = getattr(helics, f"HELICS_DATA_TYPE_{kind.upper()}")
@@ -101,7 +99,6 @@ class Federate:
         return {"others": others, "missing": missing}
 
     def step(self, request: dict[str, Any]) -> dict[str, Any]:
-        """Publish, go to a time, and return what was published since the last step."""
         helics = self.helics
         self._publish(request["publish"])
         helics.helicsFederateRequestTime(self.fed, request["time"])
@@ -138,7 +135,6 @@ class Federate:
             time.sleep(FAREWELL)  # HELICS has no sign that the others have heard it
 
     def times(self) -> list[str]:
-        """Return the other federates and the times at which they stand, for a complaint."""
         if self.fed is None:
             return []
         answer = self._query("root", "global_time")
@@ -201,7 +197,6 @@ def _reach(host: str, port: int, wait: float) -> None:
 
 
 def main() -> None:
-    """Answer requests until the end of standard input."""
     answers = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(2, 1)
     requests: queue.Queue[dict[str, Any]] = queue.Queue()

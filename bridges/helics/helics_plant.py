@@ -101,7 +101,6 @@ class HelicsPlant(RecordedPlant):
         raise ValueError(f"load {name}: the outside plant has the loads, and HELICS no topic for them")
 
     def advance(self) -> None:
-        """Publish the set-points, and go on to the next tick."""
         try:
             for k in range(1, self._rows_a_tick + 1):
                 self._hear(self.tick * self._rows_a_tick + k)
@@ -111,7 +110,6 @@ class HelicsPlant(RecordedPlant):
         self.tick += 1
 
     def close(self) -> None:
-        """Leave the federation, or end it if the run has not reached its end."""
         _leave(self._federate, self.tick, self._end_tick, self._T_c, {})
 
     def _hold(self, name: str, *set_points: float) -> None:
@@ -121,7 +119,6 @@ class HelicsPlant(RecordedPlant):
         self._values |= own
 
     def _hear(self, row: int) -> None:
-        """Publish what is due, go on to a record time, and take its values."""
         t = time_of(row, self._record)
         came = self._federate.step(self._outgoing, t, ACT)
         self._outgoing = {}
@@ -210,7 +207,6 @@ class BridgedPlant(RecordedPlant):
         return self._plant.set_load(name, setting)
 
     def advance(self) -> None:
-        """Take the outside set-points of this tick, advance, and publish every row at its time."""
         first = time_of(self._tick * round(self._T_c / self._record) + 1, self._record)
         self._take(self._federate.step(self._outgoing, first, needed=bool(self._held)))
         for name, (P_set, V_set) in self._held.items():
@@ -226,12 +222,10 @@ class BridgedPlant(RecordedPlant):
         self._outgoing = self._measured() | self._as_value(happened)
 
     def close(self) -> None:
-        """Publish the last values and leave; end the federation if the run has not reached its end."""
         _leave(self._federate, self._tick, self._end_tick, self._T_c, self._outgoing)
         self._plant.close()
 
     def _take(self, came: Mapping[str, Value]) -> None:
-        """Keep the set-points that came for the next tick."""
         for name, held in self._held.items():
             keys = [topic.key for topic in topics(self._prefix, [name], SET_POINTS)]
             P_set, V_set = (number(came.get(key, own)) for key, own in zip(keys, held, strict=True))
@@ -248,12 +242,10 @@ class BridgedPlant(RecordedPlant):
         return {**dict(zip(self._row_keys, numbers, strict=True)), **changed}
 
     def _as_value(self, happened: Iterable[PlantEvent]) -> dict[str, Value]:
-        """Return events as the value of their topic; nothing without any."""
         text = msgspec.json.encode(tuple(happened)).decode()
         return {events(self._prefix).key: text} if text != "[]" else {}
 
     def _note_absent(self, federation: Mapping[str, list[str]]) -> None:
-        """Note the inverters that nobody outside controls; refuse to run if that is all of them."""
         asked = {name: [topic.key for topic in topics(self._prefix, [name], SET_POINTS)] for name in self._held}
         absent = [name for name, keys in asked.items() if set(keys) <= set(federation["missing"])]
         if absent and len(absent) == len(asked):
@@ -271,7 +263,6 @@ def _others(federation: Mapping[str, list[str]]) -> str:
 
 
 def _leave(federate: HelicsFederate, tick: int, end_tick: int | None, T_c: float, publish: Mapping[str, Value]) -> None:
-    """Publish the last values and leave, or end a federation if the run has not reached its end."""
     if tick == end_tick:
         federate.end(publish)
     else:

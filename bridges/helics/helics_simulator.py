@@ -56,7 +56,6 @@ class HelicsSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
 
 
 def settings_of(settings: PlantSettings) -> HelicsSettings:
-    """Return the federate of a run."""
     return msgspec.convert(settings.simulators.get("helics", {}), HelicsSettings)
 
 
@@ -69,19 +68,16 @@ class HelicsSimulator(Simulator):
     table = HelicsSettings
 
     def start(self, config: PlantConfig, feeder: Feeder) -> LivePlant:
-        """Join the federation that has the plant."""
         from gridpeers.bridges.helics.helics_plant import HelicsPlant  # scenarios are checked without it
 
         return HelicsPlant(config, feeder)
 
     def offer(self, build: Callable[[], LivePlant], config: PlantConfig) -> LivePlant:
-        """Join the federation with our plant."""
         from gridpeers.bridges.helics.helics_plant import BridgedPlant
 
         return BridgedPlant(build, config)
 
     def starting(self, table: HelicsSettings | None) -> str:
-        """Return what to tell a person who waits for the start."""
         return f"still starting: waiting for the HELICS federation at {table.broker if table else BROKER} ..."
 
 
@@ -91,8 +87,6 @@ HELICS = HelicsSimulator()
 def endpoint(broker: str) -> tuple[str, int]:
     """Return host and port of a broker's address.
 
-    Examples
-    --------
     >>> endpoint("tcp://10.0.0.5:24000"), endpoint("localhost")
     (('10.0.0.5', 24000), ('127.0.0.1', 23404))
     """

@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gridpeers.bridges.import_checks import element_of, left_out_by, refuse_if, report_powers
+from gridpeers.bridges.import_checks import bus_rows, element_of, left_out_by, refuse_if, report_powers
 from gridpeers.bridges.opendss.dss_engine import METERS, DssEngine, bus_of, complexes, unusual_voltages
 from gridpeers.bridges.opendss.dss_loads import GENERATION, letter_of, read_generation, read_loads
-from gridpeers.plant.equipment import NODES, Bus, Feeder, Source, Switch
+from gridpeers.plant.equipment import NODES, Feeder, Source, Switch
 from gridpeers.plant.equipment.connectivity import Node
 from gridpeers.plant.equipment.imported_equipment import LinearElement, LoadPart, bus_behind
 from gridpeers.plant.tables.feeder_columns import SOURCE_VOLTAGE
@@ -110,7 +110,7 @@ def read_circuit(request: ImportRequest, tell: Callable[[str], None]) -> DssCirc
     feeder = Feeder(
         name=str(circuit.Name),
         load_set="main",
-        buses=taken.buses(load_parts),
+        buses=bus_rows(taken.places(), taken.added, taken.rows, taken.switches, load_parts, taken.source),
         switches=tuple(taken.switches),
         source=taken.source,
         f_nom=frequency,
@@ -136,7 +136,7 @@ class DssElements:
         self.source: Source | None = None
         self.added: dict[str, str] = {}
         """Buses that are not in the script, and the bus whose voltage and place each has."""
-        self._source_V_nom: dict[str, float] = {}
+        self._source_place: dict[str, tuple[float, float, float]] = {}
 
     def add(self, name: str) -> None:
         """Take an element over by its primitive admittance matrix; before a line that switches stands an ideal switch.
@@ -177,7 +177,6 @@ class DssElements:
             self._engine.execute("solve")
 
     def add_source(self, name: str) -> None:
-        """Take the substation over: a stiff voltage behind the source's short-circuit impedance."""
         vsource, short = self._engine.circuit.Vsources, name.partition(".")[2]
         vsource.Name = short
         element = self._active(name)
@@ -198,9 +197,10 @@ class DssElements:
             self.added[stiff] = bus
             # conductor k leads to node nodes[k], and has the angle of the k-th phase
             self._append(name, [*((stiff, letter) for letter in "ABC"), *nodes[:3]], np.block([[Y, -Y], [-Y, Y]]))
-            V_nom = self._place(bus)[0]
+            V_nom, x, y = self._place(bus)
             if SOURCE_VOLTAGE.objection(E / V_nom):  # the voltage base of the bus is not meant for it
-                V_nom = self._source_V_nom[stiff] = E
+                V_nom = E
+            self._source_place = {stiff: (V_nom, x, y)}
             self.source = Source(bus=stiff, V_pu=E / V_nom, angle=radians(vsource.AngleDeg))
             if vsource.Frequency != frequency:
                 problem = (
@@ -210,24 +210,10 @@ class DssElements:
         if problem:
             self._problems.append(f"{name}: {problem}")
 
-    def buses(self, parts: list[LoadPart]) -> tuple[Bus, ...]:
-        """Return the buses that anything is connected to, in the script's order, with their nodes, voltages, places."""
-        used = {node for row in self.rows for node in row.nodes}
-        used |= {(part.bus, letter) for part in parts for letter in part.ends}
-        used |= {(bus, p) for row in self.switches for bus in (row.from_bus, row.to_bus) for p in row.phases}
-        if self.source:
-            used |= {(self.source.bus, letter) for letter in "ABC"}
-        beside: dict[str, list[str]] = {}
-        for name, like in self.added.items():
-            beside.setdefault(like, []).append(name)
-        found = []
-        for name in (str(name).lower() for name in self._engine.circuit.AllBusNames):
-            for each in (name, *beside.get(name, ())):
-                phases = "".join(letter for letter in NODES if (each, letter) in used)
-                if phases:
-                    V_nom, x, y = self._place(name)
-                    found.append(Bus(name=each, phases=phases, V_nom=self._source_V_nom.get(each, V_nom), x=x, y=y))
-        return tuple(found)
+    def places(self) -> dict[str, tuple[float, float, float]]:
+        """Return the nominal voltage (V, line-to-neutral) and coordinates of each bus, in the script's order."""
+        names = [str(name).lower() for name in self._engine.circuit.AllBusNames]
+        return {name: self._place(name) for name in names} | self._source_place
 
     def _active(self, name: str) -> Any:
         self._engine.circuit.SetActiveElement(name)

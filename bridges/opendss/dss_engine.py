@@ -115,7 +115,6 @@ class DssEngine:
         return []
 
     def execute(self, command: str, where: str = "") -> str:
-        """Run one command, from there in a script; return the engine's message if it fails."""
         from dss import DSSException
 
         self._tell(f"{where}: {command}")
@@ -286,7 +285,6 @@ def unusual_voltages(circuit: Any, parts: Sequence[LoadPart], V: Mapping[Node, c
 
 
 def _first(names: Collection[str]) -> str:
-    """Return the first of several names, and how many more there are."""
     more = len(names) - 1
     return f"{next(iter(names))} (and {more} more)" if more else next(iter(names))
 

@@ -29,7 +29,6 @@ class Branches(NamedTuple):
     V_nom: float  # nominal voltage across each (V)
 
     def across(self, V: Any) -> Any:
-        """Return the voltage across each branch, from those of the conductors (V)."""
         return np.array([V[start] - V[end] for start, end in self.conductors])
 
     def parts(self, name: str, laws: list[Law], V_off_above: float) -> list[LoadPart]:

@@ -103,7 +103,6 @@ if it is sound, take out what comes before it, half by half, to find the cause: 
 
 
 def main() -> None:
-    """Serve until standard input ends."""
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)  # the engine may print
     for line in sys.stdin:

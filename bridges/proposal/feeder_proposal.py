@@ -192,7 +192,6 @@ def heaviest_phase(S: NDArray[np.complex128]) -> float:
 
 
 def neighbours(feeder: Feeder) -> dict[str, list[str]]:
-    """Return the buses beside each bus, over branches and switches that are closed."""
     near: dict[str, list[str]] = {bus.name: [] for bus in feeder.buses}
     ties = [(switch.from_bus, switch.to_bus) for switch in feeder.switches if switch.closed]
     for one, other in [*((one, other) for one, other, _ in feeder.branches()), *ties]:

@@ -153,7 +153,6 @@ class _Project:
         return load_scenario(str(self.file))
 
     def calmed(self) -> bool:
-        """Choose the settings with which the plant comes to rest on droop alone, and say what they are."""
         if not (found := unsteady(*self.write(), "none")):
             return True
         for settings, words in REMEDIES.items():
