@@ -17,8 +17,7 @@ IN_PROCESS = ("tests/unit", "tests/golden", "tests/papers", "tests/fuzz")
 ONE_RUN = (
     "tests/golden/catalogue",
     "tests/papers/singhal2022",
-    "tests/conformance/test_blackout.py",
-    "tests/conformance/test_three_islands.py",
+    "tests/conformance/test_islands.py",
 )
 """Tests that look at the same runs of the catalogue: one worker has them all, and runs each case once."""
 

@@ -14,7 +14,7 @@ from gridpeers.scenarios.results.link_record import LinkRecord
 from gridpeers.scenarios.run_request import Outcome
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.schema.configs import configs
-from tests.toy.link_traces import by_link
+from tests.toy.toy_runs import by_link
 
 STORM = """
 seed = 7

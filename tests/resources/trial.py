@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
@@ -16,8 +16,59 @@ from msgspec.structs import replace
 from gridpeers.scenarios.live.live_options import LiveOptions, configure
 from gridpeers.scenarios.schema import load_scenario
 from tests.resources.attack import LINKED, Attack
-from tests.resources.usage import Memory, MemoryWatch, log_bytes
 from tests.toy.town import Town
+
+MB = 1024.0
+"""kB in a MB, as the kernel counts."""
+
+
+def status_of(pid: int, name: str) -> float:
+    """Return a size (MB) of a process by the kernel's name, e.g. VmRSS."""
+    for line in Path(f"/proc/{pid}/status").read_text().splitlines():
+        if line.startswith(f"{name}:"):
+            return float(line.split()[1]) / MB
+    raise ValueError(f"process {pid} has no {name}")
+
+
+def forget_peak(pid: int) -> None:
+    """Begin to look for the highest memory of a process anew."""
+    Path(f"/proc/{pid}/clear_refs").write_text("5")
+
+
+class Memory(NamedTuple):
+    """Resident memory of a process (MB)."""
+
+    before: float
+    peak: float
+    after: float
+
+    @property
+    def growth(self) -> float:
+        """Peak beside what it was before."""
+        return self.peak / self.before
+
+
+class MemoryWatch:
+    """Memory of processes from now on."""
+
+    def __init__(self, pids: Mapping[str, int]) -> None:
+        self._pids = dict(pids)
+        self._before = {name: status_of(pid, "VmRSS") for name, pid in self._pids.items()}
+        for pid in self._pids.values():
+            forget_peak(pid)
+
+    def read(self) -> dict[str, Memory]:
+        """Return the memory of each so far."""
+        return {
+            name: Memory(self._before[name], status_of(pid, "VmHWM"), status_of(pid, "VmRSS"))
+            for name, pid in self._pids.items()
+        }
+
+
+def log_bytes(folder: Path) -> int:
+    """Return the bytes of all logs in a folder."""
+    return sum(path.stat().st_size for path in folder.rglob("*.log"))
+
 
 PLANT_COMMAND = ("-m", "gridpeers.scenarios.emulation.emulated_plant")
 

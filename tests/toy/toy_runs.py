@@ -8,9 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.netem.ledger import LinkTrace
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.scenarios.drivers.children import Child, Children
 from gridpeers.scenarios.drivers.process_driver import run_processes
+from gridpeers.scenarios.results.link_record import LinkRecord
 from gridpeers.scenarios.run_request import Outcome
 from gridpeers.wire.messages import PlantEvent, Telemetry
 from tests.toy import toy_plant
@@ -100,3 +102,13 @@ def first_difference(expected: Rows, got: Rows) -> str:
             pairs = [f"{n}: {x!r} != {y!r}" for n, x, y in zip(names, a, b, strict=True) if x != y]
             return f"first difference at t = {a[0]:g} s: " + ", ".join(pairs[:6])
     return "" if len(expected) == len(got) else f"{len(expected)} rows, but {len(got)}"
+
+
+def by_link(record: LinkRecord) -> dict[tuple[str, str], LinkTrace]:
+    """Return the verdicts of each link (src, dst)."""
+    found: dict[tuple[str, str], LinkTrace] = {}
+    for part in record.traces():
+        link = part.src, part.dst
+        one = found.get(link, LinkTrace(*link, (), (), ()))
+        found[link] = LinkTrace(*link, one.seq + part.seq, one.t + part.t, one.outcome + part.outcome)
+    return found

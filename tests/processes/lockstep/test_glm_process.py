@@ -9,9 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from gridpeers.bridges.gridlabd.read_glm import read_glm
-from gridpeers.plant.tables.read import FeederError
-
 WAITING = """import os, signal, sys
 with open(os.environ["TOLD"], "w") as told:
     told.write(f"{os.getpid()} {os.path.dirname(sys.argv[2])}")
@@ -51,24 +48,3 @@ def test_a_killed_import_leaves_no_process_and_no_folder(model: Path) -> None:
         assert select.select([each], [], [], 60.0)[0] == [each]
         os.close(each)
     assert not Path(scratch).exists()
-
-
-@pytest.mark.parametrize(
-    ("damage", "reason"),
-    [
-        ("raise OSError('libgld.so: cannot open')", "OSError: libgld.so: cannot open"),
-        ("", "AttributeError: module 'gridlabd' has no attribute 'DirectGridLabD'"),
-    ],
-    ids=["does not load", "another package"],
-)
-def test_a_damaged_wheel_is_one_line(model: Path, damage: str, reason: str) -> None:
-    """A package that is there and is of no use is not missing: the line says why, and how to mend it."""
-    (model.parent / "gridlabd.py").write_text(damage + "\n")
-
-    with pytest.raises(FeederError) as refused:
-        read_glm(model)
-
-    assert refused.value.problems == (
-        f"gridlabd is installed, but cannot be imported ({reason}); the import of .glm files needs it: "
-        "pip install --force-reinstall gridlabd",
-    )

@@ -21,10 +21,10 @@ from gridpeers.scenarios.emulation.link_data import EmulationConfig, LinkCommand
 from gridpeers.scenarios.results.link_record import LinkRecord
 from gridpeers.scenarios.schema import load_scenario
 from tests.processes.terminals import Desk
-from tests.toy.link_traces import by_link
 from tests.toy.town import Town
 from tests.toy.toy_configs import toy_configs
 from tests.toy.toy_plant import ToyPlant
+from tests.toy.toy_runs import by_link
 
 FOUR = ("inv1", "inv2", "inv3", "inv4")
 MICROGRIDS = {"inv1": "mg1", "inv2": "mg1", "inv3": "mg1", "inv4": "mg2"}

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
-from typing import Any
+from pathlib import Path
+from typing import Any, get_args
 
 import msgspec
 import pytest
@@ -11,13 +13,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gridpeers.netem.fault_schedule import Change, Heal, replayed, schedule_of
-from gridpeers.netem.models.delay import Lognormal, Normal
-from gridpeers.netem.models.loss import Bernoulli, GilbertElliott
+from gridpeers.netem.models.delay import AnyDelay, Lognormal, Normal, Trace
+from gridpeers.netem.models.lie import AnyLie
+from gridpeers.netem.models.loss import AnyLoss, Bernoulli, GilbertElliott
 from gridpeers.netem.models.medium import Cut
-from gridpeers.netem.schema.fault import PROFILES, Fault
+from gridpeers.netem.schema.fault import KINDS, PROFILES, Fault
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.netem.schema.partition import Partition
 from gridpeers.netem.schema.pattern import Link, links_among
+from gridpeers.netem.schema.trace_file import with_traces
 from gridpeers.wire.schema.table_reading import read_table
 from tests.unit.netem.link_messages import MICROGRIDS, steady
 
@@ -262,3 +266,78 @@ def test_what_is_plausible_is_no_problem_and_survives_the_way_to_an_agent(fault:
     """Numbers within their ranges pass, and an agent is told exactly what the file says."""
     assert fault.problems() == [] or fault.models() == {}
     assert msgspec.json.decode(msgspec.json.encode(fault), type=Fault) == fault
+
+
+def test_a_traces_file_is_read_from_the_scenarios_folder(tmp_path: Path) -> None:
+    """The column delay_s becomes the trace, other columns and empty lines are free."""
+    (tmp_path / "delays.csv").write_text("t_s, delay_s\n0,0.01\n\n1,0.02\n")
+    netem, wrong = with_traces(Netem(links=(Fault(on="* -> *", delay=Trace(file="delays.csv")),)), tmp_path)
+
+    assert not wrong
+    assert netem.links[0].models()["delay"].delays_s == (0.01, 0.02)
+    assert not netem.problems(NAMES, MICROGRIDS, 10.0)
+
+
+def test_a_trace_with_decimal_commas_has_its_delays(tmp_path: Path) -> None:
+    """One column and no separator: 0,012 is 12 ms, and was 0 s without a word."""
+    (tmp_path / "d.csv").write_bytes("delay_s\r\n0,012\r\n0,5\r\n".encode("utf-16"))
+
+    netem, wrong = with_traces(Netem(links=(Fault(on="* -> *", delay=Trace(file="d.csv")),)), tmp_path)
+
+    assert not wrong
+    assert netem.links[0].models()["delay"].delays_s == (0.012, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        (
+            "delay_s\n0.01\nabc\n-0.1\n20\n",
+            ['row 3: delay_s must be a number of seconds, got "abc"', "row 4:", "row 5: 20 s"],
+        ),
+        ("delay\n0.01\n", ['no column "delay_s"']),
+        ("delay_s\n12\n13\n", ["are they in milliseconds?"]),
+        ("delay_s\n", ["no row"]),
+        ("t_s,delay_s\n0,1,0,012\n", ["row 2: 4 cells, but the header has 2"]),
+        ("delay_s\n" + "x\n" * 30, [*[f"row {i}:" for i in range(2, 22)], "10 more rows"]),
+        (None, ["there is no file"]),
+    ],
+)
+def test_bad_rows_of_a_trace_are_named(tmp_path: Path, rows: str | None, words: list[str]) -> None:
+    """Each problem has its row; a whole file in milliseconds is one problem."""
+    if rows is not None:
+        (tmp_path / "d.csv").write_text(rows)
+    _, wrong = with_traces(Netem(links=(Fault(on="* -> *", delay=Trace(file="d.csv")),)), tmp_path)
+
+    assert {problem.path for problem in wrong} == {"link[0].delay.file"}
+    assert len(wrong) == len(words)
+    assert all(word in problem.text for word, problem in zip(words, wrong, strict=True))
+
+
+TEXT = (Path(__file__).parents[3] / "docs" / "netem.md").read_text(encoding="utf-8")
+
+
+def test_the_example_is_a_scenario_without_a_problem() -> None:
+    """The example of the page is a valid scenario and does what the page says."""
+    (example,) = re.findall(r"```toml\n(.*?)```", TEXT, flags=re.S)
+    netem, form = read_table(Netem, tomllib.loads(example))
+
+    assert not form
+    assert not netem.problems(list(MICROGRIDS), MICROGRIDS, 10.0)
+    assert (len(netem.links), len(netem.partitions), len(netem.nodes)) == (2, 1, 2)
+
+
+def test_every_model_with_its_keys_every_kind_and_every_profile_is_told_of() -> None:
+    """Nothing that a scenario may say is missing from the tables."""
+    for model in (*get_args(AnyDelay), *get_args(AnyLoss), *get_args(AnyLie)):
+        (row,) = re.findall(rf"^\| `{model.__struct_config__.tag}` \|.*$", TEXT, flags=re.M)
+        keys = {field.encode_name for field in msgspec.structs.fields(model)} - {
+            "fifo",
+            "correlation",
+            "delays_s",
+            "in_name_of",
+            "plant",
+        }
+        assert {key for key in keys if f"`{key}`" not in row} == set()
+    assert all(f"`{kind}`" in TEXT for kind in KINDS)
+    assert all(f"| `{name}` |" in TEXT for name in PROFILES)

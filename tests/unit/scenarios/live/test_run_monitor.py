@@ -26,8 +26,8 @@ from gridpeers.wire.membership import MOST_PROCESSES
 from gridpeers.wire.messages import AgentStatus, LinkReport, LinkRequest, Message, Telemetry
 from gridpeers.wire.node import MOST_PLANTS
 from tests.hostile.cases import Truth, hostile
-from tests.toy.link_traces import by_link
 from tests.toy.toy_configs import agent_config
+from tests.toy.toy_runs import by_link
 
 KEYS = Keys("lab")
 NAMES = ("inv1", "inv2")

@@ -17,7 +17,7 @@ from gridpeers.scenarios.emulation.link_data import report_data
 from gridpeers.scenarios.results.link_record import COLUMNS, LinkRecord
 from gridpeers.scenarios.results.record import Recorder
 from gridpeers.wire.messages import LinkReport, Telemetry
-from tests.toy.link_traces import by_link
+from tests.toy.toy_runs import by_link
 
 
 def test_every_row_of_links_csv_has_the_header_s_columns_whatever_befell_the_message(tmp_path: Path) -> None:
