@@ -19,7 +19,7 @@ from gridpeers.plant.equipment.inverter_parameters import GfmParameters
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.feeder.circuits import Circuits
 from gridpeers.plant.network import Network, solve_power_flow
-from gridpeers.plant.plant_config import PlantSettings, Protection, SwitchEvent
+from gridpeers.plant.plant_config import PlantSettings
 from gridpeers.plant.tables import read_feeder
 from tests.unit.plant.dynamics.circuits import BALANCED, GFM_D, S_B, V_B, Z_B, circuit, inverter, lone
 
@@ -159,28 +159,6 @@ def test_an_island_whose_limited_currents_settle_is_not_de_energised() -> None:
     assert current[1:] == pytest.approx([1.5, 1.5], abs=0.01)
     assert V[0] > 1.0
     assert (V[1:] < 0.75).all()
-
-
-def islanded(I_max: float) -> Plant:
-    """Microgrid123 0.1 s after islanding."""
-    settings = PlantSettings(
-        gfm=GfmParameters(I_max=I_max),
-        protection=Protection(category="off"),
-        events=(SwitchEvent(t=0.02, switch="13-152", action="open"),),
-    )
-    plant = Plant(Network(read_feeder("microgrid123")), settings, 0.02, 0.002)
-    for _ in range(6):
-        plant.advance()
-    return plant
-
-
-def test_limiting_is_an_event_once_a_spell() -> None:
-    """An inverter that limits in many steps says so once, with its limit."""
-    events = [event for event in islanded(1.7).take_events() if event.kind == "limit"]
-
-    assert events
-    assert len({event.subject for event in events}) == len(events)
-    assert events[0].text == f"{events[0].subject} limits its phase currents to 1.7 pu"
 
 
 def test_a_start_beyond_the_limit_is_refused() -> None:

@@ -21,7 +21,6 @@ from tests.unit.plant.dynamics.circuits import (
     inverter,
     loaded,
     lone,
-    on_stiff_bus,
     pair,
 )
 
@@ -148,20 +147,6 @@ def test_an_island_without_solution_is_de_energised() -> None:
     assert (trip.inverters, trip.substation, plant.take_trips()) == ((0,), False, [])
     assert not plant.inverters.connected.any()
     assert plant.run(5)[:, 0, :4].tolist() == [[0.0] * 4] * 5  # a dead terminal has no frequency
-
-
-def test_the_substation_trips_only_where_no_inverter_is_left() -> None:
-    """De-energising a bus that the grid feeds takes its inverter off first; the grid itself only the second time."""
-    plant = on_stiff_bus(GFM_D)
-
-    plant.deenergise([0])
-    still_fed = plant.network.reduction.live.all()
-    plant.deenergise([0])
-
-    first, second = plant.take_trips()
-    assert (first.inverters, first.substation, still_fed) == ((0,), False, True)
-    assert (second.inverters, second.substation) == ((), True)
-    assert not plant.network.reduction.live.any()
 
 
 def test_a_tangent_that_leads_nowhere_is_renewed_in_the_middle_of_a_step() -> None:

@@ -182,20 +182,6 @@ def test_an_inverter_leaves_and_comes_back_without_a_bump(name: str) -> None:
     ]
 
 
-def test_a_switch_can_be_operated_by_hand() -> None:
-    """Without any schedule a switch opens when told to, by its alias as well, and it is told if it was open already."""
-    p = plant(*opened(0.1, "13-152"))
-    run(p, 1.0)
-
-    already = [p.switch("67-67s", "close"), p.switch("sw1_2", "open"), p.switch("67s-67", "open")]
-    p.advance()
-    already.append(p.switch("sw1_2", "open"))
-
-    assert already == [True, False, True, True], "what was told for the same step counts too"
-    assert p.measure()["inv1"].island == "inv1"
-    assert p.measure()["inv4"].island == "inv4"
-
-
 def test_a_spare_is_off_until_it_is_connected() -> None:
     """A spare inverter changes nothing while it is off, and shares the load once it is on and has set-points."""
     events = opened(0.1, "13-152")

@@ -133,17 +133,6 @@ def test_a_scheduled_change_is_the_one_that_a_person_makes() -> None:
     assert scheduled.loads == by_hand.loads
 
 
-def test_a_change_between_two_ticks_comes_at_its_step() -> None:
-    """The schedule of loads has the grid of the plant's step, as that of switches has."""
-    p = plant(loads=(LoadEvent(t=0.026, load="48", setting=LoadSetting(factor=2.0)),))
-    run(p, 0.02)
-    assert not p.loads
-    run(p, 0.02)
-
-    (told,) = [event for event in p.take_events() if event.kind == "load"]
-    assert told.t == pytest.approx(0.026)
-
-
 def test_switches_and_loads_of_one_step_change_at_once() -> None:
     """The island takes the loads that it has then, and never those of before, which it could not feed."""
     heavy, light = every_load(0.04, 2.5), every_load(0.1, 1.0)
@@ -173,18 +162,6 @@ def test_networks_of_scheduled_loads_are_factored_before_the_run(monkeypatch: py
     p.set_load("48", LoadSetting(factor=2.0))
     run(p, 0.02)
     assert factored == [5]
-
-
-def test_the_schedule_comes_after_the_hand() -> None:
-    """Of a load that both set at one moment, the power is that of the scenario."""
-    p = plant(loads=(LoadEvent(t=0.02, load="48", setting=LoadSetting(factor=0.5)),))
-    run(p, 0.02)
-    p.set_load("48", LoadSetting(factor=2.0))
-    p.set_load("65", LoadSetting(factor=2.0))
-    run(p, 0.02)
-
-    loads = named_loads(read_feeder("microgrid123"))
-    assert p.loads == {"48": 0.5 * loads["48"].S, "65": 2.0 * loads["65"].S}
 
 
 def test_a_schedule_that_makes_no_sense_is_refused_at_the_start() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 from msgspec.structs import replace
 
@@ -101,23 +100,6 @@ def test_a_lateral_is_an_island_of_its_own_grid_forming_inverter() -> None:
     for name, rating in (("inv1", 300e3), ("leg", 60e3), ("roof", 30e3)):
         assert now[name].f - 60.0 == pytest.approx(0.6 * (0.5 - now[name].P / rating), abs=1e-4), name
     assert pytest.approx(40e3, rel=0.01) == now["leg"].P + now["roof"].P
-
-
-def test_a_lateral_meets_the_rest_when_it_is_in_step() -> None:
-    """The switch of phase B waits until the lateral, which is fast, has come round; then all have one frequency."""
-    p = plant(
-        small(*ON_LATERAL, lateral_load=20e3),
-        SwitchEvent(t=0.1, switch="grid", action="open"),
-        SwitchEvent(t=0.1, switch="lateral", action="open"),
-        SwitchEvent(t=1.0, switch="lateral", action="close", synchronised=True),
-    )
-    told = run(p, 12.0)
-    f = [reading.f for reading in p.measure().values()]
-
-    assert any(text.startswith("switch lateral (3-4) waits for synchronism") for text in told)
-    assert any(text.startswith("switch lateral (3-4) closed in step") for text in told)
-    assert not any("tripped" in text for text in told)
-    assert np.ptp(f) < 1e-3
 
 
 def test_an_overloaded_lateral_trips_and_starts_again_by_itself() -> None:
