@@ -20,11 +20,7 @@ DEFAULTS: dict[str, dict[str, tuple[float, float]]] = {
 
 
 def defaults(category: str, f_nom: float) -> dict[str, tuple[float, float]]:
-    """Return the default trip settings at a nominal frequency (Hz): threshold (pu or Hz) and clearing time (s).
-
-    >>> defaults("III", 60.0)["OF2"], defaults("III", 50.0)["UF1"]
-    ((62.0, 0.16), (48.75, 300.0))
-    """
+    """Return the default trip settings at a nominal frequency (Hz): threshold (pu or Hz) and clearing time (s)."""
     scale = f_nom / F_BASE
     return {
         name: (value * scale if name[1] == "F" else value, time) for name, (value, time) in DEFAULTS[category].items()

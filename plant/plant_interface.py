@@ -32,31 +32,26 @@ class PlantLike(Protocol):
 
     def hold(self, name: str, P_set: float, V_set: float) -> None:
         """Take set-points (W, V)."""
-        ...
 
     def connect(self, name: str, on: bool) -> None:
         """Connect or disconnect an inverter; do nothing if it is in that state already."""
-        ...
 
     def advance(self) -> None:
         """Advance one control period; de-energise an island without solution, which is an event and ends nothing.
 
         Raise RuntimeError if the plant cannot go on: the run breaks, and reports the message.
         """
-        ...
 
     def take_rows(self) -> tuple[tuple[float, ...], ...]:
         """Take out the rows recorded since the last call, every `PlantConfig.record_step` from t = 0 on.
 
         Each is t (s), then for each inverter f (Hz), P (W), Q (var), V (V), P_set (W), V_set (V): history.csv.
         """
-        ...
 
     def take_events(self) -> tuple[PlantEvent, ...]: ...
 
     def close(self) -> None:
         """End what belongs to the plant outside of this process, after a good end and after a bad one."""
-        ...
 
 
 class LivePlant(PlantLike, Protocol):
@@ -65,23 +60,19 @@ class LivePlant(PlantLike, Protocol):
     @property
     def switches(self) -> Mapping[str, bool]:
         """Whether each switch is closed, by its name. Empty where another program has the switches."""
-        ...
 
     def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
         """Operate a switch ("open" or "close") at the next step; return whether it was in that state already.
 
         ValueError if there is no such switch, or it should close synchronised and its sides are not in step.
         """
-        ...
 
     @property
     def loads(self) -> Mapping[str, complex]:
         """Power at nominal voltage (VA) of each load that has another one than in the feeder's tables now."""
-        ...
 
     def set_load(self, name: str, setting: LoadSetting) -> str:
         """Have a load take another power at the next step; return it in words. ValueError if it cannot."""
-        ...
 
 
 class RecordedPlant:

@@ -165,16 +165,7 @@ class KeptTelemetry:
 
 
 class UnacknowledgedTelemetry(KeptTelemetry):
-    """Messages for the recorders that a run waits for; without any, nothing is kept.
-
-    >>> kept = UnacknowledgedTelemetry(["history"])
-    >>> for number, payload in [(0, b"T0"), (1, b"L1"), (1, b"T1")]:
-    ...     kept.keep(number, payload)
-    >>> kept.acknowledged("history", 1), kept.acknowledged("history", 1)
-    (None, [b'L1', b'T1'])
-    >>> kept.acknowledged("history", 2), kept.is_empty
-    (None, True)
-    """
+    """Messages for the recorders that a run waits for; without any, nothing is kept."""
 
     def __init__(self, recorders: Iterable[str]) -> None:
         super().__init__()

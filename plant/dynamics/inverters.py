@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gridpeers.plant.dynamics.circuit import aligned_sum
 from gridpeers.plant.dynamics.kernel import gfl as gfl_model
 from gridpeers.plant.dynamics.kernel import gfm as gfm_model
-from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Real
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Integers, Real
 from gridpeers.plant.dynamics.kernel.second_order_step import FeedForward
 from gridpeers.plant.equipment import F_NOM
 from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters
@@ -75,20 +75,18 @@ class Inverters:
         self.V_b = np.array([unit.V_b for unit in units])
         self.m_p = np.array([unit.m_p for unit in units])
         self.m_q = np.array([unit.m_q for unit in units])
-        self.balanced = np.zeros(n, bool)
-        self.balanced[self.gfl_at] = self.gfl["balanced_power"]
-        self.positive_sequence, self.direct = np.zeros(n, bool), np.zeros(n, bool)
-        self.positive_sequence[self.gfm_at] = self.gfm["positive_sequence"]
-        self.direct[self.gfm_at] = ~self.gfm["voltage_control"]
-        self.S_max = np.full(n, np.inf)
-        self.S_max[self.gfl_at] = self.gfl["S_max"]
-        self.Q_min, self.Q_max = np.full(n, -np.inf), np.full(n, np.inf)
-        self.Q_min[self.gfl_at], self.Q_max[self.gfl_at] = self.gfl["Q_min"], self.gfl["Q_max"]
-        self.from_edge = np.zeros(n, bool)
-        self.from_edge[self.gfl_at] = self.gfl["from_edge"]
-        self.db_UV, self.db_OV = np.zeros(n), np.zeros(n)
-        for band, name in ((self.db_UV, "db_UV"), (self.db_OV, "db_OV")):
-            band[self.gfl_at] = np.where(self.gfl["volt_var"], self.gfl[name], np.inf)
+        self.balanced = _spread(n, self.gfl_at, self.gfl["balanced_power"], False)
+        self.positive_sequence = _spread(n, self.gfm_at, self.gfm["positive_sequence"], False)
+        self.direct = _spread(n, self.gfm_at, ~self.gfm["voltage_control"], False)
+        self.S_max = _spread(n, self.gfl_at, self.gfl["S_max"], np.inf)
+        self.Q_min, self.Q_max = (
+            _spread(n, self.gfl_at, self.gfl[name], other) for name, other in (("Q_min", -np.inf), ("Q_max", np.inf))
+        )
+        self.from_edge = _spread(n, self.gfl_at, self.gfl["from_edge"], False)
+        self.db_UV, self.db_OV = (
+            _spread(n, self.gfl_at, np.where(self.gfl["volt_var"], self.gfl[name], np.inf), 0.0)
+            for name in ("db_UV", "db_OV")
+        )
         self.P_set_lim = np.array([unit.parameters.P_set_lim for unit in units])
         self.V_set_min = np.array([unit.parameters.V_set_min for unit in units])
         self.V_set_max = np.array([unit.parameters.V_set_max for unit in units])
@@ -107,9 +105,7 @@ class Inverters:
 
     def theta(self) -> Real:
         """Return the angle of every GFM's internal voltage (rad); 0 for a GFL."""
-        theta = np.zeros(len(self))
-        theta[self.gfm_at] = self.gfm_state["theta"]
-        return theta
+        return _spread(len(self), self.gfm_at, self.gfm_state["theta"], 0.0)
 
     def measured(self, V: Complex, I: Complex) -> tuple[Complex, Real]:  # noqa: E741  # the paper's symbol
         """Return the powers and voltages (pu) that controllers measure (sections 3.2, 3.8), from V (V) and I (A)."""
@@ -166,6 +162,13 @@ class Inverters:
         V = np.mean(np.abs(self.V), axis=1)
         f[~online & (V == 0.0)] = 0.0
         return np.column_stack([f, S.real, S.imag, V])
+
+
+def _spread(n: int, at: Integers, values: NDArray[Any], other: float) -> NDArray[Any]:
+    """Return n values: those of the inverters `at`, and one for the others."""
+    every = np.full(n, other, values.dtype)
+    every[at] = values
+    return every
 
 
 def _pack(unit: Inverter, method: Method) -> NDArray[np.void]:

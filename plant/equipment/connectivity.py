@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Hashable, Iterable, Iterator
+from itertools import chain
 from typing import TypeVar
 
 from gridpeers.plant.equipment import PHASES, Feeder, InverterRow, Line, Regulator, Switch, Transformer
@@ -136,26 +137,18 @@ class Connectivity:
 
 
 def buses_without_ground(
-    transformers: Iterable[Transformer], lines: Iterable[Line], others: Iterable[Regulator | Switch]
+    transformers: Collection[Transformer], lines: Iterable[Line], others: Iterable[Regulator | Switch]
 ) -> frozenset[str]:
     """Return the buses behind a delta winding, from which no current can return through ground."""
-    beside: dict[str, set[str]] = {}
-    grounded = [(row.from_bus, row.to_bus) for row in transformers if row.connection != "D-D"]
-    joins = [*((row.from_bus, row.to_bus) for row in lines), *((row.from_bus, row.to_bus) for row in others)]
-    for one, other in (*joins, *grounded):
-        beside.setdefault(one, set()).add(other)
-        beside.setdefault(other, set()).add(one)
+    grounded = [row for row in transformers if row.connection != "D-D"]
+    deltas = [row for row in transformers if row.connection == "D-D"]
+    joined = [(row.from_bus, row.to_bus) for row in (*lines, *others, *grounded)]
+    parts = connected(dict.fromkeys([*chain(*joined), *(row.to_bus for row in deltas)]), joined)
     found: set[str] = set()
-    for row in transformers:
-        if row.connection != "D-D":
-            continue
-        reached, new = {row.to_bus}, [row.to_bus]
-        while new:
-            further = beside.get(new.pop(), set()) - reached
-            reached |= further
-            new += further
+    for row in deltas:
+        part = next(part for part in parts if row.to_bus in part)
         # where there is a way around it, the winding's own bus alone is certain
-        found |= {row.to_bus} if row.from_bus in reached else reached
+        found |= {row.to_bus} if row.from_bus in part else part
     return frozenset(found)
 
 

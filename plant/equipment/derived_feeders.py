@@ -21,12 +21,6 @@ def changed(feeder: Feeder, changes: FeederChanges) -> Feeder:
     At another nominal frequency the equipment stays and its reactances change: those of lines and transformers, the
     lines' susceptances, and the capacitors' reactive power go with the frequency. Loads are powers at nominal
     frequency, and inverters' filters per-unit values at nominal frequency; both stay as they are.
-
-    >>> from gridpeers.plant.tables import read_feeder
-    >>> feeder = read_feeder("microgrid123")
-    >>> slower = changed(feeder, FeederChanges(f_nom=50.0, m_p_factor=2.0))
-    >>> slower.f_nom, slower.inverters[0].m_p, round(slower.transformers[0].z.imag / feeder.transformers[0].z.imag, 6)
-    (50.0, 0.02, 0.833333)
     """
     if changes == FeederChanges():
         return feeder

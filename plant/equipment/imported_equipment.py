@@ -16,9 +16,6 @@ def cut_off(usual: float) -> float:
     """Return the `LoadPart.V_off_above` of generation that usually has this voltage (pu).
 
     Other programs have no such limit, and an island in which generation prevails then has no voltage at which to rest.
-
-    >>> cut_off(1.02), cut_off(1.7)
-    (1.2, 2.04)
     """
     return OVERVOLTAGE * (usual if usual > HIGH else 1.0)
 

@@ -48,12 +48,7 @@ class Difference:
 
     @property
     def way_out(self) -> str:
-        """Advice that brings the two sides within the limits.
-
-        >>> apart = {"switch": "sw", "V": 0.0, "limits": SynchronizationLimits(angle=10.0, f=0.1, V=0.03)}
-        >>> Difference(angle=90.0, f=0.05, **apart).way_out
-        'try again: the angle passes through zero every 20 s'
-        """
+        """Advice that brings the two sides within the limits."""
         if self.f > self.limits.f or self.V > self.limits.V:
             return "try again when frequencies and voltages have come closer"
         if self.f < LOCKED:

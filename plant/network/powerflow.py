@@ -44,18 +44,12 @@ def solve_power_flow(
     tolerance: float = 1e-10,
     start: Complex | None = None,
 ) -> PowerFlow:
-    r"""Solve the nodes that the substation reaches, by a fixed point.
+    """Solve the nodes that the substation reaches by the fixed point V <- Y^-1 (J(V) - I_load(V) - Y_s V_s).
 
-    .. math:: V \leftarrow Y^{-1} (J(V) - I_\mathrm{load}(V) - Y_s V_s).
-
-    `network`: the network; it must have a source;
-    `shunt`: admittances to ground added at the nodes (S): filters of inverters;
-    `injection`: currents fed into the nodes (A) from their voltages (V), in addition;
-    `tolerance`: largest change of any voltage in the last iteration (pu);
-    `start`: voltages to start from (V); by default those without load.
-
-    ValueError if the feeder has no source. ArithmeticError if it does not converge, mostly because the feeder cannot
-    carry the load.
+    `shunt`: admittances to ground added at the nodes (S); `injection`: currents fed in (A) from voltages (V);
+    `tolerance`: largest change of any voltage in the last iteration (pu); `start`: voltages (V), by default those
+    without load. ValueError if the feeder has no source; ArithmeticError if it does not converge, mostly because it
+    cannot carry the load.
     """
     if not len(network.source_nodes):
         raise ValueError(f'feeder "{network.feeder.name}" has no source; a power flow needs one, give source.csv')
