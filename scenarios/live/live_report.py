@@ -172,9 +172,8 @@ def conclude(outcome: ProcessOutcome, metrics: RunMetrics) -> ProcessOutcome:
         set_broken(folder, outcome.broke or "no whole record")
         return outcome
     try:
-        write_scenario(
-            folder, *ended_scenario(metrics.scenario, recorded.ended)
-        )  # first: a signal may end what follows
+        # first: a signal may end what follows
+        write_scenario(folder, *ended_scenario(metrics.scenario, recorded.ended))
         show(write_report(metrics, recorded, outcome.pacing), terminal())
         set_complete(folder, filter(None, [recorded.record_failure]))
     except (StoppedError, KeyboardInterrupt) as stop:
