@@ -3,7 +3,7 @@
 import pytest
 import typer.main
 
-from gridpeers.lab.replay.replay_command import CHANGES, replay
+from gridpeers.lab.commands import CHANGES, replay
 from tests.command_line import invoke
 
 

@@ -1,0 +1,365 @@
+"""Commands of the lab but `gridpeers chaos`. What they need is imported when it is used, so that help comes at once."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable
+from math import isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from gridpeers.cli.usage import (
+    BAD_INPUT,
+    BROKEN,
+    CLAIM_FAILED,
+    ScenarioName,
+    chosen,
+    fail,
+    load,
+    refuse,
+    require,
+    terminal,
+)
+
+if TYPE_CHECKING:
+    from gridpeers.lab.replay.changes import Changes
+    from gridpeers.scenarios.record.record_reader import RunRecord
+
+RecordedRun = Annotated[
+    Path, typer.Argument(metavar="RUN", help="Folder of a case, e.g. runs/islanding/latest/IV, or its run.mcap.")
+]
+
+CaseOfRun = Annotated[str, typer.Option(metavar="NAME", help="Case of the run, if RUN has several.")]
+
+
+def predict(
+    scenario: ScenarioName,
+    case: Annotated[
+        str | None, typer.Option(metavar="NAMES", help="Cases to predict, e.g. III,IV; all when left out.")
+    ] = None,
+    vars_: Annotated[
+        bool, typer.Option("--vars/--no-vars", help="Modes of voltage and vars, which take a second or two.")
+    ] = True,
+) -> None:
+    """Predict from theory how a scenario will go.
+
+    That is modes, settling times, limits of step and delay, and times to restore after each event.
+    Nothing is run but the plant on droop alone, to learn the load of each event and how vars answer to V_set.
+    docs/theory.md has the equations, and how far they met the plant.
+
+    Exit code: 0 all is well, 2 bad usage or a bad file, 3 the plant has no solution.
+
+    Example:  gridpeers predict islanding --case IV
+    """
+    spec, feeder = load(scenario)
+    spec = chosen(spec, case, None)
+    require({"numba": "the plant", "scipy": "the theory", "threadpoolctl": "the plant"})
+
+    from gridpeers.lab.predict.prediction import predictions
+    from gridpeers.scenarios.run_request import BrokenRunError
+    from gridpeers.scenarios.schema import ScenarioError
+
+    if not feeder.inverters:
+        fail([f"{scenario}: the feeder {feeder.name} has no inverters, so there is nothing to control"], BAD_INPUT)
+    try:
+        predicted = predictions(spec, feeder, voltage=vars_)
+    except ScenarioError as error:
+        refuse(error)
+    except BrokenRunError as error:
+        fail([str(error)], BROKEN)
+    typer.echo("\n\n".join(map(str, predicted.values())))
+
+
+def why(
+    run: RecordedRun,
+    agent: Annotated[str, typer.Argument(metavar="AGENT", help="Name of the inverter, e.g. inv4.")],
+    t: Annotated[float, typer.Argument(metavar="TIME", help="Run time (s): the decision in force then is explained.")],
+    case: CaseOfRun = "",
+    follow: Annotated[
+        bool, typer.Option("--follow", help="Follow both set-points back over neighbours, by the largest terms.")
+    ] = False,
+    hops: Annotated[int, typer.Option(metavar="N", min=1, max=1000, help="Most decisions to follow back.")] = 8,
+) -> None:
+    """Explain why an agent decided as it did.
+
+    That is what it measured, whom it heard and whom not and why, each term of its law, and the limits, from the record
+    of the run. docs/why.md has examples.
+
+    Exit code: 0 it was explained, 2 bad usage, no record, or nothing in it for this agent and time.
+
+    Example:  gridpeers why runs/islanding/latest/IV inv4 4.3
+    """
+    require({"mcap": "the record of a run"})
+
+    from gridpeers.lab.explanation.explanation import explain, trail
+    from gridpeers.lab.explanation.explanation_text import show
+    from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
+
+    if not isfinite(t):
+        fail([f"TIME {t}: needs a run time in s, as 4.3"], BAD_INPUT)
+    try:
+        record = RunRecord.open(run, case)
+        explanation = explain(record, agent, t)
+        trails = [(name, trail(record, explanation.decision, name, hops)) for name in ("P_set", "V_set") if follow]
+    except RecordFileError as error:
+        fail([str(error)], BAD_INPUT)
+    show(explanation, terminal(), trails)  # type: ignore[arg-type]  # the names are those of a trail
+
+
+# -------------------------------------------------------------------- gridpeers trace
+
+
+MOST = 20_000
+
+
+def trace(
+    run: RecordedRun,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Perfetto trace; trace.pftrace beside the record when left out.")
+    ] = None,
+    svg: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Space-time diagram instead, as .svg, .pdf or .png.")
+    ] = None,
+    since: Annotated[
+        float | None, typer.Option("--from", metavar="T", help="Begin of the diagram (s); 0 when left out.")
+    ] = None,
+    until: Annotated[
+        float | None, typer.Option("--to", metavar="T", help="End of the diagram (s); 0.2 s later when left out.")
+    ] = None,
+    agents: Annotated[
+        str, typer.Option(metavar="NAMES", help="Agents of the diagram, e.g. inv1,inv4,plant; all agents if left out.")
+    ] = "",
+    case: CaseOfRun = "",
+) -> None:
+    """Write a run's messages as a Perfetto trace, or draw them.
+
+    https://ui.perfetto.dev opens the trace: tracks of agents and links, an arrow for each message, losses and cuts, and
+    f, P and MPSI on the same axis. With --svg a space-time diagram is drawn, whose lost messages end in a cross.
+
+    Exit code: 0 the file is written, 2 bad usage, no record, or the file cannot be written.
+
+    Example:  gridpeers trace runs/islanding/latest/IV --svg messages.svg --from 1.0 --to 1.1
+    """
+    require({"mcap": "the record of a run"})
+    if svg is None:
+        given = {"--from": since is not None, "--to": until is not None, "--agents": bool(agents)}
+        if wrong := [name for name, is_given in given.items() if is_given]:
+            fail([f"{', '.join(wrong)}: for a diagram; add --svg FILE. A Perfetto trace has the whole run"], BAD_INPUT)
+        require({"perfetto": "a Perfetto trace"}, "install it: pip install 'gridpeers[trace]'; or give --svg FILE")
+    else:
+        if out is not None:
+            fail(["--out: for a Perfetto trace; --svg names the file of the diagram. Give one of them"], BAD_INPUT)
+        require({"matplotlib": "the diagram"})
+        kinds = (".svg", ".pdf", ".png")
+        if svg.suffix not in kinds:
+            fail([f"--svg {svg}: must end in {', '.join(kinds)}"], BAD_INPUT)
+    since = 0.0 if since is None else since
+    end = since + 0.2 if until is None else until
+    if not (isfinite(since) and isfinite(end) and 0.0 <= since < end):
+        fail([f"--from {since:g} --to {end:g}: needs two run times in s, the later one second"], BAD_INPUT)
+
+    from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
+    from gridpeers.scenarios.results.run_files import refusal, shown
+
+    try:
+        record = RunRecord.open(run, case)
+        if svg is None:
+            from gridpeers.lab.trace.perfetto_trace import write_perfetto_trace
+
+            target = out or record.path.with_name("trace.pftrace")
+            arrows = write_perfetto_trace(record, target)
+            text = f"{arrows} messages"
+        else:
+            target = svg
+            text = _draw(record, svg, since, end, agents)
+    except RecordFileError as error:
+        fail([str(error)], BAD_INPUT)
+    except OSError as error:
+        fail([refusal(target, error)], BAD_INPUT)
+    for damage in record.damage:
+        typer.echo(f"NOTE  {damage}")
+    typer.echo(f"{shown(target)}: {text}")
+
+
+def _draw(record: RunRecord, file: Path, since: float, until: float, agents: str) -> str:
+    from gridpeers.lab.trace.flows import flows
+    from gridpeers.lab.trace.space_time_diagram import space_time_diagram
+    from gridpeers.scenarios.results.plots.style import save
+    from gridpeers.scenarios.short_texts import in_order, short
+
+    if since > record.t_end:
+        fail([f"--from {since:g}: the record ends at {record.t_end:.2f} s"], BAD_INPUT)
+    named = dict.fromkeys(name.strip() for name in agents.split(",") if name.strip())  # a name twice is one axis
+    nodes = list(named) or in_order(record.agents)
+    if unknown := [name for name in nodes if name not in (*record.agents, "plant")]:
+        fail([f"--agents: there was no agent {unknown[0]}; agents are {short(record.agents)}, and plant"], BAD_INPUT)
+    T_c = record.info.T_c
+    found = [flow for flow in flows(record, max(0.0, since - 1.0), until) if flow.src in nodes and flow.dst in nodes]
+    found = [flow for flow in found if since <= (flow.sent + T_c if flow.arrived is None else flow.arrived)]
+    if len(found) > MOST:
+        fail([f"--from {since:g} --to {until:g}: {len(found)} messages; at most {MOST} can be told apart"], BAD_INPUT)
+    title = f"{record.info.scenario}{', case ' + record.info.case if record.info.case else ''}: messages"
+    figure = space_time_diagram(found, nodes, since, until, T_c, title)
+    save(figure, file.parent, file.stem, (file.suffix[1:],))  # type: ignore[arg-type]  # checked above
+    lost = sum(flow.is_lost for flow in found)
+    return f"{len(found)} messages, {lost} of them lost"
+
+
+# -------------------------------------------------------------------- gridpeers replay
+
+
+CHANGES = "--without, --without-loss, --without-link-commands, --law or --set"
+
+
+def replay(
+    run: RecordedRun,
+    case: CaseOfRun = "",
+    without: Annotated[
+        list[str] | None,
+        typer.Option(metavar="LINKS", help='Cut links: "inv4 -> inv7", "inv4 <-> inv7"; can be repeated.'),
+    ] = None,
+    without_loss: Annotated[bool, typer.Option("--without-loss", help="Lose no message by chance.")] = False,
+    without_link_commands: Annotated[
+        bool, typer.Option("--without-link-commands", help="Leave out what people commanded the emulated links.")
+    ] = False,
+    law: Annotated[str, typer.Option(metavar="KEY", help="Another law: a name, or module:Class.")] = "",
+    values: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", metavar="KEY=VALUE", help="A key of agents or links, e.g. gains.k_p=0.001; can be repeated."
+        ),
+    ] = None,
+    since: Annotated[
+        float, typer.Option("--from", metavar="T", help="Run time (s) from which on; up to it all is as it was.")
+    ] = 0.0,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="New folder for what would have been; in runs/ when left out."),
+    ] = None,
+) -> None:
+    """Replay a recorded run, or show what would have been.
+
+    The cores get again what they got, when they got it, and must decide the same within 1e-9. With a change, the loop
+    is closed on our plant from then on. docs/replay.md explains both.
+
+    Exit code: 0 all that was compared is the same (notes say what was not), or what would have been is written,
+    1 something differs from the record, or a law failed in what would have been, 2 bad usage, no record, or nothing in
+    it to be replayed, 130 Ctrl-C, 143 SIGTERM.
+
+    Example:  gridpeers replay runs/islanding/latest/IV --without "inv4 <-> inv7" --from 2
+    """
+    require({"mcap": "the record of a run", "numba": "the plant"})
+
+    from gridpeers.cli.usage import ended_by_signals
+    from gridpeers.lab.replay.changes import Changes
+    from gridpeers.lab.replay.recorded_process import ReplayError
+    from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
+    from gridpeers.scenarios.results.run_files import FolderError, refusal
+
+    with ended_by_signals("nothing was written"):
+        try:
+            record = RunRecord.open(run, case)
+            changes = Changes(
+                without=tuple(without or ()),
+                without_loss=without_loss,
+                without_link_commands=without_link_commands,
+                law=law,
+                keys=dict(map(_key_and_value, values or ())),
+                since=since,
+            )
+            differs = _counterfactual(record, changes, out) if changes else _replay(record, since, out)
+        except ReplayError as error:
+            fail(list(error.problems), BAD_INPUT)
+        except (RecordFileError, FolderError) as error:
+            fail([str(error)], BAD_INPUT)
+        except OSError as error:
+            fail([refusal(out or Path("runs"), error)], BAD_INPUT)
+    _tell_notes(record.damage)
+    if differs:
+        raise SystemExit(CLAIM_FAILED)
+
+
+def _key_and_value(text: str) -> tuple[str, Any]:
+    """Read a key and its value, which is as in a scenario file; what is no value there is a text."""
+    key, equals, value = text.partition("=")
+    if not equals or not key.strip():
+        fail([f"--set {text}: needs a key and its value, as gains.k_p=0.001"], BAD_INPUT)
+    try:
+        return key.strip(), tomllib.loads(f"value = {value}")["value"]
+    except ValueError:
+        return key.strip(), value.strip()
+
+
+def _replay(record: RunRecord, since: float, out: Path | None) -> bool:
+    if since:
+        fail([f"--from {since:g}: nothing is changed from then on; give {CHANGES}"], BAD_INPUT)
+    if out is not None:
+        text = f"a replay without a change writes no folder; leave it out, or give {CHANGES}"
+        fail([f"--out {out}: {text}"], BAD_INPUT)
+
+    from gridpeers.cli.progress import explained
+    from gridpeers.lab.replay.replay import replay as replay_record
+
+    typer.echo(f"{_about(record)}: {record.t_end:.2f} s recorded")
+    span = f"{record.t_end:.0f} s of {len(record.agents)} agents"
+    with explained(lambda: typer.echo(f"still at work: every call of {span} is made again ...")):
+        done = replay_record(record)
+    for part in done.parts:
+        of = "rows" if part.name == "plant" else "states"
+        verdict = f"then {part.difference}" if part.difference else "the same" if part.count else "nothing to compare"
+        typer.echo(f"  {part.name:<8}{part.count:>7} {of} up to {part.t_end:.2f} s: {verdict}")
+    if done.difference is None and not any(part.count for part in done.parts):
+        _tell_notes(done.notes)
+        fail(["the record ends before anything that a replay could be compared with"], BAD_INPUT)
+    if done.difference is None:
+        same = "The replay gives what was recorded, within 1e-9"
+        partly = bool(done.notes or record.damage)  # its damage is told behind the notes
+        typer.echo(f"{same}, as far as it was compared:" if partly else f"{same}.")
+    _tell_notes(done.notes)
+    if done.difference is not None:
+        typer.echo(f"The first difference: {done.difference}")
+    return done.difference is not None
+
+
+def _tell_notes(notes: Iterable[str]) -> None:
+    for note in notes:
+        typer.echo(f"NOTE  {note}")
+
+
+def _counterfactual(record: RunRecord, changes: Changes, out: Path | None) -> bool:
+    require({"matplotlib": "the figure", "pandas": "the table"})
+
+    from datetime import datetime
+
+    from gridpeers.cli.progress import progress
+    from gridpeers.cli.usage import ended_by_signals
+    from gridpeers.lab.replay.changes import changed_rule
+    from gridpeers.lab.replay.counterfactual import counterfactual_in
+    from gridpeers.scenarios.results.plots.style import save
+    from gridpeers.scenarios.results.run_files import broken_if_ended, new_folder, shown, write_whole
+    from gridpeers.scenarios.schema.plugin_keys import judges_laws
+
+    rule = changed_rule(record, changes)  # whatever is wrong is told before a folder is made
+
+    typer.echo(f"{_about(record)}: {changes}")
+    folder = new_folder(out, f"{record.info.scenario}-replay", datetime.now().astimezone())
+    with ended_by_signals(f"what came until then is in {shown(folder)}/"), broken_if_ended(folder):
+        with progress(terminal(), (record.info.case,)) as tell:
+            done = counterfactual_in(record, rule, folder, tell)
+        typer.echo(str(done))
+        write_whole(folder / "comparison.txt", f"{changes}\n\n{done}\n")
+        (figure,) = save(done.plot(), folder / "plots", "counterfactual")
+    _tell_notes(done.notes)
+    typer.echo(f"\nWhat would have been: {shown(folder)}/; figure: {shown(figure)}")
+    if done.difference is not None:
+        typer.echo(f"It is not to be trusted: before the change, {done.difference}")
+    failed = len(done.would_be.failures) > 0 and judges_laws(rule.scenario)
+    return done.difference is not None or failed
+
+
+def _about(record: RunRecord) -> str:
+    info = record.info
+    kind = "wall-clock" if info.clock == "wall" else "simulated"
+    return f"{info.scenario}{f', case {info.case}' if info.case else ''}, in {kind} time"
