@@ -18,8 +18,7 @@ from gridpeers.lab.chaos.chaos_run import (
     compared,
     run_schedule,
 )
-from gridpeers.lab.chaos.disturbance import Schedule, counted_kinds
-from gridpeers.lab.chaos.disturbed_scenario import ChaosBase, base_of
+from gridpeers.lab.chaos.disturbed_scenario import ChaosBase, Schedule, base_of, counted_kinds
 from gridpeers.lab.chaos.machine_error import MachineError
 from gridpeers.lab.chaos.schedules import BATCH, drawn, shrunk
 from gridpeers.plant.request_process import TransientFolder

@@ -13,9 +13,7 @@ from typing import NamedTuple
 
 import msgspec
 
-from gridpeers.lab.chaos.chaos_checks import RESTORED, WITHIN_S
-from gridpeers.lab.chaos.disturbance import Schedule
-from gridpeers.lab.chaos.disturbed_scenario import ChaosBase
+from gridpeers.lab.chaos.disturbed_scenario import RESTORED, WITHIN_S, ChaosBase, Schedule
 from gridpeers.lab.chaos.machine_error import MachineError, machine_error
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.equipment.connectivity import bus_islands

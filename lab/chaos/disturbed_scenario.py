@@ -1,24 +1,30 @@
-"""A scenario with the disturbances of a schedule: checked as if a person had written it."""
+"""Disturbances as entries of a scenario file, and a scenario with those of a schedule, checked as if a person wrote it.
+
+So a scenario can say all that chaos can. The checks of such a run judge the promises of control once the last
+disturbance has ended (docs/chaos.md).
+"""
 
 from __future__ import annotations
 
 import tomllib
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
+from math import inf
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
+import msgspec
 from msgspec.structs import replace
 
-from gridpeers.lab.chaos.chaos_checks import JUDGED_S, WITHIN_S, chaos_checks
-from gridpeers.lab.chaos.disturbance import Disturbance, Schedule
 from gridpeers.lab.chaos.feasible_supply import FeasibleSupply
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem, NodeFault
 from gridpeers.netem.schema.partition import Partition
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.tables import read_feeder
+from gridpeers.scenarios.checks.check_registry import ALWAYS, RETURNS, check_name
 from gridpeers.scenarios.schema.check_notes import AgentEvent, why_away
 from gridpeers.scenarios.schema.checks import check_switches, check_times
 from gridpeers.scenarios.schema.loading import check_tables, read_tables
@@ -27,13 +33,112 @@ from gridpeers.scenarios.schema.scenario_errors import Problems
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.scenarios.schema.scenario_writing import to_toml
 from gridpeers.scenarios.schema.supply import check_loads
+from gridpeers.wire.plugins.plugin import table_of
 from gridpeers.wire.timing import rounded_up
+
+WITHIN_S = 4.0
+"""Time (s) after the last change within which a run is to be restored. Set-points come back from their bounds at the
+rate of the law, and vars, the slowest, settle within 3 s after a large step."""
+
+JUDGED_S = 0.8
+
+REJOINED_S = 1.0
+"""Longest time (s) after a cut until a value from over there is used: in simulated time nothing has to connect again,
+and no delay is longer."""
+
+LATEST_S = 0.5
+"""Time (s) after the last change from which on no decision uses a stale value: as long as the longest delay."""
+
+_AFTER: Mapping[str, Mapping[str, Any]] = {
+    "frequency": {"within_s": WITHIN_S},
+    "voltage": {"within_s": WITHIN_S},
+    "power_sharing": {"after_s": WITHIN_S, "with_killed": False},
+    "var_sharing": {"after_s": WITHIN_S, "with_killed": False},
+    "rating": {"with_killed": False},
+    "steady": {"after_s": WITHIN_S},
+}
+
+RESTORED = frozenset({*_AFTER, "oscillation", RETURNS})
+"""Checks of what control restores; the others hold whatever is done to a run."""
+
+TAIL_S = 2.0
+
+_ALWAYS: Mapping[str, Mapping[str, Any]] = {"heal": {"within_s": REJOINED_S}, "oscillation": {"tail_s": TAIL_S}}
 
 _LISTS = ("open", "close", "leave", "join")
 
 _TABLES = ("load", "P_max_kW")
 
 _LONGEST_NAME = 24
+
+
+KINDS = (
+    *("cut", "delay", "loss", "duplicate", "corrupt", "partition", "pause", "slow_s", "kill", "lies"),
+    *("leave", "join", "open", "close", "load"),
+)
+"""Kinds of disturbances: the key that makes them, or their table."""
+
+
+class Disturbance(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """One disturbance.
+
+    Examples
+    --------
+    >>> cut = Disturbance(table="link", entry={"on": "inv1 <-> inv4", "from_s": 2.0, "to_s": 3.0, "cut": True})
+    >>> str(cut), cut.settled_s
+    ('2 to 3 s: link on = inv1 <-> inv4, cut = true', 3.0)
+    >>> str(Disturbance(table="event", entry={"t_s": 2.0, "leave": ["inv2"]}))
+    '2 s: event leave = [inv2]'
+    """
+
+    table: Literal["event", "link", "partition", "node"]
+    entry: Mapping[str, Any]
+    back: Mapping[str, Any] = {}
+
+    @property
+    def begins_s(self) -> float:
+        return float(self.entry["t_s" if self.table == "event" else "from_s"])
+
+    @property
+    def ends_s(self) -> float:
+        return float(self.back.get("t_s", inf) if self.table == "event" else self.entry.get("to_s", inf))
+
+    @property
+    def settled_s(self) -> float:
+        """Run time (s) of its last change: its end, or its beginning if it stays."""
+        return self.begins_s if self.ends_s == inf else self.ends_s
+
+    @property
+    def kind(self) -> str:
+        return next(key for key in (self.table, *self.entry) if key in KINDS)
+
+    def __str__(self) -> str:
+        until = "" if self.ends_s == inf else f" to {self.ends_s:g}"
+        what = {key: value for key, value in self.entry.items() if key not in ("t_s", "from_s", "to_s")}
+        return f"{self.begins_s:g}{until} s: {self.table} {_pairs(what)}"
+
+
+Schedule = tuple[Disturbance, ...]
+"""Disturbances of one run, as they were drawn: not in the order of time."""
+
+
+def counted_kinds(schedules: Iterable[Schedule]) -> str:
+    numbers = Counter(disturbance.kind for schedule in schedules for disturbance in schedule)
+    return ", ".join(f"{kind} {numbers[kind]}" for kind in KINDS if numbers[kind]) or "none"
+
+
+def _pairs(entry: Mapping[str, Any]) -> str:
+    return ", ".join(f"{key} = {_word(value)}" for key, value in entry.items())
+
+
+def _word(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return "{" + _pairs(value) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_word, value)) + "]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 @dataclass(frozen=True)
@@ -189,3 +294,25 @@ def base_of(text: str) -> ChaosBase:
     problems.raise_if_any()
     assert feeder is not None
     return ChaosBase(scenario, feeder)
+
+
+def chaos_checks(
+    own: Iterable[str | Mapping[str, Any]], changed_s: float, since_s: float
+) -> list[str | dict[str, Any]]:
+    """Return the checks of a run with disturbances, as entries of its scenario, from its own entries.
+
+    The scenario's own keys of a check stay: its limits, but for those above, and that it is off. The run is to be
+    restored from the last change (s of run time) on, or from later if inverters trip.
+    """
+    entries = {check_name(entry): entry if isinstance(entry, str) else dict(entry) for entry in own}
+    limits_of: dict[str, Mapping[str, Any]] = {
+        **{name: {**limits, "since_s": round(since_s, 9)} for name, limits in _AFTER.items()},
+        "stale_values": {"since_s": round(changed_s + LATEST_S, 9)},
+        **_ALWAYS,
+    }
+    for name in ALWAYS:
+        given = table_of(entries.get(name, name))
+        if name in limits_of and not given.get("off"):
+            entries[name] = {**given, **limits_of[name]}
+    entries.setdefault(RETURNS, RETURNS)
+    return list(entries.values())

@@ -17,8 +17,7 @@ import msgspec
 from hypothesis import HealthCheck, Phase
 from hypothesis import strategies as st
 
-from gridpeers.lab.chaos.disturbance import Disturbance, Schedule
-from gridpeers.lab.chaos.disturbed_scenario import ChaosBase
+from gridpeers.lab.chaos.disturbed_scenario import ChaosBase, Disturbance, Schedule
 from gridpeers.plant.equipment.named_loads import named_loads
 from gridpeers.scenarios.schema.participants import with_agent
 

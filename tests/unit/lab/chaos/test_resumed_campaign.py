@@ -11,7 +11,7 @@ import pytest
 from gridpeers.lab.chaos import campaign as campaigns
 from gridpeers.lab.chaos.chaos_folder import ChaosFolder, kept_rows
 from gridpeers.lab.chaos.chaos_run import ChaosRow
-from gridpeers.lab.chaos.disturbance import Disturbance
+from gridpeers.lab.chaos.disturbed_scenario import Disturbance
 from gridpeers.scenarios.results.run_files import LOCK, locked
 from tests.command_line import invoke
 from tests.unit.lab.chaos.bases import base_in

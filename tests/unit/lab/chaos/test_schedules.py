@@ -11,11 +11,17 @@ from msgspec import json
 
 from gridpeers.lab.chaos import schedules as schedules_of_chaos
 from gridpeers.lab.chaos.campaign import Campaign, Summary
-from gridpeers.lab.chaos.chaos_checks import JUDGED_S, WITHIN_S, chaos_checks
 from gridpeers.lab.chaos.chaos_folder import ChaosFolder
 from gridpeers.lab.chaos.chaos_run import ChaosRow, run_schedule
-from gridpeers.lab.chaos.disturbance import KINDS, Disturbance, Schedule
-from gridpeers.lab.chaos.disturbed_scenario import base_of
+from gridpeers.lab.chaos.disturbed_scenario import (
+    JUDGED_S,
+    KINDS,
+    WITHIN_S,
+    Disturbance,
+    Schedule,
+    base_of,
+    chaos_checks,
+)
 from gridpeers.lab.chaos.schedules import BATCH, MOST_DISTURBANCES, drawn, schedules, shrunk
 from gridpeers.scenarios.checks.check_registry import ALWAYS, CHECKS, check_name
 from gridpeers.scenarios.schema import load_scenario

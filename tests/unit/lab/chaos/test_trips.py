@@ -8,7 +8,6 @@ import pytest
 from msgspec.structs import replace
 
 from gridpeers.lab.chaos import chaos_run
-from gridpeers.lab.chaos.chaos_checks import JUDGED_S, WITHIN_S
 from gridpeers.lab.chaos.chaos_folder import ChaosFolder
 from gridpeers.lab.chaos.chaos_run import (
     ChaosRow,
@@ -19,8 +18,7 @@ from gridpeers.lab.chaos.chaos_run import (
     run_scenario,
     run_schedule,
 )
-from gridpeers.lab.chaos.disturbance import Disturbance
-from gridpeers.lab.chaos.disturbed_scenario import ChaosBase
+from gridpeers.lab.chaos.disturbed_scenario import JUDGED_S, WITHIN_S, ChaosBase, Disturbance
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict, Violation
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
