@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from gridpeers.scenarios.results import metrics
-from gridpeers.scenarios.results.event_windows import Window as Window
 from gridpeers.scenarios.results.history import Flags as Flags
 from gridpeers.scenarios.results.history import Floats as Floats
 from gridpeers.scenarios.results.history import History as History
 from gridpeers.scenarios.results.history import Nameplates as Nameplates
+from gridpeers.scenarios.results.history import Window as Window
 from gridpeers.scenarios.results.metric import DIGITS as DIGITS
 from gridpeers.scenarios.results.metric import HEADINGS as HEADINGS
 from gridpeers.scenarios.results.metric import UNITS as UNITS

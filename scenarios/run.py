@@ -76,7 +76,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
     pacing: dict[str, Pacing] = {}
     for case in scenario.cases:
         recorded[case], outcome = run_case(request, case, text, progress)
-        from gridpeers.scenarios.results.event_windows import CaseRecord, as_they_came, late_moves
+        from gridpeers.scenarios.results.history import CaseRecord, as_they_came, late_moves
 
         notes += [f"case {case}: {note}" for note in (*outcome.notes, *recorded[case].link_lines)]
         if outcome.pacing is not None:

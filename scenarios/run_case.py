@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from gridpeers.plant.plant_interface import PlantLike
 
 _AFTER_RUN = (
-    *("results.event_windows", "results.findings", "results.claims", "results.report"),
+    *("results.findings", "results.claims", "results.report"),
     *("results.plots.drawing", "checks.judging"),
 )
 """Modules that are used after a run, and imported while it goes on: this process has little to do then."""

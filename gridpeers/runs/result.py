@@ -25,9 +25,8 @@ from gridpeers.scenarios.live.departures import compare
 from gridpeers.scenarios.live.live_report import live_drawing
 from gridpeers.scenarios.record.record_info import LIVE
 from gridpeers.scenarios.results.claims import Verdict, benchmark_of, judge, judged
-from gridpeers.scenarios.results.event_windows import CaseRecord, as_they_came, windows
 from gridpeers.scenarios.results.findings import Findings, find
-from gridpeers.scenarios.results.history import History, read_history
+from gridpeers.scenarios.results.history import CaseRecord, History, as_they_came, read_history, windows
 from gridpeers.scenarios.results.plots.drawing import Drawing, drawing_of
 from gridpeers.scenarios.results.recorded_events import law_failures
 from gridpeers.scenarios.schema import scenario_model as model

@@ -21,7 +21,7 @@ from gridpeers.scenarios.checks.check_registry import LAW_FAILED
 from gridpeers.scenarios.checks.check_verdict import SHOWN_VIOLATIONS, CheckVerdict
 from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.checks.judging import judge_case
-from gridpeers.scenarios.results.event_windows import CaseRecord
+from gridpeers.scenarios.results.history import CaseRecord
 from gridpeers.scenarios.results.island_membership import closed_switches
 from gridpeers.scenarios.results.recorded_events import tripped_by, tripped_inverters
 from gridpeers.scenarios.run_case import run_case

@@ -13,8 +13,7 @@ import numpy as np
 from gridpeers.plant.equipment import Feeder
 from gridpeers.scenarios.checks.check_registry import READERS
 from gridpeers.scenarios.checks.check_verdict import NotJudgedError, Violation
-from gridpeers.scenarios.results.event_windows import CaseRecord, Window
-from gridpeers.scenarios.results.history import Flags, History, Nameplates, read_only
+from gridpeers.scenarios.results.history import CaseRecord, Flags, History, Nameplates, Window, read_only
 from gridpeers.scenarios.results.island_membership import island_intervals, islands_at_end, part_of
 from gridpeers.scenarios.schema.configs import limits_of
 from gridpeers.scenarios.schema.participants import netem_of, without_agent

@@ -12,7 +12,7 @@ from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.equipment.connectivity import switch_names
 from gridpeers.plant.equipment.named_loads import load_name, named_loads
 from gridpeers.scenarios.live.run_monitor import line_of
-from gridpeers.scenarios.results.event_windows import Window, as_they_came, windows
+from gridpeers.scenarios.results.history import Window, as_they_came, windows
 from gridpeers.scenarios.results.island_membership import is_closed
 from gridpeers.scenarios.results.metrics import STEADY
 from gridpeers.scenarios.schema import ScenarioModel

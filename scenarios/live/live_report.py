@@ -17,9 +17,8 @@ from gridpeers.scenarios.live.departures import Departures, compare, few
 from gridpeers.scenarios.live.live_files import ended_scenario, write_scenario
 from gridpeers.scenarios.live.live_processes import ProcessOutcome
 from gridpeers.scenarios.results.claims import NO_BENCHMARK, benchmark_of
-from gridpeers.scenarios.results.event_windows import CaseRecord, Window, as_they_came, late_moves
 from gridpeers.scenarios.results.findings import find
-from gridpeers.scenarios.results.history import History
+from gridpeers.scenarios.results.history import CaseRecord, History, Window, as_they_came, late_moves
 from gridpeers.scenarios.results.island_membership import taken_part
 from gridpeers.scenarios.results.metrics_file import RunMetrics, case_facts, metrics_json
 from gridpeers.scenarios.results.plots.drawing import Drawing, Mark, drawing_of

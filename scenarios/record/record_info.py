@@ -41,7 +41,7 @@ class RecordInfo(msgspec.Struct, frozen=True, kw_only=True):
     inverters: tuple[str, ...]
     plant: PlantConfig
     agents: tuple[AgentConfig, ...]
-    """Configuration of each agent, also of those that join later: nameplate, graph, law, emulated links."""
+    """Configuration of each agent, also of those that join later."""
     fields: dict[str, tuple[str, ...]] = msgspec.field(
         default_factory=lambda: {kind.__name__: kind.__struct_fields__ for kind in (Measurement, State)}
     )

@@ -13,9 +13,8 @@ from gridpeers.plant.tables import FeederError, read_feeder
 from gridpeers.scenarios.live.departures import compare
 from gridpeers.scenarios.record.record_file import RecordFileError
 from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.scenarios.results.event_windows import CaseRecord, Window, as_they_came, messages_saved, windows
 from gridpeers.scenarios.results.findings import find
-from gridpeers.scenarios.results.history import History
+from gridpeers.scenarios.results.history import CaseRecord, History, Window, as_they_came, messages_saved, windows
 from gridpeers.scenarios.results.island_membership import taken_part
 from gridpeers.scenarios.results.metrics import STEADY
 from gridpeers.scenarios.results.recorded_events import law_failures

@@ -51,7 +51,7 @@ BEHIND = 64_000_000
 
 
 class _WholeWrites:
-    """A file to which all that was written since the last flush goes at once; on a failure none of it stays."""
+    """A file to which all that was written since the last flush goes at once, or none of it."""
 
     def __init__(self, path: Path) -> None:
         self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
@@ -67,7 +67,6 @@ class _WholeWrites:
         return self._position
 
     def flush(self) -> None:
-        """Write what is kept; if that fails, cut the file where it ended before, and raise OSError."""
         left = memoryview(b"".join(self._pending))
         self._pending.clear()
         try:
@@ -180,7 +179,6 @@ class RecordWriter:
         self._file.close()
 
     def _write_all(self) -> None:
-        """Write a chunk every `PERIOD`, or when there is much to write, until the end."""
         while not self.failure:
             self._wake.wait(PERIOD)
             self._wake.clear()
@@ -190,7 +188,6 @@ class RecordWriter:
                 return
 
     def _write(self) -> None:
-        """Write what waits as a chunk, and have the disk keep it now and then."""
         try:
             with self._lock:
                 waiting, self._waiting, self._bytes = self._waiting, [], 0
@@ -207,10 +204,7 @@ class RecordWriter:
             self._fail(error.strerror or str(error))
 
     def _sync_all(self, descriptor: int) -> None:
-        """Have the disk keep what is written, also if the machine loses its power, once a `SYNC` until the end.
-
-        A busy disk takes its time for that, and the writer must not wait for it.
-        """
+        """Have the disk keep what is written against a loss of power; the writer does not wait for a busy disk."""
         with contextlib.suppress(OSError):  # of a full disk, which the writer tells
             while not self._closed.wait(SYNC):
                 os.fsync(descriptor)

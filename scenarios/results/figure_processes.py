@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import pickle
 import signal
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -37,28 +37,30 @@ def drawn_on_all_cores(drawing: Drawing, folder: Path) -> Iterator[None]:
 
     What a process cannot draw, this one draws again, and raises what went wrong.
     """
-    started = _started(drawing, folder, _cores())
+    started: list[ForkedProcess] = []
     try:
+        all_at_work = _start(started, drawing, folder, _cores())
         yield
-        if started and all([process.wait() == 0 for process in started]):
+        if all_at_work and all([process.wait() == 0 for process in started]):
             return
     finally:
-        _end(started)
+        for process in started:
+            process.send_signal(signal.SIGKILL)
+            process.wait()
+            with suppress(BrokenPipeError):  # of what it never read
+                process.stdin.close()
         for unfinished in folder.glob(".*.png"):
             unfinished.unlink(missing_ok=True)
-    from gridpeers.scenarios.results.plots.run_figures import (
-        draw_all,  # matplotlib takes longer to import than a case to run
-    )
+    from gridpeers.scenarios.results.plots.run_figures import draw_all  # imports matplotlib
 
     draw_all(drawing, folder)
 
 
-def _started(drawing: Drawing, folder: Path, number: int) -> list[ForkedProcess]:
-    """Start so many processes that draw, each a share; return none where they cannot be."""
+def _start(started: list[ForkedProcess], drawing: Drawing, folder: Path, number: int) -> bool:
+    """Start so many processes that draw, each a share; return whether all of them are at work."""
     server = figure_server(start=False)
-    started: list[ForkedProcess] = []
     if number < 2 or server is None:
-        return started
+        return False
     try:
         with Path(os.devnull).open("wb") as log:  # what went wrong is said by the process that draws again
             started += [server.fork([MODULE], log, speaks=False) for _ in range(number)]
@@ -66,17 +68,8 @@ def _started(drawing: Drawing, folder: Path, number: int) -> list[ForkedProcess]
             process.stdin.write(pickle.dumps((drawing, folder, first, number)))
             process.stdin.flush()  # it stays open: a process that draws ends with this one
     except (ForkServerError, OSError, pickle.PicklingError):
-        _end(started)
-        started.clear()
-    return started
-
-
-def _end(started: Sequence[ForkedProcess]) -> None:
-    for process in started:
-        process.send_signal(signal.SIGKILL)
-        process.wait()
-        with suppress(BrokenPipeError):  # of what it never read
-            process.stdin.close()
+        return False
+    return True
 
 
 def _cores() -> int:

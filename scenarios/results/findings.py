@@ -9,8 +9,7 @@ import numpy as np
 
 from gridpeers.plant.equipment import F_NOM, Feeder
 from gridpeers.scenarios.results.claims import Published
-from gridpeers.scenarios.results.event_windows import CaseRecord
-from gridpeers.scenarios.results.history import Nameplates, read_only
+from gridpeers.scenarios.results.history import CaseRecord, Nameplates, read_only
 from gridpeers.scenarios.results.island_membership import island_intervals, islands_at_end, part_of
 from gridpeers.scenarios.results.metric import Measured, label, make_metrics, measured
 from gridpeers.scenarios.results.metrics import Settling, Steady, measure

@@ -13,8 +13,7 @@ import numpy as np
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.equipment.connectivity import bus_islands, switch_name, switch_names
 from gridpeers.plant.simulators import SIMULATORS
-from gridpeers.scenarios.results.event_windows import Window
-from gridpeers.scenarios.results.history import UNITS, Floats, History, Nameplates
+from gridpeers.scenarios.results.history import UNITS, Floats, History, Nameplates, Window
 from gridpeers.scenarios.schema.participants import inverters_of
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.wire.messages import PlantEvent

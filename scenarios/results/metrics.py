@@ -18,8 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gridpeers.scenarios.results.event_windows import Window
-from gridpeers.scenarios.results.history import Flags, Floats, History, Nameplates
+from gridpeers.scenarios.results.history import Flags, Floats, History, Nameplates, Window
 from gridpeers.scenarios.results.metric import DIGITS, UNITS, Measure
 from gridpeers.scenarios.results.sharing_index import NO_LOAD, mean_over, sharing_index
 

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gridpeers.scenarios.results.event_windows import Window
-from gridpeers.scenarios.results.history import Flags, Floats, History, Nameplates, read_only
+from gridpeers.scenarios.results.history import Flags, Floats, History, Nameplates, Window, read_only
 from gridpeers.scenarios.results.metrics import SHARING, Settling, Steady, measure, settling
 
 if TYPE_CHECKING:

@@ -17,9 +17,8 @@ from gridpeers.plant.feeder import Plant
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.tables import read_feeder
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
-from gridpeers.scenarios.results.event_windows import CaseRecord
 from gridpeers.scenarios.results.findings import Findings, find
-from gridpeers.scenarios.results.history import History
+from gridpeers.scenarios.results.history import CaseRecord, History
 from gridpeers.scenarios.results.link_record import LinkRecord
 from gridpeers.scenarios.results.metrics import SHARING, SHARING_OF_ISLANDS
 from gridpeers.scenarios.results.record import Recorder

@@ -11,9 +11,8 @@ import gridpeers as gp
 from gridpeers.plant.tables.write import write_feeder
 from gridpeers.scenarios.catalogue_files import CATALOGUE
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
-from gridpeers.scenarios.results.event_windows import CaseRecord
 from gridpeers.scenarios.results.findings import find
-from gridpeers.scenarios.results.history import Nameplates, history_of
+from gridpeers.scenarios.results.history import CaseRecord, Nameplates, history_of
 from gridpeers.scenarios.results.metrics_file import RunMetrics, metrics_json
 from gridpeers.scenarios.results.record import Recorded, Recorder
 from gridpeers.scenarios.schema import load_scenario

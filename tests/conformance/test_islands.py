@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.scenarios.results.event_windows import as_they_came, windows
-from gridpeers.scenarios.results.history import History, Nameplates, history_of
+from gridpeers.scenarios.results.history import History, Nameplates, as_they_came, history_of, windows
 from gridpeers.scenarios.results.metrics import measure
 from gridpeers.scenarios.run_request import Outcome
 from gridpeers.scenarios.schema import load_scenario

@@ -5,9 +5,8 @@ from functools import cache
 
 from gridpeers.papers.singhal2022.paper_benchmarks import CLAIMS
 from gridpeers.scenarios.results.claims import judge
-from gridpeers.scenarios.results.event_windows import CaseRecord, windows
 from gridpeers.scenarios.results.findings import Findings, SteadyValues, find
-from gridpeers.scenarios.results.history import History, Nameplates
+from gridpeers.scenarios.results.history import CaseRecord, History, Nameplates, windows
 from gridpeers.scenarios.schema import load_scenario
 from tests.golden.catalogue.pins import ran
 

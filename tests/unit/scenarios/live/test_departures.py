@@ -15,9 +15,8 @@ from gridpeers.plant.equipment import Feeder
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.live.departures import compare
 from gridpeers.scenarios.live.live_report import live_drawing, write_report
-from gridpeers.scenarios.results.event_windows import CaseRecord, windows
 from gridpeers.scenarios.results.findings import find
-from gridpeers.scenarios.results.history import History, history_of
+from gridpeers.scenarios.results.history import CaseRecord, History, history_of, windows
 from gridpeers.scenarios.results.metrics_file import RunMetrics, metrics_json
 from gridpeers.scenarios.results.record import Recorded, Recorder
 from gridpeers.scenarios.results.report import plain

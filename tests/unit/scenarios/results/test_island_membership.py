@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import gridpeers as gp
-from gridpeers.scenarios.results.event_windows import Window
+from gridpeers.scenarios.results.history import Window
 from gridpeers.scenarios.results.island_membership import island_intervals, islands_at_end
 from gridpeers.scenarios.results.plots.run_figures import figures_of, measured
 from gridpeers.scenarios.schema import load_scenario

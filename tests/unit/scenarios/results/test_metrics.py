@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gridpeers.scenarios.results import metrics
-from gridpeers.scenarios.results.event_windows import Window
-from gridpeers.scenarios.results.history import History, Nameplates
+from gridpeers.scenarios.results.history import History, Nameplates, Window
 from gridpeers.scenarios.results.sharing_index import sharing_index
 
 F_NOM = 60.0

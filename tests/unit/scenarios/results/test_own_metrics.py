@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from gridpeers.scenarios.results.claims import CLAIMS, Claim, judged
-from gridpeers.scenarios.results.event_windows import Window
 from gridpeers.scenarios.results.findings import Findings
-from gridpeers.scenarios.results.history import History, Nameplates, read_only
+from gridpeers.scenarios.results.history import History, Nameplates, Window, read_only
 from gridpeers.scenarios.results.metric import METRICS, make_metrics, measured, name_of
 from gridpeers.scenarios.results.window_metrics import WindowData
 from gridpeers.wire.plugins.plugin import Plugin, plugin_problems

@@ -9,9 +9,8 @@ import pytest
 
 from gridpeers.papers.singhal2022.paper_benchmarks import CLAIMS, ISLANDING
 from gridpeers.scenarios.results.claims import judge
-from gridpeers.scenarios.results.event_windows import Window
 from gridpeers.scenarios.results.findings import Findings
-from gridpeers.scenarios.results.history import History, Nameplates
+from gridpeers.scenarios.results.history import History, Nameplates, Window
 from gridpeers.scenarios.results.metrics import Steady, measure
 from gridpeers.scenarios.results.metrics_file import RunMetrics, metrics_json
 from gridpeers.scenarios.results.report import RunReport, plain

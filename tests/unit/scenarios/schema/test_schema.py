@@ -19,7 +19,7 @@ from gridpeers.plant.tables import read_feeder
 from gridpeers.plant.tables.read import DATA
 from gridpeers.scenarios.catalogue_files import CATALOGUE
 from gridpeers.scenarios.live.live_options import LiveOptions, configure
-from gridpeers.scenarios.results.event_windows import as_they_came, late_moves
+from gridpeers.scenarios.results.history import as_they_came, late_moves
 from gridpeers.scenarios.schema import catalogue, load_scenario
 from gridpeers.scenarios.schema.configs import configs, limits_of
 from gridpeers.scenarios.schema.participants import inverters_of
