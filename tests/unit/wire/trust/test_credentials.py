@@ -157,6 +157,18 @@ SHOWN = Credentials(
 ).knowing(("inv1", "inv2"))
 
 
+def test_links_are_mutual_tls_alone_and_end_with_a_certificate() -> None:
+    """Both ends show a certificate, no other protocol is there, and a link closes when a certificate expires."""
+    link, rules = SHOWN.zenoh_settings(star=False)
+    tls = link["tls"]
+
+    assert link["protocols"] == ["tls"]
+    assert (tls["enable_mtls"], tls["close_link_on_expiration"], tls["root_ca_certificate"]) == (True, True, "ca.pem")
+    assert {tls[f"{way}_certificate"] for way in ("listen", "connect")} == {"inv1.pem"}
+    assert {tls[f"{way}_private_key"] for way in ("listen", "connect")} == {"inv1.key"}
+    assert (rules["enabled"], rules["default_permission"]) == (True, "deny")
+
+
 def test_a_sender_has_the_certificate_of_its_own_name() -> None:
     """An agent that of its inverter, in this generation or the next; the plant that of any plant of the site."""
     assert SHOWN.common_names("inv1") == {"agent:inv1", "agent:inv1:2"}

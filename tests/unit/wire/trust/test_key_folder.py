@@ -51,6 +51,16 @@ def test_a_site_is_private_and_its_members_are_listed(lab: Path) -> None:
     ]  # fmt: skip
 
 
+def test_the_certificate_of_a_member_signs_no_other(lab: Path) -> None:
+    """A member that issues certificates by its own key is no authority to anybody."""
+    from cryptography import x509
+
+    extensions = x509.load_pem_x509_certificate((lab / "inv1.pem").read_bytes()).extensions
+
+    assert not extensions.get_extension_for_class(x509.BasicConstraints).value.ca
+    assert not extensions.get_extension_for_class(x509.KeyUsage).value.key_cert_sign
+
+
 def test_a_host_needs_four_files_and_no_more(lab: Path, tmp_path: Path) -> None:
     """Authority, list, own certificate, own key; the authority's key stays at home."""
     host = tmp_path / "host"
