@@ -54,19 +54,7 @@ def at_once(src: str, dst: str, key: str, number: int) -> float:
 
 
 class FakeClockRun:
-    """A run of the toy plant.
-
-    Parameters
-    ----------
-    plant : PlantConfig
-        The toy plant's.
-    agents : tuple[AgentConfig, ...]
-        All agents.
-    recorder : Recorder
-        Takes what the plant publishes for recorders.
-    delay : Delay, optional
-        Of every message.
-    """
+    """A run of the toy plant, whose recorder takes what it publishes for recorders; each message has its delay."""
 
     def __init__(
         self, plant: PlantConfig, agents: tuple[AgentConfig, ...], recorder: Recorder, delay: Delay = at_once
@@ -91,8 +79,6 @@ class FakeClockRun:
         self._tell(self.keys.alive_recorder(RECORDER), PLANT, appeared=True)
         for name in plant.agents:
             self.start(name)
-
-    # ---------------------------------------------------------------- what people and the machine do
 
     def at(self, t: float, do: Callable[[], None]) -> None:
         """Do something at a run time (s), at speed 1."""
@@ -137,8 +123,6 @@ class FakeClockRun:
         command = Command(sender="cli", epoch=1, seq=7, t=0.0, verb=verb, reply_to="z1", **further)
         self._send("cli", self.keys.command, encode(command))
 
-    # ---------------------------------------------------------------- the clock
-
     def run(self) -> None:
         """Run until the plant is over."""
         while not self.plant.finished:
@@ -151,8 +135,6 @@ class FakeClockRun:
 
     def _later(self, seconds: float, do: Callable[[], None]) -> None:
         self._on(self.now + seconds, do)
-
-    # ---------------------------------------------------------------- processes
 
     def _join(self, node: Node, subscriptions: tuple[str, ...]) -> None:
         """Start a process; then it and the others learn of each other."""
@@ -214,8 +196,6 @@ class FakeClockRun:
         elif not node.finished and self._wakes.get(name) != node.deadline:
             self._wakes[name] = node.deadline
             self._on(node.deadline, lambda: self._wake(name, node))
-
-    # ---------------------------------------------------------------- messages
 
     def _publish(self, src: str, action: Publish) -> None:
         if action.key == self.keys.telemetry and src == PLANT:
