@@ -128,16 +128,12 @@ GRAPHS: Registry[Any] = Registry(
 )
 
 
-def neighbours_by(rule: Graph, members: Members, name: str, *, strict: bool = False) -> dict[str, tuple[str, ...]]:
-    """Return each agent's in-neighbours by a rule, in the order of `members`.
+def check_graph(rule: Graph, members: Members, name: str) -> None:
+    """Raise GraphError if a rule, by its name in the scenario, raises, or its result is no graph of these agents.
 
-    `name` is that of the rule in the scenario, for messages. With `strict` a name that is no member is a problem, as
-    in the check of a scenario; else it is left out: in wall-clock time agents meet one after the other.
-
-    Raise GraphError if the rule raises, or its result is no graph of these agents.
+    In a run a name that is no member is left out: in wall-clock time agents meet one after the other.
     """
-    heard_by = _evaluated(rule, members, name)
-    for one, heard in heard_by.items() if strict else ():
+    for one, heard in _evaluated(rule, members, name).items():
         if one not in members:
             raise GraphError(f"graph {name} names {_shown(one)}, {_unknown(one, members)}")
         for other in sorted(heard, key=str):
@@ -145,9 +141,6 @@ def neighbours_by(rule: Graph, members: Members, name: str, *, strict: bool = Fa
                 raise GraphError(f"graph {name} lets {one} listen to {_shown(other)}, {_unknown(other, members)}")
             if other == one:
                 raise GraphError(f"graph {name} lets {one} listen to itself; leave it out of its own neighbours")
-    return {
-        one: tuple(other for other in members if other != one and other in heard_by.get(one, ())) for one in members
-    }
 
 
 class RosterGraph:
@@ -161,7 +154,7 @@ class RosterGraph:
         self._place: dict[str, int] = {}
 
     def in_neighbours(self, own: str) -> tuple[str, ...]:
-        """Return an agent's in-neighbours, in the order of the members; raise GraphError as `neighbours_by` does."""
+        """Return an agent's in-neighbours, in the order of the members; raise GraphError if the rule fails."""
         if self._linked is not None:
             return tuple(_linked_to(own, self._members, self._linked))
         if self._error:

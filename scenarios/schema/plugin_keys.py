@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from gridpeers.agents.agent_config import Gains, GraphRule, LawChoice
 from gridpeers.agents.carriers.law_check import PAPER, law_problems
 from gridpeers.agents.carriers.law_registry import KEYS, LAWS
-from gridpeers.agents.graphs import GRAPHS, make_graph, neighbours_by
+from gridpeers.agents.graphs import GRAPHS, check_graph, make_graph
 from gridpeers.netem.models.own_fault import FAULTS
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.plant.equipment import Feeder, InverterRow
@@ -189,7 +189,7 @@ def check_graphs(scenario: ScenarioModel, feeder: Feeder | None, problems: Probl
         try:
             rule = make_graph(plugin)
             for roster in _rosters(scenario, feeder, name):
-                neighbours_by(rule, roster, plugin.name, strict=True)
+                check_graph(rule, roster, plugin.name)
         except ValueError as error:  # a `GraphError`, or a `PluginError` of one that cannot be called
             problems.add(path, str(error))
 

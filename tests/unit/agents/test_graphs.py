@@ -16,10 +16,10 @@ from gridpeers.agents.agent_config import Control, GraphRule
 from gridpeers.agents.graphs import (
     GRAPHS,
     GraphError,
+    check_graph,
     in_neighbours,
     is_pairwise,
     make_graph,
-    neighbours_by,
 )
 from gridpeers.wire.messages import Measurement
 from gridpeers.wire.plugins.plugin import Plugin, plugin_of, plugin_problems
@@ -200,7 +200,7 @@ def test_a_rule_that_cannot_be_is_told_in_one_line(
 def test_what_is_no_graph_is_told_in_one_line(rule: object, said: str) -> None:
     """The error names the agent, and what the rule returned or raised."""
     with pytest.raises(GraphError) as caught:
-        neighbours_by(rule, nameplates(2), "mine", strict=True)  # type: ignore[arg-type]
+        check_graph(rule, nameplates(2), "mine")  # type: ignore[arg-type]
 
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
