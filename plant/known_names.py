@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 LISTENING = "listening"  # its session is open
-
 COMPILING = "compiling"  # it is being built; its step may be compiled first, which takes up to a minute
-
 READY = "ready"  # it waits for agents
 SUBSTATION = "substation"  # name of a substation that trips, in the text of the event, beside those of inverters
 F_BASE = 60.0  # nominal frequency (Hz) of the standard's settings; at another one the defaults are in proportion

@@ -52,7 +52,6 @@ from gridpeers.wire.traffic import TickTraffic
 Phase = Literal["gathering", "preparing", "ticking", "joining", "holding", "closing", "over"]
 
 TELEMETRY_TICKS = 10  # ticks between two telemetry messages after tick 0: enough for a progress bar
-
 AGAIN = 1.0  # time (s) after which a question without an answer is asked again
 SILENT = 3.0  # time (s) after a recorder's last word after which it counts as silent; it speaks every second
 

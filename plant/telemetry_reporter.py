@@ -48,7 +48,6 @@ def _scale(field: str) -> Callable[[float], float]:
 
 
 _in_W, _in_V, _in_Hz = _scale("P"), _scale("V"), _scale("f")
-
 _LATEST = 20  # number of latest events for late clients: with twice as many of the longest, an answer is still short
 ROWS_BYTES = 32_000  # bytes of rows in a message: Zenoh sends it in one piece
 EVENTS = 30  # most events in a message; the longest possible ones fit within the limit

@@ -19,8 +19,6 @@ from gridpeers.plant.dynamics.kernel.step import run_steps_unlocked
 from gridpeers.plant.dynamics.threads import each_on_a_core
 
 PART = 1000  # nodes from which on a part is large enough: 0.3 MB of factors, and some 50 inverters
-
-
 _OF_GFM = ("gfm", "gfm_state", "gfm_0", "gfm_d")
 _OF_GFL = ("gfl", "gfl_state", "gfl_0", "gfl_d")
 _OF_INVERTERS = ("online", "set_points", "J", "J_0", "V", "I", "limiting")

@@ -15,7 +15,6 @@ from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Integers, R
 from gridpeers.plant.dynamics.kernel.network_arrays import BlockFactors, add_tangent
 
 MOST_NEIGHBOURS = 8  # neighbours up to which taking a node out makes the matrix smaller
-
 WEAK = 1e-6
 """Part of a node's largest coupling below which its own admittance is no pivot: what is in series there cancels."""
 

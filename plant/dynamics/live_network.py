@@ -18,7 +18,6 @@ from gridpeers.plant.dynamics.kernel.step import MAX_LIMITING, limit_currents
 from gridpeers.plant.dynamics.reduction import Reduction
 
 KEPT = 32  # circuits, and their factors, that are kept: a factored network of 123 nodes has 1 MB
-
 K = TypeVar("K", bound=Hashable)
 V = TypeVar("V")
 
@@ -33,7 +32,6 @@ def recent(kept: dict[K, V], key: K, make: Callable[[], V]) -> V:
 
 
 TOLERANCE = 1e-11  # of a network solution: last change of a voltage (pu of the highest nominal one)
-
 WORTH = 40  # iterations of a network solution that cost as much time as new sparse factors
 
 

@@ -22,7 +22,6 @@ from gridpeers.plant.dynamics.reduction import Reduction
 from gridpeers.plant.dynamics.threads import one_thread
 
 MOST_ROUNDS = 500  # rounds between network and inverters, within which the changes of injections must end or halve
-
 NEAR = 4  # rounds after which the voltages are near enough to the solution for a tangent that serves to the end
 
 
@@ -102,7 +101,6 @@ class PowerFlow:
 
 
 DROOP, INSIDE, UNDER, OVER = range(4)
-
 AT_ONCE = 8  # rounds in which all inverters may change place; then the first alone (Murty's least-index rule)
 
 

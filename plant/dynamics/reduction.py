@@ -28,9 +28,7 @@ FLOATING = 1e-12
 without an inverter would have no determined voltage."""
 
 EARTHING = 1e3  # admittance (S) with which a GFM earths the neutral of an island that has lost its earth
-
 UNEARTHED = 0.03 / 50.0  # admittance (S) below which a neutral is not earthed: 50 V over 30 mA (IEC 60364-4-41)
-
 INSULATION = 1e-6  # admittance to earth (S) of all neutrals that nothing earths: their voltages must be determined
 
 

@@ -70,7 +70,6 @@ def _at_frequency(feeder: Feeder, f_nom: float) -> Feeder:
 
 
 TIE_LENGTH = 0.3  # length (km) of the line of a tie
-
 AnyFeeder = TypeVar("AnyFeeder", bound=Feeder)
 Row = TypeVar("Row", bound=msgspec.Struct)
 

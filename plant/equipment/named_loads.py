@@ -14,7 +14,6 @@ from gridpeers.wire.schema.plausible import Plausible
 from gridpeers.wire.wording import first_of, suggestion
 
 FACTOR = Plausible("a factor on a load", 0.0, 10.0)  # factors on the power that a load has in the feeder's tables
-
 LEAST = 0.01  # part of its branches' sizes below which a load's total does not say how they share it
 
 
@@ -104,7 +103,6 @@ def _scaled(values: Sequence[float], sizes: Sequence[float], total: float) -> li
 
 
 MOST = 10.0  # greatest power of one load, over that of all loads, or of the inverters' ratings if more
-
 _POWER = re.compile(r"\bset to (\S+) kW and (\S+) kvar at nominal voltage")
 
 

@@ -9,7 +9,6 @@ from gridpeers.plant.equipment.imported_equipment import LinearElement, LoadPart
 from gridpeers.wire.wording import first_of
 
 EARTH = "earth"  # in place of a neutral: the inverter returns through earth, though its bus has a neutral
-
 BETWEEN_PHASES = 1.3
 """Voltage of a load (pu of its bus, line-to-neutral) from which on it is between phases: there it is 1.73, or 2 between
 the legs of a split-phase service."""

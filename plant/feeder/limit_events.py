@@ -68,7 +68,6 @@ class SetPointLimits:
 
 
 LIMITS = "limits its phase currents"  # words of these events alone; their kind, `limit`, has others
-
 PAUSE = 0.1  # time (s) without limiting after which the next limiting is a spell of its own
 
 
@@ -91,7 +90,6 @@ class CurrentLimits:
 
 
 CROSSING_PAUSE = 0.5  # time (s) without a crossing after which a load's next crossing is reported
-
 SHOWN = 3  # loads that an event names
 BESIDE = 1e-9  # distance from a limit, in proportion, at which the law beside it is taken; a jump is larger by far
 

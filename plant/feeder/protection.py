@@ -19,9 +19,7 @@ from gridpeers.plant.plant_config import Protection
 
 V_ENTER = (0.917, 1.05)  # voltages (pu) within which an inverter may enter service: IEEE 1547-2018, Table 4
 F_ENTER = (59.5, 60.1)  # the same for the frequency (Hz at 60 Hz)
-
 ATTEMPTS = 3  # trips, each within `SETTLED` of the last return, after which an inverter stays off
-
 SETTLED = 60.0  # time in service (s) after which earlier trips do not count
 
 _WORDS = {"OV": "overvoltage", "UV": "undervoltage", "OF": "overfrequency", "UF": "underfrequency"}

@@ -28,7 +28,6 @@ _TABLE_5 = ((500e3, 0.3, 0.10, 20.0), (1500e3, 0.2, 0.05, 15.0), (np.inf, 0.1, 0
 
 
 LOCKED = 0.01  # difference of frequency (Hz) below which two islands count as held at one frequency
-
 LEAST = 0.1  # voltage without load (pu) below which a pole of a switch is a neutral's
 
 

@@ -7,9 +7,7 @@ from collections import deque
 from gridpeers.wire.messages import Pacing
 
 TOLERATED = 0.01  # part of the steps that may be more than one control period late
-
 HOPELESS = 10  # control periods behind which the schedule is put off: a rush is not real time either
-
 FIRST = 100  # steps before which nothing is judged
 _KEPT = 5_000  # delays that are remembered, the latest, for the percentiles of a run that stays
 

@@ -57,7 +57,6 @@ RECORDING = 15.0  # longest time that an ended run stays for a recorder that has
 WAITING = 0.5  # between two messages of a plant that waits for agents to those that are there
 AGAIN = 1.0  # between two questions for the nameplates that have not come: a question dies with its link
 HEARD = 1.0  # after its last state for which an agent is on the roster, as one that the plant hears
-
 COMMANDS, COMMAND_INTERVAL = 100, 0.02
 """Commands of one verb that are carried out at once, and time after which one more is: a step must not wait for those
 who ask without end."""

@@ -24,12 +24,10 @@ SELF_B = Plausible("the susceptance of a line", 0.0, 2000.0)
 MUTUAL = Plausible("a mutual impedance", -10.0, 10.0)
 MUTUAL_B = Plausible("the susceptance of a line", -2000.0, 2000.0)
 RATIO = Plausible("the ratio of a regulator", 0.8, 1.25)
-
 BRANCH_CURRENT = 2000.0  # largest current of a load or capacitor bank (A per phase): conductors carry less
 PART_CURRENT = 50e3  # the same of a load that another program has: it may stand for a town
 RATED_CURRENT = 5000.0  # largest rated current of an inverter or transformer (A per phase)
 TIMES_THE_LOAD = 50.0  # largest rating of one inverter beside the total real power of the feeder's loads
-
 SOURCE_VOLTAGE = Plausible("the voltage of the substation", 0.8, 1.2, above_zero=True)
 
 Phases = Annotated[str, PhaseLetters()]

@@ -18,9 +18,7 @@ from gridpeers.plant.dynamics.kernel.network_arrays import extrapolate, note_inc
 from gridpeers.plant.dynamics.kernel.step import FAILURES, solve_within_limits
 
 CONSISTENT = 1e-10  # last change of a current between network and inverters (pu of rated current)
-
 LOOSE = 0.01  # tolerance of a round's network solution, as a part of the round's change (pu voltage per pu current)
-
 MAX_ROUNDS = 60
 
 

@@ -83,9 +83,7 @@ def limited_tangents(at: Integers, law: Real, V: Complex, A: Complex, B: Complex
 
 
 MAX_ITERATIONS = 60
-
 CAUTION = 0.1  # part of the tolerance that what is left of an iteration may have by its rate so far
-
 NOISE = 100.0  # change, over the tolerance, from which on the next one tells its rate, not rounding
 
 
@@ -160,7 +158,6 @@ EXACT, SETTLED = 1e-13, 1e-11
 """Largest change of an injection (pu of its rated current) at which to end: at once, and after `PATIENCE`."""
 
 PATIENCE = 100
-
 NO_NETWORK = -1  # result of `settle_powers` where the network has no solution at the injections
 
 
