@@ -32,61 +32,6 @@ NEAR = 1e-9
 """Times (s) that differ by less are the same: they are multiples of the plant's step."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class LiveWindows:
-    """The windows of a live run, each kind in the order of time."""
-
-    measured: tuple[Window, ...]
-    too_short: tuple[Window, ...]
-    """Windows that the next event ended before the values could be steady."""
-    not_reached: tuple[Window, ...]
-    unrecorded: tuple[Window, ...]
-    """Windows without numbers, as rows are missing at their end, where they are measured."""
-
-
-def live_windows(
-    scenario: ScenarioModel,
-    events: Iterable[PlantEvent],
-    live: Sequence[tuple[str, float]],
-    ended: float,
-    missing: Sequence[tuple[float, float]] = (),
-) -> LiveWindows:
-    """Return the windows of a live run that ended at a time (s), given label and time (s) of its live events in order.
-
-    A live event opens a window, which lasts to the next event or to the end of the run, and ends the one before it. At
-    the moment of an event of the scenario it belongs to the window of that event.
-    """
-    meant = windows([(event.label, event.t_s) for event in scenario.events], scenario.time.end_s)
-    scripted = windows(as_they_came(scenario, events), scenario.time.end_s)
-    starts = [window.start for window in scripted]
-    live = [(label, t) for label, t in live if all(abs(t - start) > NEAR for start in starts)]
-    reached, not_reached = [], []
-    for plan, window in zip(meant, scripted, strict=True):
-        cut = [t for _, t in live if window.start < t < window.end - NEAR]
-        if cut or plan.end <= ended + NEAR:
-            reached.append(replace(window, end=cut[0]) if cut else window)
-        else:
-            not_reached.append(plan)
-    starts += [t for _, t in live]
-    for label, t in live:
-        end = min((start for start in starts if start > t), default=ended)
-        reached.append(Window(label=label, start=t, end=min(end, ended)))
-    reached.sort(key=lambda window: window.start)
-    shortest = max(STEADY, 2.0 * scenario.time.record_s) - NEAR
-    too_short = [one for one in reached if one not in scripted and one.end - one.start < shortest]
-    unrecorded = [
-        one
-        for one in reached
-        if one not in too_short and any(a < one.end and b > one.end - STEADY - NEAR for a, b in missing)
-    ]
-    return LiveWindows(
-        measured=tuple(one for one in reached if one not in too_short and one not in unrecorded),
-        too_short=tuple(too_short),
-        not_reached=tuple(not_reached),
-        unrecorded=tuple(unrecorded),
-    )
-
-
 def few(lines: Sequence[str]) -> str:
     more = f", and {len(lines) - _SHOWN} more (metrics.json)" if len(lines) > _SHOWN else ""
     return f"{'; '.join(lines[:_SHOWN])}{more}"
@@ -94,14 +39,19 @@ def few(lines: Sequence[str]) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class Departures:
-    """The departures of a run from its scenario, and its windows of measurement."""
+    """The departures of a run from its scenario, and its windows of measurement, each kind in the order of time."""
 
     events: tuple[PlantEvent, ...]
-    disturbed: tuple[Window, ...]
-    """Measured windows of the scenario that end after the first departure, or miss rows."""
-    windows: LiveWindows
     live: Mapping[str, str]
     """By label, the operations of each event that people made."""
+    measured: tuple[Window, ...]
+    disturbed: tuple[Window, ...]
+    """Measured windows of the scenario that end after the first departure, or miss rows."""
+    too_short: tuple[Window, ...]
+    """Windows that the next event ended before the values could be steady."""
+    not_reached: tuple[Window, ...]
+    unrecorded: tuple[Window, ...]
+    """Windows without numbers, as rows are missing at their end, where they are measured."""
 
     def lines(self, end: float = inf) -> list[str]:
         return [line_of(event).strip() for event in self.events if event.t < end]
@@ -116,20 +66,6 @@ class Departures:
         return f"{names}: not what the scenario means by it, which does not tell of: {few(lines)}"
 
 
-class _Due(NamedTuple):
-    """A move of an agent that the scenario asks people, or the driver, to make."""
-
-    verb: str
-    """As the plant's events say it: "left", "joined" or "died"."""
-    name: str
-    since: float
-    until: float
-    """Times (s) between which it may happen."""
-    complaint: str = ""
-    """Text of the departure if it has not happened by the deadline (s); "" if it need not."""
-    deadline: float = inf
-
-
 def compare(
     scenario: ScenarioModel,
     feeder: Feeder,
@@ -139,26 +75,50 @@ def compare(
 ) -> Departures:
     """Compare a run of one case, whose last row was at `ended` (s), with its scenario.
 
-    `missing` has the times (s) of the rows before and after each interval without rows.
+    A live event opens a window, which lasts to the next event or to the end of the run, and ends the one before it. At
+    the moment of an event of the scenario it belongs to the window of that event. `missing` has the times (s) of the
+    rows before and after each interval without rows.
     """
     meant = windows([(event.label, event.t_s) for event in scenario.events], scenario.time.end_s)
+    scripted = windows(as_they_came(scenario, events), scenario.time.end_s)
     switched = tuple(_switched(scenario, feeder, events))
     commands = (event for event in events if event.kind == "link" and event.subject == "links")
     departures = sorted((*switched, *_moved(scenario, feeder, events, meant, ended), *commands), key=lambda one: one.t)
     first = departures[0].t if departures else ended
-    live = tuple((f"live at {round(t, 3):.12g} s", t) for t in dict.fromkeys(event.t for event in switched))
-    opened = live_windows(scenario, events, live, ended, missing)
-    measured = {window.label for window in opened.measured}
+    live = {t: f"live at {round(t, 3):.12g} s" for t in dict.fromkeys(event.t for event in switched)}
+    starts = [window.start for window in scripted]
+    opening = [t for t in live if all(abs(t - start) > NEAR for start in starts)]
+    reached, not_reached = [], []
+    for plan, window in zip(meant, scripted, strict=True):
+        cut = [t for t in opening if window.start < t < window.end - NEAR]
+        if cut or plan.end <= ended + NEAR:
+            reached.append(replace(window, end=cut[0]) if cut else window)
+        else:
+            not_reached.append(plan)
+    starts += opening
+    for t in opening:
+        end = min((start for start in starts if start > t), default=ended)
+        reached.append(Window(label=live[t], start=t, end=min(end, ended)))
+    reached.sort(key=lambda window: window.start)
+    shortest = max(STEADY, 2.0 * scenario.time.record_s) - NEAR
+    too_short = [one for one in reached if one not in scripted and one.end - one.start < shortest]
+    whole = [one for one in reached if one not in too_short]
+    unrecorded = [one for one in whole if any(a < one.end and b > one.end - STEADY - NEAR for a, b in missing)]
+    measured = tuple(one for one in whole if one not in unrecorded)
+    labels = {window.label for window in measured}
     return Departures(
         events=tuple(departures),
+        live={label: "; ".join(one.text for one in switched if one.t == t) for t, label in live.items()},
+        measured=measured,
         disturbed=tuple(
             window
             for window in meant
-            if window.label in measured
+            if window.label in labels
             and (first < window.end - NEAR or any(a < window.end and b > window.start for a, b in missing))
         ),
-        windows=opened,
-        live={label: "; ".join(one.text for one in switched if one.t == t) for label, t in live},
+        too_short=tuple(too_short),
+        not_reached=tuple(not_reached),
+        unrecorded=tuple(unrecorded),
     )
 
 
@@ -179,6 +139,20 @@ def _switched(scenario: ScenarioModel, feeder: Feeder, events: Iterable[PlantEve
             done = is_closed(came), switches.get(came.subject, came.subject)
         if not any(done == (*what,) and since - NEAR < came.t < until + NEAR for *what, since, until in planned):
             yield came
+
+
+class _Due(NamedTuple):
+    """A move of an agent that the scenario asks people, or the driver, to make."""
+
+    verb: str
+    """As the plant's events say it: "left", "joined" or "died"."""
+    name: str
+    since: float
+    until: float
+    """Times (s) between which it may happen."""
+    complaint: str = ""
+    """Text of the departure if it has not happened by the deadline (s); "" if it need not."""
+    deadline: float = inf
 
 
 def _moved(

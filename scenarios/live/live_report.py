@@ -75,7 +75,7 @@ def write_report(metrics: RunMetrics, recorded: Recorded, pacing: Pacing | None,
     """
     scenario, feeder, (case,) = metrics.scenario, metrics.feeder, metrics.scenario.cases
     departures = compare(scenario, feeder, recorded.events, recorded.ended, recorded.missing)
-    record = CaseRecord.of(scenario, feeder, case, recorded, departures.windows.measured)
+    record = CaseRecord.of(scenario, feeder, case, recorded, departures.measured)
     record = replace(record, history=taken_part(scenario, feeder, record.history))
     findings = find(scenario, feeder, {case: record})
     stop = JudgingStop(StoppedError, KeyboardInterrupt)
@@ -108,33 +108,32 @@ def write_report(metrics: RunMetrics, recorded: Recorded, pacing: Pacing | None,
 
 def _live_table(recorded: Recorded, departures: Departures) -> dict[str, object]:
     """Return the table `live` of metrics.json (docs/results.md)."""
-    windows, live = departures.windows, departures.live
     table: dict[str, object] = {
         "ended_s": recorded.ended,
         "windows": {
-            window.label: {"t_s": window.start, "end_s": window.end, "what": live[window.label]}
-            for window in windows.measured
-            if window.label in live
+            window.label: {"t_s": window.start, "end_s": window.end, "what": departures.live[window.label]}
+            for window in departures.measured
+            if window.label in departures.live
         },
-        "too_short": _labels(windows.too_short),
-        "not_reached": _labels(windows.not_reached),
+        "too_short": _labels(departures.too_short),
+        "not_reached": _labels(departures.not_reached),
         "disturbed": _labels(departures.disturbed),
         "departures": departures.lines(),
     }
     if recorded.missing:
         table["missing"] = [{"after_s": a, "before_s": b} for a, b in recorded.missing]
-        table["unrecorded"] = _labels(windows.unrecorded)
+        table["unrecorded"] = _labels(departures.unrecorded)
     return table
 
 
 def _notes(scenario: ScenarioModel, recorded: Recorded, departures: Departures) -> Iterable[str]:
-    ended, end_s, windows = f"{recorded.ended:.2f} s", scenario.time.end_s, departures.windows
+    ended, end_s = f"{recorded.ended:.2f} s", scenario.time.end_s
     if not scenario.events and not departures.live:
         yield "the scenario has no event, and nobody made one, so there is no window to measure in"
-    elif windows.not_reached:
-        what = "they have no numbers" if windows.measured else "nothing was measured"
-        yield f"ended at {ended}, before the end of {_named(windows.not_reached)}: {what}"
-    elif end_s < recorded.ended and all(window.end <= end_s for window in windows.measured):
+    elif departures.not_reached:
+        what = "they have no numbers" if departures.measured else "nothing was measured"
+        yield f"ended at {ended}, before the end of {_named(departures.not_reached)}: {what}"
+    elif end_s < recorded.ended and all(window.end <= end_s for window in departures.measured):
         yield f"measured up to {end_s:g} s, where the scenario ends; the history goes on to {ended}"
     if departures.live:
         lines = [f"{label}: {what}" for label, what in departures.live.items()]
@@ -142,10 +141,10 @@ def _notes(scenario: ScenarioModel, recorded: Recorded, departures: Departures) 
     if recorded.missing:
         spans = ", ".join(f"{before:.2f} and {after:.2f} s" for before, after in recorded.missing)
         yield f"rows are missing between {spans}, as the record was out of the plant's reach"
-    if windows.unrecorded:
-        yield f"without rows where they are measured, so without numbers: {_named(windows.unrecorded)}"
-    if windows.too_short:
-        yield f"too short to be measured: {_named(windows.too_short)}"
+    if departures.unrecorded:
+        yield f"without rows where they are measured, so without numbers: {_named(departures.unrecorded)}"
+    if departures.too_short:
+        yield f"too short to be measured: {_named(departures.too_short)}"
     if recorded.record_failure:
         yield f"{recorded.record_failure}; the run went on without it"
     yield from late_moves(scenario, recorded.events)

@@ -160,7 +160,7 @@ def test_a_live_switch_opens_a_window_as_the_scenarios_events_do(
     events: list[PlantEvent], ended: float, measured: str, too_short: str, not_reached: str
 ) -> None:
     """Each window lasts to the next event, whoever made it; its label says by whom."""
-    opened = compare(*one_case("islanding"), events, ended).windows
+    opened = compare(*one_case("islanding"), events, ended)
 
     assert ", ".join(f"{one.label} {one.start:g}-{one.end:g}" for one in opened.measured) == measured
     assert ", ".join(one.label for one in opened.too_short) == too_short
