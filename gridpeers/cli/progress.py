@@ -8,14 +8,7 @@ from contextlib import contextmanager
 from time import monotonic
 
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    Progress,
-    TaskProgressColumn,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from gridpeers.scenarios.run_request import Progress as TellCase
 from gridpeers.scenarios.short_texts import duration
@@ -29,7 +22,6 @@ PATIENCE = 4.0
 COMPILING = (
     "still starting: the plant is built, and the first run ever compiles its inner loop, which takes some seconds ..."
 )
-
 TRYING = (
     "still at work: the plant is tried; the first use ever compiles its inner loop, which takes some 20 seconds ..."
 )
@@ -53,48 +45,30 @@ def explained(explain: Callable[[], None]) -> Iterator[Callable[[], None]]:
 @contextmanager
 def progress(console: Console, cases: tuple[str, ...], explanation: str = COMPILING) -> Iterator[TellCase]:
     """Yield the function that takes the progress of each case; an `explanation` comes if t = 0 lasts long."""
-    shown = _bars(console, cases) if console.is_terminal else _lines(console)
-    with explained(lambda: console.print(explanation, soft_wrap=True)) as begun, shown as show:
-
-        def tell(case: str, t: float, end: float) -> None:
-            if t > 0.0:  # the plant's first step is compiled last
-                begun()
-            show(case, t, end)
-
-        yield tell
-
-
-@contextmanager
-def _bars(console: Console, cases: tuple[str, ...]) -> Iterator[TellCase]:
     columns = (
         TextColumn("case {task.fields[case]:4}", markup=False),
         BarColumn(bar_width=40),
         TextColumn("{task.completed:4.1f} of {task.total:g} s simulated"),
         TimeElapsedColumn(),
     )
-    with Progress(*columns, console=console, transient=True) as bars:
-        tasks = {case: bars.add_task(case, case=case, total=1.0, start=False, visible=False) for case in cases}
-
-        def tell(case: str, t: float, end: float) -> None:
-            if t == 0.0:
-                bars.start_task(tasks[case])
-            bars.update(tasks[case], completed=t, total=end, visible=True)
-
-        yield tell
-
-
-@contextmanager
-def _lines(console: Console) -> Iterator[TellCase]:
+    bars = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+    tasks = {case: bars.add_task(case, case=case, total=1.0, start=False, visible=False) for case in cases}
     began: dict[str, float] = {}
     done: set[str] = set()
+    with explained(lambda: console.print(explanation, soft_wrap=True)) as begun, bars:
 
-    def tell(case: str, t: float, end: float) -> None:
-        began.setdefault(case, monotonic())
-        if t >= end and case not in done:
-            done.add(case)
-            console.print(f"case {case}: {end:g} s simulated in {monotonic() - began[case]:.1f} s")
+        def tell(case: str, t: float, end: float) -> None:
+            if t > 0.0:  # the plant's first step is compiled last
+                begun()
+            if case not in began:
+                began[case] = monotonic()
+                bars.start_task(tasks[case])
+            bars.update(tasks[case], completed=t, total=end, visible=True)
+            if t >= end and case not in done and not console.is_terminal:
+                done.add(case)
+                console.print(f"case {case}: {end:g} s simulated in {monotonic() - began[case]:.1f} s")
 
-    yield tell
+        yield tell
 
 
 @contextmanager
@@ -116,31 +90,27 @@ def remaining(console: Console, total: float) -> Iterator[TellPart]:
         TimeElapsedColumn(),
     )
     with Progress(*columns, console=console, transient=True, speed_estimate_period=MEMORY) as bars:
-        task = bars.add_task("starting", total=total)
-        begun = False
+        task = bars.add_task("starting", total=total, start=False)
 
         def tell(what: str, done: float) -> None:
-            nonlocal begun
-            if not begun:
-                bars.reset(task, description=what, completed=round(done))
+            if not bars.tasks[0].started:
+                bars.reset(task, completed=round(done))
             bars.update(task, description=what, completed=done)
-            begun = True
 
         yield tell
 
 
 def _part_lines(console: Console, total: float) -> TellPart:
     """Print a line for each piece of work that begins, and for each tenth of all."""
-    latest: tuple[str, int] | None = None
+    shown: set[tuple[str, int]] = set()
     began: tuple[float, float] | None = None
 
     def tell(what: str, done: float) -> None:
-        nonlocal latest, began
+        nonlocal began
         since, before = began = began or (monotonic(), done)
-        now = what.partition(",")[0], int(10.0 * done / total)
-        if now == latest:
+        if (now := (what.partition(",")[0], int(10.0 * done / total))) in shown:
             return
-        latest = now
+        shown.add(now)
         left = (monotonic() - since) / (done - before) * (total - done) if done > before else 0.0
         words = f", about {duration(round(left))} left" if left else ""
         console.print(f"{what}: {100.0 * done / total:.0f} % done{words}", soft_wrap=True)

@@ -48,7 +48,11 @@ def _in_one_line() -> Iterator[None]:
 def _line(error: Any) -> str:
     """Return a problem in one line: where it is, what it is, and what would be right."""
     message = error.format_message().rstrip(".")
-    more = command_line(*_words(error.ctx), "-h")
+    words: list[str] = []
+    ctx = error.ctx
+    while ctx is not None and ctx.parent is not None:
+        words, ctx = [ctx.info_name, *words], ctx.parent
+    more = command_line(*words, "-h")
     param, kind = getattr(error, "param", None), type(error).__name__
     if kind == "NoSuchOption":
         params = error.ctx.command.get_params(error.ctx)
@@ -56,32 +60,23 @@ def _line(error: Any) -> str:
             return 'TIME: must be at least 0 s, where a run begins, as 4.3; a word that begins with "-" is an option'
         known = [name for each in params for name in each.opts if name[:2] == "--"]
         return f'no option "{error.option_name}"; {suggestion(error.option_name, known, "options")}'
-    if kind == "MissingParameter" and param is not None:
-        return f"{_name(param)} is missing; {more} shows what it is"
     if kind == "BadOptionUsage":
-        needs = "needs a value" if "requires" in message else "takes no value"
-        return f"{error.option_name}: {needs}"
+        return f"{error.option_name}: {'needs a value' if 'requires' in message else 'takes no value'}"
     if extra := re.search(r"unexpected extra arguments?(?:\(s\))? \((.*)\)", message):
         return f'too much was typed: "{extra[1]}"; {more} shows what is expected'
-    if param is not None:
-        return f"{_name(param)}: {_wrong_value(error, message)}"
-    return f"{message[:1].lower()}{message[1:]}; {more} shows what can be given"
-
-
-def _words(ctx: Any) -> list[str]:
-    """Return the words of a command, without the program."""
-    return [] if ctx is None or ctx.parent is None else [*_words(ctx.parent), ctx.info_name]
-
-
-def _name(param: Any) -> str:
-    """Return the name of an option or an argument in the help."""
+    if param is None:
+        return f"{message[:1].lower()}{message[1:]}; {more} shows what can be given"
+    name = param.metavar if param.metavar and param.metavar.isupper() else str(param.name).upper()
     if param.param_type_name == "option":
-        return str(max(param.opts, key=len))
-    return param.metavar if param.metavar and param.metavar.isupper() else str(param.name).upper()
+        name = str(max(param.opts, key=len))
+    if kind == "MissingParameter":
+        return f"{name} is missing; {more} shows what it is"
+    return f"{name}: {_wrong_value(error, message)}"
 
 
 def _wrong_value(error: Any, message: str) -> str:
-    value, *choices = re.findall(r"'([^']*)'", message.partition(": ")[2]) or [""]
+    text = message.partition(": ")[2]
+    value, *choices = re.findall(r"'([^']*)'", text) or [""]
     ctx: dict[str, Any] = {}
     if details := getattr(error.__cause__, "errors", None):  # typer has values checked by pydantic since 0.29
         first = details()[0]
@@ -94,5 +89,5 @@ def _wrong_value(error: Any, message: str) -> str:
         return f'must be a whole number, got "{value}"'
     if "number" in message or "float" in message:
         return f'must be a number, got "{value}"'
-    text = message.partition(": ")[2] or message
+    text = text or message
     return text[:1].lower() + text[1:]

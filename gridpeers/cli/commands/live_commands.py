@@ -1,4 +1,7 @@
-"""Commands to a live run, look at it, change it, end it, and the command that joins it: an agent."""
+"""Commands to a live run, look at it, change it, end it, and the command that joins it: an agent.
+
+What one of them needs alone is imported in it: people wait for them.
+"""
 
 from __future__ import annotations
 
@@ -21,8 +24,6 @@ from gridpeers.cli.commands.options import (
 )
 from gridpeers.cli.usage import BAD_INPUT, BROKEN, fail, terminal
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
-from gridpeers.scenarios.live import watching
-from gridpeers.scenarios.live.live_processes import agent_here
 from gridpeers.scenarios.live.run_address import (
     RUN,
     Access,
@@ -61,6 +62,8 @@ def agent(
 
     Example:  gridpeers agent inv2 --keys lab --connect tls/192.168.1.10:7447
     """
+    from gridpeers.scenarios.live.live_processes import agent_here
+
     check_inverters(inverters)
     if keys is not None and len(inverters) > 1:
         raise UsageError(f"--keys: agents of one process have one certificate; start that of {inverters[1]} alone")
@@ -79,6 +82,8 @@ def status(live: LiveRun) -> None:
 
     Example:  gridpeers status
     """
+    from gridpeers.scenarios.live import watching
+
     with live.client(meet_agents=True) as client:
         typer.echo(watching.plain(watching.look(client)), nl=False)
 
@@ -94,6 +99,8 @@ def watch(
 
     Example:  gridpeers watch --keys lab --connect tls/192.168.1.10:7447
     """
+    from gridpeers.scenarios.live import watching
+
     check_duration(duration)
     with live.client(meet_agents=True) as client:
         watching.watch(client, terminal(), duration)

@@ -8,13 +8,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import wraps
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from gridpeers.cli.usage import BAD_INPUT, BROKEN, CLAIM_FAILED, INTERRUPTED, TERMINATED, fail
 from gridpeers.scenarios.drivers.free_endpoint import ListenError
-from gridpeers.scenarios.live.live_processes import ProcessOutcome
 from gridpeers.scenarios.live.run_address import (
     ENDPOINT,
     RUN,
@@ -34,6 +33,9 @@ from gridpeers.wire.driver.session import SessionError
 from gridpeers.wire.keys import Role
 from gridpeers.wire.trust.credentials import Credentials
 from gridpeers.wire.trust.key_folder import COMMANDING, KeysError, open_credentials
+
+if TYPE_CHECKING:
+    from gridpeers.scenarios.live.live_processes import ProcessOutcome
 
 Run = Annotated[str, typer.Option(metavar="NAME", help="Name of the run; runs of other names do not meet.")]
 Connect = Annotated[
