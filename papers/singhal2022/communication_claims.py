@@ -122,7 +122,6 @@ class GraphRun:
     """A run on one random graph: settling after the event, and steady values."""
 
     links: int
-    """Links of the graph."""
     connected: bool
     """Whether there is a way between any two inverters; a graph with links enough may still lack one."""
     settled: Settling
@@ -141,7 +140,11 @@ def graph_runs(found: Findings) -> tuple[GraphRun, ...]:
     return found.graphs if isinstance(found, GraphFindings) else ()
 
 
-TREE, BEND = 8, int(FEW_LINKS)
+def connected(found: Findings) -> tuple[GraphRun, ...]:
+    return tuple(run for run in graph_runs(found) if run.connected)
+
+
+TREE, BEND = 8, FEW_LINKS
 """Links of a tree of nine inverters, with fewer of which no graph is connected; and where the paper's curve bends."""
 
 topology = ExperimentClaims("topology", source="section 4, figure of topologies", figure="topology")
@@ -154,11 +157,6 @@ def medians(runs: tuple[GraphRun, ...]) -> dict[int, float]:
         t = run.settled.t_share_s
         by_links.setdefault(run.links, []).append(float("inf") if t is None else t)
     return {links: median(by_links[links]) for links in sorted(by_links)}
-
-
-def connected(found: Findings) -> tuple[GraphRun, ...]:
-    """Return the runs on connected graphs."""
-    return tuple(run for run in graph_runs(found) if run.connected)
 
 
 @topology.add("time to MPSI < 0.01 falls with the number of links")

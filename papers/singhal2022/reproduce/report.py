@@ -16,12 +16,11 @@ from typing import Any, NamedTuple
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from gridpeers import Verdict
-from gridpeers.measures import HEADINGS, Quantity
+from gridpeers.measures import HEADINGS
 from gridpeers.output_folders import set_status, versions, write_whole
 from gridpeers.papers.singhal2022.communication_claims import graph_runs
 from gridpeers.papers.singhal2022.paper_benchmarks import ComparedNumber, headline, numbers
-from gridpeers.papers.singhal2022.reproduce.parts import SETTINGS
-from gridpeers.papers.singhal2022.reproduce.work import FORMATS, PartResult, Work
+from gridpeers.papers.singhal2022.reproduce.work import FORMATS, SETTINGS, PartResult, Work
 from gridpeers.papers.singhal2022.tables import MQSI_FACTOR, V_RELATIVE, Cell, PaperTable
 from gridpeers.theory import ScenarioModel
 
@@ -96,27 +95,17 @@ class Entry(NamedTuple):
     """Every judgement: its measure, "" for the tolerance of its table, and whether it passes."""
 
 
-class GridRow(NamedTuple):
-    """One row: a case (or an island) after one event."""
-
-    label: str
-    entries: tuple[Entry, ...]
-
-
 _CASES = {"I": "no control", "II": "un-coordinated", "III": "GFM-coordinated", "IV": "fully coordinated"}
 
 
-def lines(table: PaperTable, result: PartResult) -> tuple[GridRow, ...]:
-    """Return the rows of a table, in the paper's order."""
-    rows: dict[str, dict[Quantity, Cell]] = {}
-    several = len({cell.event for cell in table.cells}) > 1
+def lines(table: PaperTable, result: PartResult) -> dict[str, list[Entry]]:
+    """Return the rows of a table by their case or island and event, in the paper's order."""
+    rows: dict[str, list[Entry]] = {}
     for cell in table.cells:
         what = f"island of {cell.island}" if cell.island else f"{cell.case} {_CASES.get(cell.case, '')}".rstrip()
-        rows.setdefault(f"{what}, {cell.event}" if several else what, {})[cell.quantity] = cell
-    return tuple(
-        GridRow(label, tuple(_entry(cells[quantity], result) for quantity in table.quantities))
-        for label, cells in rows.items()
-    )
+        label = f"{what}, {cell.event}" if len(table.events) > 1 else what
+        rows.setdefault(label, []).append(_entry(cell, result))
+    return rows
 
 
 def tolerances(table: PaperTable) -> list[str]:
@@ -134,22 +123,20 @@ def tolerances(table: PaperTable) -> list[str]:
 
 
 def _entry(cell: Cell, result: PartResult) -> Entry:
-    ours, reason = result.found.value(cell), result.found.reason(cell)
+    reason = result.found.reason(cell)
+    ours = float("nan") if reason else result.found.value(cell)
     digits, paper = cell.digits + 1, f"{cell.paper:.{cell.digits}f}"
-    if reason:
-        return Entry(paper, reason.partition(":")[0], "-", _judged(cell, float("nan")))
-    off = round(ours - cell.paper, digits) + 0.0  # no "-0.000"
-    times = f" ({ours / cell.paper:.2g} times)" if cell.tolerance.value is None else ""
-    return Entry(paper, f"{ours:.{digits}f}", f"{off:+.{digits}f}{times}", _judged(cell, ours))
-
-
-def _judged(cell: Cell, ours: float) -> tuple[tuple[str, bool], ...]:
     by = {
         "": cell.within(ours),
         f"{100 * V_RELATIVE:g} %": cell.within_relative(ours),
         f"factor {MQSI_FACTOR:g}": cell.within_factor(ours),
     }
-    return tuple((name, holds) for name, holds in by.items() if holds is not None)
+    judged = tuple((name, holds) for name, holds in by.items() if holds is not None)
+    if reason:
+        return Entry(paper, reason.partition(":")[0], "-", judged)
+    off = round(ours - cell.paper, digits) + 0.0  # no "-0.000"
+    times = f" ({ours / cell.paper:.2g} times)" if cell.tolerance.value is None else ""
+    return Entry(paper, f"{ours:.{digits}f}", f"{off:+.{digits}f}{times}", judged)
 
 
 PAPER = (

@@ -26,9 +26,8 @@ from gridpeers.cli.usage import (
 )
 from gridpeers.output_folders import FolderError, OutputLostError, new_folder, refusal, set_broken, shown
 from gridpeers.papers.singhal2022.paper_benchmarks import headline
-from gridpeers.papers.singhal2022.reproduce.parts import CHOICES, chosen
 from gridpeers.papers.singhal2022.reproduce.report import Reproduction, write
-from gridpeers.papers.singhal2022.reproduce.work import Work
+from gridpeers.papers.singhal2022.reproduce.work import CHOICES, Work, chosen
 
 
 def reproduce(

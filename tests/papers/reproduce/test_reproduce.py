@@ -8,10 +8,9 @@ from pathlib import Path
 import pytest
 
 from gridpeers.papers.singhal2022.paper_benchmarks import CLAIMS, within
-from gridpeers.papers.singhal2022.reproduce.parts import CHOICES, PARTS, Part, chosen
 from gridpeers.papers.singhal2022.reproduce.report import Reproduction, lines, metrics_json, render, settings
 from gridpeers.papers.singhal2022.reproduce.studies import graphs
-from gridpeers.papers.singhal2022.reproduce.work import PartResult
+from gridpeers.papers.singhal2022.reproduce.work import CHOICES, PARTS, Part, PartResult, chosen
 from gridpeers.papers.singhal2022.tables import TABLES, Cell, tables_of
 from gridpeers.scenarios.results.claims import judge
 from gridpeers.scenarios.results.findings import Findings
@@ -89,7 +88,7 @@ def test_every_number_verdict_and_reason_is_told(tmp_path: Path, template: str) 
 def test_a_number_that_is_off_fails_the_whole(tmp_path: Path) -> None:
     """It is marked in its cell, fails the claim on its column, and the command ends with 1."""
     off = whole(result(tmp_path, f_error=0.2))
-    entry = lines(TABLES[0], off.results[0])[0].entries[0]
+    entry = next(iter(lines(TABLES[0], off.results[0]).values()))[0]
 
     assert entry == ("0.14", "0.200", "+0.060", (("", False),))
     assert off.failed

@@ -39,7 +39,6 @@ def test_one_part_from_end_to_end(tmp_path: Path) -> None:
     ("words", "told"),
     [
         (["--only", "table"], '--only: no part "table"; did you mean "tables"?'),
-        (["--driver", "threads"], '--driver: no driver "threads"; the drivers are processes, inprocess'),
         (["--out", __file__], "this is a file; give a new or an empty folder"),
     ],
 )
