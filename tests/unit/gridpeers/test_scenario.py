@@ -126,10 +126,3 @@ def test_a_scenario_without_events_runs_and_has_no_windows() -> None:
 
     assert len(run.metrics) == 0
     assert len(run.history) == 51
-
-
-def test_what_is_no_change_is_refused_in_one_line() -> None:
-    """Changes are values by the path of their key."""
-    for changes in ([("seed", 1)], {3: 1}, None):
-        with pytest.raises(gp.ScenarioError, match="replace: needs values by the path of their key"):
-            gp.load("islanding").replace(changes)  # type: ignore[arg-type]

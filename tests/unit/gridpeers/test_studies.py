@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 from pathlib import Path
 
 import pytest
@@ -133,8 +134,8 @@ def test_the_command_compare_prints_the_table_and_draws_both(
 ) -> None:
     """Two folders in, a table and a figure out."""
     monkeypatch.chdir(tmp_path)
-    scenario.run("I").save("one")
-    scenario.run("IV").save("two")
+    shutil.copytree(scenario.run("I").folder, "one")
+    shutil.copytree(scenario.run("IV").folder, "two")
 
     code, text = invoke("compare", "one", "two")
 

@@ -6,14 +6,12 @@ import re
 import sys
 from pathlib import Path
 from tempfile import gettempdir
-from types import SimpleNamespace
 
 import pandas as pd
 import pytest
 
 from gridpeers import BrokenRunError, Feeder, Scenario
 from gridpeers.bridges.proposal import feeder_proposal
-from gridpeers.scenarios.checks.check_verdict import CheckVerdict
 from tests.command_line import invoke
 from tests.unit.bridges.gridlabd.glm_models import HEAD, LOADS
 
@@ -111,28 +109,6 @@ def test_a_phase_that_would_stay_at_its_limit_gets_more_current(
     assert "tripped: overvoltage" in made
     assert "so [plant.gfm] allows more current, I_max_pu = 3" in made
     assert "I_max_pu = 3.0" in Path("mine/islanding.toml").read_text()
-
-
-def test_a_check_that_raises_is_a_note_and_another_limit_gives_leaders_no_more_current(
-    elsewhere: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The note says what the check raised; available power is no limit of a current, so nothing else is tried."""
-    verdict = CheckVerdict(check="mine", status="failed", reason="division by zero")
-    events = pd.DataFrame({"kind": ["limit"], "subject": ["inv1"], "text": ["inv1 has 3 kW available"]})
-    tried: list[str] = []
-
-    def run(self: Scenario, case: str) -> object:
-        tried.append(Path("mine/islanding.toml").read_text())
-        return SimpleNamespace(check_verdicts=(verdict,), events=events)
-
-    monkeypatch.setattr(Scenario, "run", run)
-    Path("uneven.dss").write_text(UNEVEN)
-
-    code, made = invoke("init", "mine", "--feeder", "uneven.dss", "--switch", "Line.sw")
-
-    assert code == 0, made
-    assert "NOTE  case ring fails its check mine: division by zero" in made
-    assert len(tried) == 1
 
 
 def string_of_loads(buses: int, km: float, kvar: float) -> str:
@@ -238,19 +214,6 @@ def test_buses_with_blanks_in_their_names_are_imported(elsewhere: Path, script: 
     assert V["src_bus"].min() > V["c_(1)_2"].min() > V["c_(1)"].min() > 0.9
 
 
-def test_names_of_a_script_are_no_paths_and_no_toml(elsewhere: Path) -> None:
-    """A circuit called ../x gets a folder within the project, and a quote in a switch's name ends no text."""
-    Path("odd.dss").write_text(
-        'New Circuit.../x basekv=4.16 bus1=src\nNew Line."l,1" bus1=src bus2=a length=0.1 units=km switch=y\n'
-        "New Load.ld bus1=a kv=4.16 kw=100\n"
-    )
-    code, made = invoke("init", "mine", "--feeder", "odd.dss", "--inverters", "2")
-
-    assert code == 0, made
-    assert "NOTE  no bus for more than 1 of the 2 inverters" in made
-    assert sorted(path.name for path in Path("mine").iterdir()) == ["_x", "islanding.toml"]
-
-
 def test_loads_of_another_set_are_other_loads() -> None:
     """A command that reads a folder of tables takes its load set, main if none is named."""
     main, by_name, event2 = (
@@ -293,6 +256,8 @@ def test_a_model_for_gridlabd_goes_the_same_ways(elsewhere: Path) -> None:
         assert text in printed
     tables, model = (pd.read_csv(f"{name}.csv") for name in ("tables", "model"))
     assert (tables["V_pu"] - model["V_pu"]).abs().max() < 1e-9
+
+    assert "was imported: its elements are admittance matrices" in invoke("feeder", "glm", "mine")[1]
 
     code, made = invoke("init", "mine-islanded", "--feeder", "feeder.glm")
 
@@ -377,7 +342,6 @@ def test_a_feeder_becomes_a_model_with_the_inverters_of_a_scenario(elsewhere: Pa
 
 
 @pytest.mark.parametrize(("words", "text"), [
-    (("imported",), "was imported: its elements are admittance matrices"),
     (("Master.dss",), "no feeder of our own tables"),
     (("standard123", "--scenario", "islanding"), '"islanding" is on feeder "microgrid123", not on "standard123"'),
     (("microgrid123", "--scenario", "islanding", "--case", "V"), 'no case "V"; did you mean "IV"?'),
@@ -389,15 +353,6 @@ def test_a_feeder_that_cannot_be_a_model_is_told_in_one_line(
     elsewhere: Path, words: tuple[str, ...], text: str
 ) -> None:
     """Exit code 2 and one line; no model is written."""
-    imported = Path("imported")
-    imported.mkdir()
-    (imported / "buses.csv").write_text("bus,phases,V_nom_kV_LL\na,ABC,4.16\nb,ABC,4.16\n")
-    (imported / "source.csv").write_text("bus,V_pu,angle_deg\na,1,0\n")
-    rows = [f"line{phase},a.{phase} b.{phase},1.0 -1.0 -1.0 1.0" for phase in "ABC"]
-    (imported / "elements.csv").write_text("\n".join(["element,nodes,Y_S", *rows]) + "\n")
-    head = "load,bus,from_phase,to_phase,P_kW,Q_kvar,V_nom_kV,n_P,n_Q,V_low_pu,V_min_pu,V_max_pu,edge,V_off_pu"
-    (imported / "load_parts_main.csv").write_text(f"{head}\nx,b,A,,10,0,2.4,0,0,0.5,0.8,1.2,0,0\n")
-
     code, printed = invoke("feeder", "glm", *words)
 
     assert code == 2

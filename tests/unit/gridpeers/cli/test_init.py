@@ -36,14 +36,3 @@ def test_a_folder_that_another_command_fills_is_left_to_it(elsewhere: Path) -> N
 
     assert (code, text) == (2, "gridpeers: study: another command is writing in it; give another folder\n")
     assert [path.name for path in (elsewhere / "study").iterdir()] == ["notes.txt"]
-
-
-def test_a_folder_with_something_in_it_is_left_alone(elsewhere: Path) -> None:
-    """Nothing of the user's is written over."""
-    (elsewhere / "notes.txt").write_text("mine")
-
-    code, text = invoke("init", ".")
-
-    assert code == 2
-    assert text == "gridpeers: .: the folder is not empty; give a new or an empty one\n"
-    assert [path.name for path in elsewhere.iterdir()] == ["notes.txt"]

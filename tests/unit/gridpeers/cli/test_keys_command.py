@@ -61,17 +61,6 @@ def test_what_cannot_be_done_with_a_site_is_refused(elsewhere: Path) -> None:
     assert 'no certificate was issued to "inv7"' in refused("keys", "revoke", "inv7", "--keys", "lab")
 
 
-def test_names_are_all_judged_before_any_certificate_is_issued(elsewhere: Path) -> None:
-    """A line for each name that cannot be used; the good one among them gets nothing, until it stands alone."""
-    assert invoke("keys", "init", "lab")[0] == 0
-    assert refused("keys", "issue", ".", "CA", "--keys", "lab").count("cannot be a name") == 2
-    text = refused("keys", "issue", "inv1", "a b", "plant", "ca", "--role", "agent", "--keys", "lab")
-
-    assert [line.partition(": ")[2].split()[0] for line in text.splitlines()] == ['"a', "plant:", '"ca"']
-    assert not (elsewhere / "lab" / "inv1.pem").exists()
-    assert invoke("keys", "issue", "inv1", "inv1", "--keys", "lab")[1].count("inv1.pem") == 1
-
-
 def test_show_says_to_the_minute_until_when_certificates_are_valid(elsewhere: Path) -> None:
     """One may end within hours."""
     from gridpeers.wire.trust.site_authority import issue

@@ -9,8 +9,6 @@ import msgspec
 import pytest
 
 from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.plant.plant_config import PlantConfig
-from gridpeers.scenarios.live import run_address
 from gridpeers.scenarios.live.live_options import LiveOptions, configure
 from gridpeers.scenarios.schema import load_scenario
 from tests.command_line import invoke
@@ -132,10 +130,3 @@ def test_the_plant_hands_every_agent_what_it_needs() -> None:
     assert {agent.control.graph for agent in agents} == {"GFM-only"}
     assert (handed["inv10"].microgrid, handed["inv10"].P_rated) == ("MG3", 350e3)
     assert handed["inv10"].name == "inv10"
-
-
-def test_a_plant_can_wait_for_its_agents_for_ever() -> None:
-    """An infinite --wait reaches the plant as a time that JSON can say."""
-    plant, _ = configure(*load_scenario("islanding"), LiveOptions(run="lab", wait=float("inf")), "tcp/127.0.0.1:7447")
-
-    assert msgspec.json.decode(msgspec.json.encode(plant), type=PlantConfig).wait_for_agents == run_address.LONGEST_TIME
