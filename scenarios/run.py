@@ -1,38 +1,56 @@
 """One run from a checked scenario to its folder: cases, records, metrics, figures, claims, report.
 
-`run_case` runs the cases; all else here comes of their records.
+`run_case` gives the configurations of a case to a driver (`gridpeers.scenarios.drivers`), and its telemetry to its
+record; all else here comes of the records.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import traceback
-from collections.abc import Mapping
+from collections.abc import Callable
 from contextlib import ExitStack
+from datetime import datetime
+from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
-import msgspec
+from msgspec.structs import replace
 
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.realtime.pacer import sentence
 from gridpeers.plant.simulators import SIMULATORS
+from gridpeers.scenarios.checks.check_registry import ALWAYS, CHECKS
+from gridpeers.scenarios.drivers.free_endpoint import local_endpoint
+from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.scenarios.results.claims import NO_BENCHMARK, benchmark_of
-from gridpeers.scenarios.results.figure_processes import drawn_on_all_cores
+from gridpeers.scenarios.results.figure_processes import drawn_on_all_cores, prepare_figures
 from gridpeers.scenarios.results.metrics_file import case_facts, metrics_json
-from gridpeers.scenarios.results.record import Recorded
+from gridpeers.scenarios.results.record import Recorded, Recorder, RecordError
+from gridpeers.scenarios.results.recorded_events import ended_by_a_law
 from gridpeers.scenarios.results.run_files import broken_if_ended, no_room, refusal, set_complete, shown, write_whole
-from gridpeers.scenarios.run_case import run_case
-from gridpeers.scenarios.run_request import BrokenRunError, Progress, Request
+from gridpeers.scenarios.run_request import BrokenRunError, LawStopError, Outcome, Progress, Request
+from gridpeers.scenarios.schema.configs import configs
+from gridpeers.scenarios.schema.participants import inverters_of
 from gridpeers.scenarios.schema.plugin_keys import claims_of
 from gridpeers.scenarios.schema.scenario_writing import to_toml
 from gridpeers.scenarios.versions import version_of, versions
 from gridpeers.wire.driver.ending import OutputLostError
 from gridpeers.wire.driver.machine import too_few_files
-from gridpeers.wire.messages import Pacing
+from gridpeers.wire.messages import Pacing, Telemetry
 from gridpeers.wire.wording import not_importable
 
 if TYPE_CHECKING:
+    from gridpeers.plant.plant_interface import PlantLike
     from gridpeers.scenarios.live.departures import Departures
     from gridpeers.scenarios.results.report import RunReport
+
+_AFTER_RUN = (
+    *("results.findings", "results.claims", "results.report"),
+    *("results.plots.drawing", "checks.judging"),
+)
+"""Modules that are used after a run, and imported while it goes on: this process has little to do then."""
 
 
 def run(request: Request, progress: Progress) -> RunReport:
@@ -101,7 +119,13 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
 
     cases = {case: CaseRecord.of(scenario, request.feeder, case, record) for case, record in recorded.items()}
     findings = find(scenario, request.feeder, cases)
-    compared = _compared(request, recorded)
+    compared: dict[str, Departures] = {}
+    if request.clock == "wall":
+        from gridpeers.scenarios.live.departures import compare
+
+        for case, record in recorded.items():
+            one_case = replace(scenario, cases={case: scenario.cases[case]})
+            compared[case] = compare(one_case, request.feeder, record.events, record.ended)
     disturbed = any(one.disturbed for one in compared.values())
     facts = {}
     for case, record in recorded.items():
@@ -157,19 +181,94 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
     return report
 
 
-def _compared(request: Request, recorded: Mapping[str, Recorded]) -> dict[str, Departures]:
-    """Compare each case of a run in wall-clock time with its scenario."""
-    if request.clock == "simulated":
-        return {}
-    from gridpeers.scenarios.live.departures import compare
+def run_case(
+    request: Request,
+    case: str,
+    toml: str,
+    progress: Progress,
+    plant_at_rest: Callable[[PlantConfig], PlantLike] | None = None,
+) -> tuple[Recorded, Outcome]:
+    """Run one case by the driver asked for, and record it, with the scenario as run (TOML); or BrokenRunError.
 
-    scenario = request.scenario
-    return {
-        case: compare(
-            msgspec.structs.replace(scenario, cases={case: scenario.cases[case]}),
-            request.feeder,
-            record.events,
-            record.ended,
-        )
-        for case, record in recorded.items()
-    }
+    In one process `plant_at_rest` gives the plant at t = 0 instead of building it.
+    """
+    scenario, real = request.scenario, request.clock == "wall"
+    time = scenario.time
+    plant, agents = _configs(request, case)
+    record = RecordInfo(
+        level=plant.record,
+        scenario=scenario.name,
+        case=case,
+        toml=toml,
+        seed=scenario.seed,
+        driver=request.driver,
+        versions=versions(),
+        inverters=tuple(row.name for row in inverters_of(scenario, request.feeder)),
+        plant=plant,
+        agents=agents,
+        started=datetime.now().astimezone().isoformat(timespec="milliseconds") if real else "",
+    )
+    ahead = request.lasting and not real  # in real time nothing else may take a core
+    with Recorder(request.folder / case, record=record) as recorder:
+
+        def note(telemetry: Telemetry) -> None:
+            nonlocal ahead
+            if ahead:  # from the first row on: before, every core is busy with the start
+                ahead = False
+                prepare_figures()
+                for module in _AFTER_RUN:
+                    import_module(f"gridpeers.scenarios.{module}")
+                for check in ALWAYS:
+                    CHECKS.resolve(check)
+            recorder(telemetry)
+            progress(case, recorder.ended, time.end_s)
+
+        progress(case, 0.0, time.end_s)
+        try:
+            if request.driver == "inprocess":
+                from gridpeers.scenarios.drivers.inprocess import run_inprocess
+
+                ready = None if plant_at_rest is None else plant_at_rest(plant)
+                outcome = run_inprocess(plant, agents, note, on_other=recorder, plant=ready)
+            else:
+                from gridpeers.scenarios.drivers.process_driver import run_processes
+
+                logs = request.folder / "log" / case
+                outcome = run_processes(plant, agents, logs, note, on_other=recorder, shared=request.processes)
+            if outcome.broke:
+                stopped = ended_by_a_law(plant.on_law_failure, outcome.events)
+                raise (LawStopError if stopped else BrokenRunError)(f"case {case}: {outcome.broke}")
+            recorded = recorder.finish(time.end_s, time.record_s)
+            if recorder.record_failure:
+                outcome = dataclasses.replace(
+                    outcome, notes=(*outcome.notes, f"{recorder.record_failure}; the run went on without it")
+                )
+            return recorded, outcome
+        except RecordError as error:
+            raise BrokenRunError(f"case {case}: {error}") from error
+
+
+def _configs(request: Request, case: str) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
+    listen = local_endpoint(request.scenario.processes.port) if request.driver == "processes" else ""
+    real = request.clock == "wall"
+    plant, agents = configs(request.scenario, request.feeder, case, listen, real_nodes=real)
+    plant = replace(plant, record=request.scenario.record)
+    agents = tuple(replace(agent, record=request.scenario.record) for agent in agents)
+    if request.bridge:
+        own = tuple(name for name in plant.agents if name not in request.outside)
+        plant = replace(plant, bridged=request.bridge, agents=own)
+        agents = tuple(agent for agent in agents if agent.name not in request.outside)
+    if request.keys is not None:
+        from gridpeers.scenarios.drivers.secured import secured
+
+        inverters = tuple(row.name for row in inverters_of(request.scenario, request.feeder))
+        started = {agent.name for agent in agents}
+        plant = replace(plant, listen=tuple(text.replace("tcp/", "tls/", 1) for text in plant.listen))
+        plant, agents, _ = secured(plant, agents, Path(request.keys), started=started, inverters=inverters)
+    if request.clock == "simulated":
+        return plant, agents
+    if request.driver != "processes":
+        raise BrokenRunError("wall-clock time needs one process per agent: use the driver processes")
+    clock, speed = request.clock, request.speed
+    plant = replace(plant, clock=clock, speed=speed, strict=request.strict)
+    return plant, tuple(replace(agent, clock=clock, speed=speed) for agent in agents)

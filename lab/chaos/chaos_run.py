@@ -24,7 +24,7 @@ from gridpeers.scenarios.checks.judging import judge_case
 from gridpeers.scenarios.results.history import CaseRecord
 from gridpeers.scenarios.results.island_membership import closed_switches
 from gridpeers.scenarios.results.recorded_events import tripped_by, tripped_inverters
-from gridpeers.scenarios.run_case import run_case
+from gridpeers.scenarios.run import run_case
 from gridpeers.scenarios.run_request import BrokenRunError, Driver, LawStopError, Request
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.scenarios.sweep.sweep_case import plant_at_start

@@ -26,7 +26,7 @@ ALLOWED = {
     "wire/driver/process.py": "tells two processes of one name apart, with random bits",
     "wire/trust/key_folder.py": "ends of certificates are dates",
     "wire/trust/site_authority.py": "the same",
-    "scenarios/run_case.py": "the record says when a run began",
+    "scenarios/run.py": "the record says when a run began",
     "scenarios/live/live_files.py": "names of folders, and the same",
     "viewer/record_pages.py": "how long ago a file was written, which only says whether to look again",
 }

@@ -16,7 +16,7 @@ from gridpeers.lab.chaos.campaign import shrink_number
 from gridpeers.lab.chaos.chaos_folder import ChaosFolder
 from gridpeers.lab.chaos.chaos_run import run_scenario
 from gridpeers.lab.chaos.machine_error import MachineError
-from gridpeers.scenarios.run_case import run_case
+from gridpeers.scenarios.run import run_case
 from tests.command_line import invoke
 from tests.unit.lab.chaos.bases import base_in
 from tests.unit.lab.chaos.small_campaign import rows_of, small
