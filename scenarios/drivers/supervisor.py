@@ -9,12 +9,10 @@ from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from pathlib import Path
 from time import monotonic
-from typing import NamedTuple
 
 from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.netem.schema.netem import NodeFault
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.scenarios.drivers.children import Child, Children
 from gridpeers.scenarios.drivers.forking import agent_server, plant_server
@@ -22,33 +20,20 @@ from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.wire.messages import PLANT
 
 
-class ProcessFault(NamedTuple):
-    t: float
-    """Run time (s)."""
-    name: str
-    number: signal.Signals
-
-
-def process_faults(nodes: Iterable[NodeFault]) -> list[ProcessFault]:
-    """Return the signals of entries `[[node]]` in the order of time; their other faults are emulated."""
-    faults = []
-    for node in nodes:
-        end = math.inf if node.to_s is None else node.to_s
-        faults += [ProcessFault(node.from_s, node.name, signal.SIGKILL)] if node.kill else []
-        if node.pause:
-            faults += [
-                ProcessFault(node.from_s, node.name, signal.SIGSTOP),
-                ProcessFault(end, node.name, signal.SIGCONT),
-            ]
-    return sorted(faults)
-
-
 class FaultInjector:
     """Inject the process faults of a plant's run in real time; telemetry gives the run's time."""
 
     def __init__(self, plant: PlantConfig) -> None:
-        setup = EmulationConfig.of_tree(plant.links) if plant.links and plant.clock == "wall" else None
-        self._due = process_faults(setup.netem.nodes) if setup is not None and setup.real_nodes else []
+        self._due: list[tuple[float, str, signal.Signals]] = []
+        """Run time (s), agent and signal of the faults that are left, in the order of time; others are emulated."""
+        if plant.links and plant.clock == "wall":
+            setup = EmulationConfig.of_tree(plant.links)
+            for node in setup.netem.nodes if setup.real_nodes else ():
+                end = math.inf if node.to_s is None else node.to_s
+                self._due += [(node.from_s, node.name, signal.SIGKILL)] if node.kill else []
+                self._due += [(node.from_s, node.name, signal.SIGSTOP)] if node.pause else []
+                self._due += [(end, node.name, signal.SIGCONT)] if node.pause else []
+            self._due.sort()
         self._speed, self._T_c = plant.speed, plant.T_c
         self._offset: float | None = None
         """Run time minus wall time times the speed (s); None before the run begins."""
@@ -57,7 +42,7 @@ class FaultInjector:
 
     @property
     def names(self) -> set[str]:
-        return {fault.name for fault in self._due}
+        return {name for _, name, _ in self._due}
 
     def note_time(self, t: float, at: float) -> None:
         """Note that telemetry of t (s), one period ahead, came at a time of `monotonic` (s); a plant may lag."""
@@ -68,18 +53,18 @@ class FaultInjector:
         """Time (s) until the next fault; infinite if there is none, or the run has not begun."""
         if not self._due or self._offset is None:
             return math.inf
-        return max(0.0, (self._due[0].t - self._offset) / self._speed - monotonic())
+        return max(0.0, (self._due[0][0] - self._offset) / self._speed - monotonic())
 
     def inject(self, children: Children) -> None:
         while self._due and self.wait == 0.0:
-            fault = self._due.pop(0)
+            _, name, number = self._due.pop(0)
             try:
-                children[fault.name].signal(fault.number)
+                children[name].signal(number)
             except KeyError:  # its agent has not joined yet
                 continue
-            if fault.number is signal.SIGKILL:
-                self.killed.add(fault.name)
-            (self._paused.add if fault.number is signal.SIGSTOP else self._paused.discard)(fault.name)
+            if number is signal.SIGKILL:
+                self.killed.add(name)
+            (self._paused.add if number is signal.SIGSTOP else self._paused.discard)(name)
 
     def end(self, children: Children) -> None:
         """Drop the faults that are left, and continue paused processes, so that they can leave."""

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+import msgspec
 from msgspec.structs import replace
 
 from gridpeers.netem.fault_schedule import LinkSchedules
@@ -21,7 +22,6 @@ from gridpeers.scenarios.emulation.link_data import (
     EmulationConfig,
     LinkCommand,
     LinkStatus,
-    encode_statuses,
     report_data,
     words,
 )
@@ -124,7 +124,7 @@ class EmulatedLinks:
             if self._receiver.was_impaired(src, t):
                 holds = tuple(words(kind, span.model) for kind, span in self._receiver.holding(src, t).items())
                 statuses[src] = LinkStatus(holds=holds, counts=counts.get(src))
-        return encode_statuses(statuses)
+        return msgspec.msgpack.encode(statuses)
 
     def _counts(self) -> dict[str, LinkCounts]:
         counts = self._receiver.counts()

@@ -66,16 +66,12 @@ class LinkStatus(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
 
 NO_MESSAGES = LinkCounts(sent=0, duplicated=0, delivered=0, dropped={}, corrupted=0, in_flight=0)
 
-encode_statuses = msgspec.msgpack.Encoder().encode
-
 _statuses = msgspec.msgpack.Decoder(dict[Name, LinkStatus])
 
 
 def decode_statuses(data: bytes) -> dict[str, LinkStatus]:
     return decode_foreign(_statuses.decode, data)
 
-
-encode_data = msgspec.msgpack.Encoder().encode
 
 _reports = msgspec.msgpack.Decoder(LinkReportData)
 
@@ -111,7 +107,7 @@ def report_data(
         batches[-1].append(piece)
     *first, last = (tuple(batch) for batch in batches)
     final = LinkReportData(traces=last, counts=counts, sha256=sha256, failures=failures)
-    return tuple(map(encode_data, [*(LinkReportData(traces=batch) for batch in first), final]))
+    return tuple(map(msgspec.msgpack.encode, [*(LinkReportData(traces=batch) for batch in first), final]))
 
 
 def words(kind: str, model: Any) -> str:

@@ -6,7 +6,7 @@ import copy
 import hashlib
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import islice
@@ -61,15 +61,6 @@ class Plan:
     @property
     def parameters(self) -> tuple[str, ...]:
         return tuple(self.runs[0].shown)
-
-
-def fingerprint(runs: Iterable[Run], feeders: Iterable[Feeder]) -> str:
-    whole = hashlib.sha256()
-    for run in runs:
-        whole.update(msgspec.json.encode((run.sample, run.case, run.scenario, dict(run.shown))))
-    for text in sorted(map(repr, feeders)):
-        whole.update(text.encode())
-    return whole.hexdigest()
 
 
 MOST_LISTED = 20
@@ -215,13 +206,18 @@ def _plan(sweep: Sweep, text: str, axes: Sequence[Axis], base: BaseScenario, pro
             f"max_runs = {sweep.max_runs:,}; thin out the axes, or raise max_runs if it is meant",
         )
     problems.raise_if_any()
+    whole = hashlib.sha256()
+    for run in runs:
+        whole.update(msgspec.json.encode((run.sample, run.case, run.scenario, dict(run.shown))))
+    for feeder in sorted(map(repr, feeders)):
+        whole.update(feeder.encode())
     return Plan(
         name=sweep.name,
         title=sweep.title,
         text=text,
         base=scenario,
         runs=tuple(runs),
-        fingerprint=fingerprint(runs, feeders),
+        fingerprint=whole.hexdigest(),
     )
 
 
