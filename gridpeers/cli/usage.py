@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 import typer
 
 from gridpeers.scenarios.console import terminal as terminal
-from gridpeers.scenarios.results.run_files import TerminatedError
 from gridpeers.wire.driver.command_line import command_line
 from gridpeers.wire.driver.ending import StopSignal
 from gridpeers.wire.wording import DISTRIBUTIONS, damaged, printable, requirement, suggestion
@@ -127,6 +126,8 @@ def interruptible() -> Iterator[None]:
 
     Signals within a second are one request, those of Ctrl-C too, which `timeout` passes on twice.
     """
+    from gridpeers.scenarios.results.run_files import TerminatedError  # with msgspec, which the help starts without
+
     terminate, numbers = StopSignal(TerminatedError), [signal.SIGTERM]
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else a shell has it ignored, or another has it
         numbers.append(signal.SIGINT)
@@ -142,6 +143,8 @@ def interruptible() -> Iterator[None]:
 
 def exit_code(error: KeyboardInterrupt) -> int:
     """Return the exit code of a command that a signal ended."""
+    from gridpeers.scenarios.results.run_files import TerminatedError
+
     return TERMINATED if isinstance(error, TerminatedError) else INTERRUPTED
 
 
