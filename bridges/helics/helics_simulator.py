@@ -38,7 +38,7 @@ class HelicsSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
     def relations(self) -> list[Problem]:
         """Return what is wrong with the values.
 
-            >>> HelicsSettings(broker="tcp://127.0.0.1:99999").relations()[0].text
+        >>> HelicsSettings(broker="tcp://127.0.0.1:99999").relations()[0].text
         'must be like tcp://127.0.0.1:23404, got "tcp://127.0.0.1:99999"'
         """
         found = []
