@@ -27,9 +27,8 @@ from bench.harness import machine, markdown, say
 from gridpeers.scenarios.drivers.children import Child, Children
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
 from gridpeers.scenarios.drivers.process_driver import run_processes
-from gridpeers.scenarios.drivers.secured import secured
 from gridpeers.scenarios.schema import load_scenario
-from gridpeers.scenarios.schema.configs import configs
+from gridpeers.scenarios.schema.configs import configs, secured
 from gridpeers.wire.driver.session import Session
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.trust.credentials import Credentials

@@ -9,7 +9,7 @@ import typing
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any
 
 import msgspec
 
@@ -48,30 +48,22 @@ from gridpeers.wire.schema.table_reading import in_words, kinds_of, shown
 from gridpeers.wire.schema.table_schema import INLINE, NO_KEY, Field, NamedTables, OtherKeys, fields_of
 
 
-class FieldDoc(NamedTuple):
-    name: str
-    type: str
-    """The annotation as written in the source."""
-    text: str
-    """The docstring under the field, on one line."""
-
-
-def field_docs(cls: type) -> tuple[FieldDoc, ...]:
-    """Return the fields of a class with their docstrings, those of its base classes first."""
-    written: dict[str, FieldDoc] = {}
+def field_docs(cls: type) -> dict[str, tuple[str, str]]:
+    """Return annotation (as in the source) and docstring of each field of a class, those of its base classes first."""
+    written: dict[str, tuple[str, str]] = {}
     for base in reversed(cls.__mro__):
         if base not in (object, msgspec.Struct):
             written |= _written_in(base)
     names = cls.__struct_fields__ if issubclass(cls, msgspec.Struct) else tuple(written)
-    return tuple(written[name] for name in names)
+    return {name: written[name] for name in names}
 
 
 def field_table(cls: type, *, left_out: Iterable[str] = ()) -> Iterator[str]:
-    skipped, docs = set(left_out), {doc.name: doc.text for doc in field_docs(cls)}
+    skipped, docs = set(left_out), field_docs(cls)
     rows = []
     for field in fields_of(cls):
         if not (field.name in skipped or INLINE in field.marks or NO_KEY in field.marks or field.mark(NamedTables)):
-            text = field.help or docs.get(field.name, "")
+            text = field.help or docs.get(field.name, ("", ""))[1]
             key = '"mine:Name"' if field.mark(OtherKeys) else field.key
             rows.append((f"`{key}`", _type(field), field.unit, field.span, _default(field), text))
     if rows:
@@ -96,18 +88,18 @@ def alias_docs(module: ModuleType) -> tuple[tuple[str, str], ...]:
     )
 
 
-def _written_in(cls: type) -> dict[str, FieldDoc]:
+def _written_in(cls: type) -> dict[str, tuple[str, str]]:
     try:
         definition = ast.parse(textwrap.dedent(inspect.getsource(cls))).body[0]
     except (OSError, TypeError):  # of a class that was made, or written in a notebook
         return {}
     assert isinstance(definition, ast.ClassDef)
-    found: dict[str, FieldDoc] = {}
+    found: dict[str, tuple[str, str]] = {}
     for statement, after in zip(definition.body, [*definition.body[1:], None], strict=True):
         if isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name):
             is_text = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
             text = _one_line(after.value.value) if is_text else ""  # type: ignore[union-attr]
-            found[statement.target.id] = FieldDoc(statement.target.id, ast.unparse(statement.annotation), text)
+            found[statement.target.id] = ast.unparse(statement.annotation), text
     return found
 
 
@@ -200,7 +192,7 @@ def _messages() -> Iterator[str]:
         "Another CRC-32, unknown fields, missing fields, wrong types and values out of bounds are refused:",
         "counted by kind, logged once and dropped.",
     )
-    common = {doc.name for doc in field_docs(messages.Message)}
+    common = set(field_docs(messages.Message))
     yield from _section("Fields of every message", messages.Message, "")
     for kind in (*typing.get_args(messages.AnyMessage), messages.PlantEvent):
         yield from _section(
@@ -243,7 +235,7 @@ def _feeder() -> Iterator[str]:
 
 def _section(title: str, cls: type[msgspec.Struct], text: str, leave_out: Iterable[str] = ()) -> Iterator[str]:
     skipped = set(leave_out)
-    rows = [(f"`{doc.name}`", f"`{doc.type}`", doc.text) for doc in field_docs(cls) if doc.name not in skipped]
+    rows = [(f"`{name}`", f"`{kind}`", text) for name, (kind, text) in field_docs(cls).items() if name not in skipped]
     yield from ("", f"## {title}", "")
     if text:
         yield from (text, "")

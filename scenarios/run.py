@@ -31,7 +31,7 @@ from gridpeers.scenarios.results.record import Recorded, Recorder, RecordError
 from gridpeers.scenarios.results.recorded_events import ended_by_a_law
 from gridpeers.scenarios.results.run_files import broken_if_ended, no_room, refusal, set_complete, shown, write_whole
 from gridpeers.scenarios.run_request import BrokenRunError, LawStopError, Outcome, Progress, Request
-from gridpeers.scenarios.schema.configs import configs
+from gridpeers.scenarios.schema.configs import configs, secured
 from gridpeers.scenarios.schema.participants import inverters_of
 from gridpeers.scenarios.schema.plugin_keys import claims_of
 from gridpeers.scenarios.schema.scenario_writing import to_toml
@@ -259,8 +259,6 @@ def _configs(request: Request, case: str) -> tuple[PlantConfig, tuple[AgentConfi
         plant = replace(plant, bridged=request.bridge, agents=own)
         agents = tuple(agent for agent in agents if agent.name not in request.outside)
     if request.keys is not None:
-        from gridpeers.scenarios.drivers.secured import secured
-
         inverters = tuple(row.name for row in inverters_of(request.scenario, request.feeder))
         started = {agent.name for agent in agents}
         plant = replace(plant, listen=tuple(text.replace("tcp/", "tls/", 1) for text in plant.listen))

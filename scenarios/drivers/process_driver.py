@@ -153,9 +153,8 @@ class _ProcessDriver:
             if self._plant_left is not None and not self._ended and now - self._plant_left > LAST_TELEMETRY:
                 self._end(supervisor.children[PLANT].report(self._when))
             if not self._ended:
-                supervisor.start_when_gone(self._awaited)
+                supervisor.work(self._awaited)
                 self._awaited.clear()
-                supervisor.work()
         supervisor.faults.end(supervisor.children)
         until = monotonic() + self.patience
         # in simulated time the plant leaves once its last telemetry is acknowledged

@@ -148,12 +148,9 @@ class Supervisor:
     def _mates(self, name: str) -> tuple[str, ...]:
         return self._shared.get(name, (name,))
 
-    def start_when_gone(self, names: Iterable[str]) -> None:
-        """Start agents that the plant awaits, as soon as the former process of their name has ended."""
-        self._awaited.update(names)
-
-    def work(self) -> None:
-        """Start the awaited agents whose former process has ended, and inject the faults that are due."""
+    def work(self, awaited: Iterable[str] = ()) -> None:
+        """Inject the faults that are due, and start agents that the plant awaits, once their former process ended."""
+        self._awaited.update(awaited)
         for name in sorted(self._awaited):
             if all(child.status is not None for child in self.children.lives(name)):
                 self._awaited.discard(name)

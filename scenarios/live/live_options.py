@@ -6,7 +6,7 @@ import msgspec
 from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.plant.equipment import Feeder, InverterRow
+from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.scenarios.drivers.free_endpoint import ListenError, free_endpoint
 from gridpeers.scenarios.live.feeder_map import feeder_map
@@ -128,7 +128,9 @@ def configure(
     level: RecordLevel = scenario.record if options.recorded else "physics"
     live = {"run": options.run, "clock": "wall", "speed": options.speed, "links": links, "record": level}
     first = [replace(agent, **live, deadline=0.0) for agent in agents if agent.name in plant.agents]
-    everyone = (*first, *(_spare(row, first[0]) for row in feeder.spares))
+    nameplate = ("name", "kind", "microgrid", "P_rated", "V_nom", "m_p", "m_q")
+    spares = (replace(first[0], **{name: getattr(row, name) for name in nameplate}) for row in feeder.spares)
+    everyone = (*first, *spares)
     end = None if options.duration is None else max(1, round(options.duration / plant.T_c)) * plant.T_c
     diagram = replace(feeder_map(as_in(scenario, feeder)), scenario=scenario.name, case=case)
     plant = replace(
@@ -152,9 +154,3 @@ def manual_node_faults(scenario: ScenarioModel) -> str:
     names = ", ".join(dict.fromkeys(node.name for node in netem_of(scenario, case).nodes if node.kill or node.pause))
     note = f"[[node]] of {names}: agents in other terminals are killed and paused by you (kill -KILL, -STOP, -CONT)"
     return note if names else ""
-
-
-def _spare(row: InverterRow, like: AgentConfig) -> AgentConfig:
-    """Return the configuration of a spare inverter's agent: as another's, but for the nameplate."""
-    fields = ("name", "kind", "microgrid", "P_rated", "V_nom", "m_p", "m_q")
-    return replace(like, **{name: getattr(row, name) for name in fields})

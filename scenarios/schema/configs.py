@@ -1,6 +1,9 @@
-"""From a checked scenario to the configurations of its plant and agents, and to its feeder."""
+"""From a checked scenario to the configurations of its plant and agents, with certificates too, and to its feeder."""
 
 from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from pathlib import Path
 
 import msgspec
 
@@ -106,6 +109,41 @@ def configs(
         for row in present
     )
     return plant, agents
+
+
+def secured(
+    plant: PlantConfig,
+    agents: Sequence[AgentConfig],
+    folder: Path,
+    *,
+    started: Collection[str],
+    inverters: Sequence[str],
+) -> tuple[PlantConfig, tuple[AgentConfig, ...], tuple[str, ...]]:
+    """Return configurations with certificates, and a note on each that ends soon.
+
+    The keys of the agents that are `started` from here must be in the folder; access rules name the agents of all
+    `inverters`. KeysError has every problem of a certificate, a line each.
+    """
+    from gridpeers.wire.trust.key_folder import KeysError, open_credentials  # ssl, which a run without keys has not
+
+    every = tuple(inverters)
+    credentials, note = open_credentials(folder, ("plant",))
+    problems, notes = [], [note]
+    secured_agents = []
+    for agent in agents:
+        own = None
+        if agent.name in started:
+            try:
+                own, note = open_credentials(folder, ("agent",), agent.name)
+                notes.append(note)
+            except KeysError as error:
+                problems.append(str(error))
+        secured_agents.append(msgspec.structs.replace(agent, inverters=every, credentials=own))
+    if problems:
+        raise KeysError("\n".join(problems))
+    handed_out = {name: {**tree, "inverters": list(every)} for name, tree in plant.agent_configs.items()}
+    plant = msgspec.structs.replace(plant, credentials=credentials.knowing(every), agent_configs=handed_out)
+    return plant, tuple(secured_agents), tuple(filter(None, notes))
 
 
 def limits_of(scenario: ScenarioModel, case: str) -> tuple[PowerLimit, ...]:

@@ -19,7 +19,6 @@ from gridpeers.plant.tables import read_feeder
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.results.findings import Findings, find
 from gridpeers.scenarios.results.history import CaseRecord, History
-from gridpeers.scenarios.results.link_record import LinkRecord
 from gridpeers.scenarios.results.metrics import SHARING, SHARING_OF_ISLANDS
 from gridpeers.scenarios.results.record import Recorder
 from gridpeers.scenarios.results.recorded_events import ended_by_a_law, first_of, law_failures
@@ -102,6 +101,10 @@ def _run(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, His
         measures |= flat(label, dict(metrics.values))
     if failed_check:
         measures = dict.fromkeys(measures)
+    if books := links.counts.values():
+        measures["links_sent"] = float(links.sent)
+        measures["links_delivered"] = float(sum(book.delivered for book in books))
+        measures["links_dropped"] = float(sum(sum(book.dropped.values()) for book in books))
     failed = [f"{label}: {name} {text}" for label, metrics in own.items() for name, text in metrics.reasons.items()]
     done = SweepRow(
         number=number,
@@ -112,7 +115,7 @@ def _run(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, His
         links_sha256=links.sha256,
         trips="; ".join(f"t = {event.t:g} s: {event.text}" for event in recorded.events if event.kind == "trip"),
         link_warnings="; ".join((*links.warnings, *sorted(links.failures))),
-        measures=measures | _accounts(links),
+        measures=measures,
     )
     return done, record.history
 
@@ -129,17 +132,6 @@ def _indexes(found: Findings, case: str, label: str) -> dict[str, Any]:
         }
     del numbers["reasons"]
     return numbers | {"steady": float(not any(one.reasons for one in islands.values() or (whole,)))}
-
-
-def _accounts(links: LinkRecord) -> dict[str, float | None]:
-    books = links.counts.values()
-    if not books:
-        return {}
-    return {
-        "links_sent": float(links.sent),
-        "links_delivered": float(sum(book.delivered for book in books)),
-        "links_dropped": float(sum(sum(book.dropped.values()) for book in books)),
-    }
 
 
 def flat(label: str, values: dict[str, Any]) -> dict[str, float | None]:

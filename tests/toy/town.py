@@ -14,9 +14,9 @@ from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.scenarios.drivers.children import Child
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
-from gridpeers.scenarios.drivers.secured import secured
 from gridpeers.scenarios.drivers.supervisor import Supervisor
 from gridpeers.scenarios.results.link_record import LinkRecord
+from gridpeers.scenarios.schema.configs import secured
 from gridpeers.wire.codec import RejectedError, decode, encode
 from gridpeers.wire.driver.session import Session
 from gridpeers.wire.keys import Keys

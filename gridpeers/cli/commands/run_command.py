@@ -31,13 +31,12 @@ from gridpeers.plant.simulators import SIMULATORS
 from gridpeers.rooms import ROOMS
 from gridpeers.runs.choices import Pace, check_how
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint, local_endpoint
-from gridpeers.scenarios.drivers.secured import secured
 from gridpeers.scenarios.results.file_sizes import file_sizes, require_room
 from gridpeers.scenarios.results.run_files import RUNS, new_folder, shown
 from gridpeers.scenarios.run import run as run_scenario
 from gridpeers.scenarios.run_request import BrokenRunError, Driver, LawStopError, Request
 from gridpeers.scenarios.schema import ScenarioError, ScenarioModel
-from gridpeers.scenarios.schema.configs import configs
+from gridpeers.scenarios.schema.configs import configs, secured
 from gridpeers.scenarios.schema.participants import inverters_of
 from gridpeers.wire.trust.key_folder import KeysError
 

@@ -18,7 +18,6 @@ from gridpeers.cli.commands.options import (
     opened,
 )
 from gridpeers.cli.usage import ScenarioName, chosen, load
-from gridpeers.scenarios.drivers.secured import secured
 from gridpeers.scenarios.live.live_files import LinkLog, check_new, folders, live_record
 from gridpeers.scenarios.live.live_options import (
     LiveOptions,
@@ -43,6 +42,7 @@ from gridpeers.scenarios.record.record_info import LIVE
 from gridpeers.scenarios.results.file_sizes import HOUR, file_sizes, require_room
 from gridpeers.scenarios.results.metrics_file import RunMetrics
 from gridpeers.scenarios.results.recorded_events import ended_by_a_law, first_of, law_failures
+from gridpeers.scenarios.schema.configs import secured
 from gridpeers.scenarios.schema.plugin_keys import judges_laws
 from gridpeers.wire.driver.command_line import command_line
 from gridpeers.wire.driver.ending import watch_readers

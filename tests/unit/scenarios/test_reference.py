@@ -36,7 +36,7 @@ TABLES: tuple[type[msgspec.Struct], ...] = (
 @pytest.mark.parametrize("cls", [*TABLES, *typing.get_args(messages.AnyMessage), messages.PlantEvent])
 def test_every_field_has_its_sentence(cls: type[msgspec.Struct]) -> None:
     """A field without one, in its annotation or below it, would have an empty line in the reference."""
-    below = {doc.name: doc.text for doc in field_docs(cls)}
+    below = {name: text for name, (_, text) in field_docs(cls).items()}
 
     assert [field.name for field in fields_of(cls) if not (field.help or below[field.name])] == []
 
@@ -44,7 +44,7 @@ def test_every_field_has_its_sentence(cls: type[msgspec.Struct]) -> None:
 @pytest.mark.parametrize("cls", [Gains, DegradedCommunication, Protection, GfmParameters, GflParameters, SyncCheck])
 def test_the_unit_in_a_key_is_the_one_in_its_sentence(cls: type[msgspec.Struct]) -> None:
     """T_p_s is in seconds, and its docstring says so; what is in s, pu or Hz carries it in the key."""
-    below = {doc.name: doc.text for doc in field_docs(cls)}
+    below = {name: text for name, (_, text) in field_docs(cls).items()}
     units = {field.name: re.search(r"\((s|pu|Hz)\)", field.help or below[field.name]) for field in fields_of(cls)}
 
     for field in fields_of(cls):
