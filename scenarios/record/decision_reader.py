@@ -37,7 +37,7 @@ class DecisionReader:
         self.entries = DecisionEntries(index)
         self._listens = lru_cache(maxsize=None)(self._all_in_neighbours)
         self._hearing = lru_cache(maxsize=None)(self._heard_from)
-        self._true_state = lru_cache(maxsize=20_000)(self._state_of_process)
+        self._true_state = lru_cache(maxsize=20_000)(index.state)
 
     def decisions(self, agent: str, since: float, until: float) -> Iterator[RecordedDecision]:
         config = self._info.agent(agent)
@@ -124,15 +124,13 @@ class DecisionReader:
         lies = lies_about(netem, sender, agent)
         return HeardFrom(netem.seed, sender, agent, lies) if lies else None
 
-    def _state_of_process(self, sender: str, epoch: int, number: int, t: float) -> State | None:
-        return None if number < 0 else self._index.state(sender, number, t, epoch, _REACH)
-
     def _last_state_before(self, latest: State, t: float) -> State:
         """Return the last state that the process of a state sent up to a run time (s), or its first one."""
         T_c, number = self._info.T_c, latest.seq
 
         def state(n: int) -> State | None:
-            return self._true_state(latest.sender, latest.epoch, n, max(0.0, latest.t - (number - n) * T_c))
+            at = max(0.0, latest.t - (number - n) * T_c)
+            return None if n < 0 else self._true_state(latest.sender, n, at, latest.epoch, _REACH)
 
         n = max(0, min(number, number - round((latest.t - t) / T_c)))
         while n < number and (later := state(n + 1)) is not None and later.t <= t + INSTANT:
@@ -199,11 +197,10 @@ class DecisionReader:
     def heard(self, receiver: str, since: float, until: float) -> Iterator[MessageOnWire]:
         if self._info.clock == "wall":
             return self._heard_in_real_time(receiver, since, until)
-        return self._heard_by_plant(since, until) if receiver == PLANT else self._heard_in_ticks(receiver, since, until)
-
-    def _heard_by_plant(self, since: float, until: float) -> Iterator[MessageOnWire]:
-        for message in self._index.messages(None, since, until, "State"):
-            yield on_wire(message.key, message.payload, None, receiver=PLANT, message=message.message)
+        if receiver != PLANT:
+            return self._heard_in_ticks(receiver, since, until)
+        states = self._index.messages(None, since, until, "State")
+        return (dataclasses.replace(each, receiver=PLANT) for each in states)
 
     def _heard_in_ticks(self, receiver: str, since: float, until: float) -> Iterator[MessageOnWire]:
         last: dict[str, int | None] = {}

@@ -11,7 +11,7 @@ from math import inf
 from typing import TypeVar
 
 from gridpeers.scenarios.record.journal_reader import entries_of, message_of, values_of
-from gridpeers.scenarios.record.record_file import RecordFile, RecordMessage
+from gridpeers.scenarios.record.record_file import RecordFile
 from gridpeers.scenarios.record.record_info import Topic
 from gridpeers.wire.codec import encode, sound
 from gridpeers.wire.journal import (
@@ -108,15 +108,13 @@ class MessageIndex:
         """Yield the messages of a topic that can be read, of some parts or of all."""
         for index in range(self.parts) if parts is None else parts:
             for record in self.file.part(index):
-                message = self._message(record) if record.topic == topic else None
-                if isinstance(message, kind):
+                if record.topic != topic:
+                    continue
+                message = sound(record.data)
+                if message is None:
+                    self.note_damage(f"a message of {topic} at t = {record.t / 1e9:.2f} s cannot be read")
+                elif isinstance(message, kind):
                     yield message
-
-    def _message(self, record: RecordMessage) -> AnyMessage | None:
-        message = sound(record.data)
-        if message is None:
-            self.note_damage(f"a message of {record.topic} at t = {record.t / 1e9:.2f} s cannot be read")
-        return message
 
     # ---------------------------------------------------------------- journals
 

@@ -127,7 +127,6 @@ _EVENTS = {
 
 @lru_cache(maxsize=4)
 def channels(inverters: tuple[str, ...], quantities: tuple[str, ...]) -> tuple[RecordChannel, ...]:
-    """Return the channels of a record."""
     numbers = {"type": "object", "properties": {name: {"type": ["number", "null"]} for name in quantities}}
     physics = {
         "type": "object",

@@ -16,7 +16,7 @@ from typing import TypeVar, get_args
 
 from gridpeers.netem.ledger import LinkCounts, LinkTrace
 from gridpeers.scenarios.emulation.link_data import LinkReportData, data_of
-from gridpeers.scenarios.record.decision_entries import DecisionEntries, Hole
+from gridpeers.scenarios.record.decision_entries import Hole
 from gridpeers.scenarios.record.decision_reader import DecisionReader
 from gridpeers.scenarios.record.message_index import MessageIndex, MessageOnWire
 from gridpeers.scenarios.record.record_file import RecordFile, RecordFileError, record_path
@@ -40,18 +40,11 @@ class RunRecord:
     def __init__(self, file: RecordFile) -> None:
         self._file = file
         self.path, self.info = file.path, file.info
-        self._index = MessageIndex(file)
-        self._decisions = DecisionReader(self._index)
-
-    @property
-    def index(self) -> MessageIndex:
+        self.index = MessageIndex(file)
         """What is in each part of the file, for readers that go through it by parts."""
-        return self._index
-
-    @property
-    def entries_of_decisions(self) -> DecisionEntries:
+        self._decisions = DecisionReader(self.index)
+        self.entries_of_decisions = self._decisions.entries
         """How agents decided, and where the record lacks it, for readers that look at all agents."""
-        return self._decisions.entries
 
     @classmethod
     def open(cls, path: str | Path, case: str = "") -> RunRecord:
@@ -68,12 +61,12 @@ class RunRecord:
 
     def refresh(self) -> bool:
         """Take in what was written since, of a run that is still recorded; return whether that is anything."""
-        return self._index.refresh()
+        return self.index.refresh()
 
     @property
     def damage(self) -> tuple[str, ...]:
         """Sentences on parts of the file that could not be read so far, and on its end if it is cut off."""
-        return tuple(dict.fromkeys((*self._file.damage, *self._index.damage)))
+        return tuple(dict.fromkeys((*self._file.damage, *self.index.damage)))
 
     @property
     def t_end(self) -> float:
@@ -97,7 +90,7 @@ class RunRecord:
         Messages have the rows of a while: those between two run times (s) come with others around them.
         """
         _check_times(since=since, until=until)
-        return self._index.of_type("telemetry", Telemetry, self._index.near(since, until))
+        return self.index.of_type("telemetry", Telemetry, self.index.near(since, until))
 
     def physics(self) -> History:
         """Return the rows of the plant as in history.csv, to the last bit; RecordFileError if there are none."""
@@ -121,7 +114,7 @@ class RunRecord:
         _check_times(since=since, until=until)
         if kind is not None and kind not in KINDS:
             raise RecordFileError(f"kind: no message is a {kind!r:.60}; {suggestion(str(kind), KINDS, 'types')}")
-        return self._index.messages(sender, since, until, kind)
+        return self.index.messages(sender, since, until, kind)
 
     def heard(self, agent: str, *, since: float = 0.0, until: float = inf) -> Iterator[MessageOnWire]:
         """Yield messages as an agent, or the plant, heard them, in the order of their arrival.
@@ -139,7 +132,7 @@ class RunRecord:
         An entry has no run time of its own: `since` and `until` (s) choose the parts of the journal, of 0.2 s or so.
         """
         _check_times(since=since, until=until)
-        return self._index.entries(node, since, until)
+        return self.index.entries(node, since, until)
 
     def links(self) -> Iterator[LinkTrace]:
         """Yield the verdicts of the emulated links, as in links.csv: in parts of one link, as they were reported."""
@@ -151,15 +144,15 @@ class RunRecord:
         return {(src, receiver): of for receiver, data in self._link_reports() for src, of in data.counts.items()}
 
     def _link_reports(self) -> Iterator[tuple[str, LinkReportData]]:
-        for report in self._index.of_type("link_reports", LinkReport):
+        for report in self.index.of_type("link_reports", LinkReport):
             try:
                 yield report.sender, data_of(report)
             except ValueError:  # the report of a later version, or a damaged one
-                self._index.note_damage(f"a report on the links into {report.sender} cannot be read")
+                self.index.note_damage(f"a report on the links into {report.sender} cannot be read")
 
     def link_requests(self) -> Iterator[LinkRequest]:
         """Yield the commands to emulated links, in their order."""
-        return self._index.of_type("link_requests", LinkRequest)
+        return self.index.of_type("link_requests", LinkRequest)
 
     def decisions(self, agent: str, *, since: float = 0.0, until: float = inf) -> Iterator[RecordedDecision]:
         """Yield the decisions of an agent between two run times (s), the limits included, in the order of time."""
@@ -172,7 +165,7 @@ class RunRecord:
     def holes(self, agent: str) -> list[Hole]:
         """Return the run times (s) between which it is not known how an agent decided: the file is damaged there."""
         self._require(agent)
-        return list(self._decisions.entries.holes(agent))
+        return list(self.entries_of_decisions.holes(agent))
 
     def decision(self, agent: str, t: float) -> RecordedDecision:
         """Return the decision of an agent that was in force at a run time (s): its last one up to then.
@@ -188,7 +181,7 @@ class RunRecord:
         while found is None and back < 4.0 * (t + 1.0):
             found = _last(self.decisions(agent, since=max(0.0, t - back), until=t + 1e-9))
             back *= 4.0
-        if self._decisions.entries.lost_at(agent, t, None if found is None else found.t):
+        if self.entries_of_decisions.lost_at(agent, t, None if found is None else found.t):
             why = self.damage[0] if self.damage else "parts of journals never came into it"
             raise RecordFileError(f"{self.path}: it lacks how {agent} decided at t = {t:g} s: {why}")
         if found is None:

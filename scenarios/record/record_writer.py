@@ -282,10 +282,8 @@ class Recording:
             self._t = message.t
         at = nanoseconds(self._t if isinstance(message, LinkReport) else message.t)
         self._writer.add(TOPICS[type(message)], at, message.seq, payload_of(message))
-        if isinstance(message, Telemetry):
-            self._show(message)
-
-    def _show(self, message: Telemetry) -> None:
+        if not isinstance(message, Telemetry):
+            return
         for row in message.rows:
             if row[0] >= self._next:
                 at = nanoseconds(row[0])
