@@ -25,7 +25,6 @@ from typing import Any
 from gridpeers.wire.plugins.plugin import KEYS, Plugin, callable_objection, plugin_of, table_of
 from gridpeers.wire.plugins.registry import Registry
 
-CHOICE_KEYS = (*KEYS, "name", "off")  # Keys of an entry of `checks` that are no limits of the check
 RETURNS = "returns"  # Judges a run whose scenario asks for it: many end before an inverter that trips may return
 
 LAW_FAILED = "law_failed"
@@ -40,7 +39,7 @@ ALWAYS = (
 CHECKS: Registry[Any] = Registry(
     "check",
     "checks",
-    lambda it: callable_objection(it, "case", CHOICE_KEYS),
+    lambda it: callable_objection(it, "case", (*KEYS, "name", "off")),
     own={
         name: f"gridpeers.scenarios.checks.{place}"
         for name, place in {

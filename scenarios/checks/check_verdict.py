@@ -25,8 +25,6 @@ MOST_VIOLATIONS = 1_000_000
 INTERRUPTED = "interrupted"
 """Reason of a check that was not judged because somebody ended the run while it, or one before it, judged."""
 
-SWITCHED_OFF = "switched off by the scenario"
-
 
 class NotJudgedError(Exception):
     """A check cannot judge this run; the text is the reason, such as what the record lacks."""
@@ -98,10 +96,10 @@ def summary(verdicts: tuple[CheckVerdict, ...]) -> str:
 
 
 FILE = "checks.json"  # Name of the file in the run folder
-Verdicts = Mapping[str, tuple[CheckVerdict, ...]]  # Verdicts of a run by case, in the order of the checks
 
 
-def verdicts_json(verdicts: Verdicts) -> str:
+def verdicts_json(verdicts: Mapping[str, tuple[CheckVerdict, ...]]) -> str:
+    """Return checks.json: the verdicts of a run by case, in the order of the checks."""
     return msgspec.json.format(msgspec.json.encode(verdicts), indent=1).decode() + "\n"
 
 

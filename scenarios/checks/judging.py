@@ -17,7 +17,6 @@ from gridpeers.scenarios.checks.check_verdict import (
     INTERRUPTED,
     MOST_VIOLATIONS,
     SHOWN_VIOLATIONS,
-    SWITCHED_OFF,
     CheckVerdict,
     NotJudgedError,
     Violation,
@@ -47,8 +46,9 @@ class JudgingStop:
 
 def judge_case(case: CheckedCase, stop: JudgingStop | None = None) -> tuple[CheckVerdict, ...]:
     """Return the verdict of each check of the scenario on a case; those that it switches off come last."""
-    off = (CheckVerdict(check=name, status="off", reason=SWITCHED_OFF) for name in switched_off(case.scenario.checks))
-    return *judge_by(chosen_checks(case.scenario.checks), case, stop), *off
+    entries, why = case.scenario.checks, "switched off by the scenario"
+    off = (CheckVerdict(check=name, status="off", reason=why) for name in switched_off(entries))
+    return *judge_by(chosen_checks(entries), case, stop), *off
 
 
 def judge_by(

@@ -185,7 +185,8 @@ class Oscillation(Check):
             i = _swings_most(x[tail], which, limit)
             if i is None:
                 continue
-            for mode in (_dominant(y, dt) for y, dt in _looks(x[tail, i], step)):
+            for y, dt in _looks(x[tail, i], step):
+                mode = next((one for one in modes(y, dt) if one.f * len(y) * dt >= 1.0), None)  # it has a whole period
                 if mode and mode.damping < self.damping_percent / 100.0 and mode.swing > limit:
                     yield Violation(
                         text=f"{name} swings by {mode.swing:.2g} {unit} at {mode.f:.2g} Hz, damping",
@@ -214,8 +215,3 @@ def _looks(x: Floats, step: float) -> Iterator[tuple[Floats, float]]:
         cut = x[len(x) % blocks :]
         yield cut.reshape(-1, blocks).mean(axis=1), blocks * step
     yield x[-_SAMPLES:], step
-
-
-def _dominant(x: Floats, dt: float) -> Mode | None:
-    """Return the mode that swings most at the end, among those that had a period to show."""
-    return next((mode for mode in modes(x, dt) if mode.f * len(x) * dt >= 1.0), None)
