@@ -11,7 +11,7 @@ from gridpeers.plant.equipment import F_NOM, Feeder
 from gridpeers.scenarios.results.claims import Published
 from gridpeers.scenarios.results.history import CaseRecord, Nameplates, read_only
 from gridpeers.scenarios.results.island_membership import island_intervals, islands_at_end, part_of
-from gridpeers.scenarios.results.metric import Measured, label, make_metrics, measured
+from gridpeers.scenarios.results.metric import Measured, label, measured, metric_of
 from gridpeers.scenarios.results.metrics import Settling, Steady, measure
 from gridpeers.scenarios.results.window_metrics import WindowData
 from gridpeers.scenarios.schema import ScenarioModel
@@ -99,7 +99,7 @@ def find(scenario: ScenarioModel, feeder: Feeder, cases: Mapping[str, CaseRecord
     islands: dict[str, dict[str, dict[str, Steady]]] = {}
     available: dict[str, dict[str, float]] = {}
     own: dict[str, dict[str, Measured]] = {}
-    metrics = make_metrics(metrics_of(scenario))
+    metrics = [(name, metric_of(plugin)) for name, plugin in metrics_of(scenario)]
     for case, record in cases.items():
         everybody = Nameplates.of_columns(record.history.inverters, feeder)
         nameplates = read_only(everybody.without(without_agent(scenario, case)))

@@ -6,6 +6,7 @@ import json
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import nullcontext
+from itertools import chain
 from pathlib import Path
 
 import msgspec
@@ -91,18 +92,13 @@ class LinkRecord:
         """Write links.csv and links.json, and return the lines for the report; nothing if no message was sent."""
         if not self.sent:
             return []
-        write_whole(folder / "links.csv", self._csv())
+        parts = chain([[COLUMNS]], map(_rows, self.traces()))
+        write_whole(folder / "links.csv", map(csv_text, parts))  # part by part: an hour has hundreds of megabytes
         write_whole(folder / "links.json", self._json())
         if self._file is not None:
             self._file.unlink(missing_ok=True)
             self._file = None
         return list(self._lines())
-
-    def _csv(self) -> Iterator[str]:
-        """Yield the text of links.csv: a run of an hour has hundreds of megabytes."""
-        yield csv_text([COLUMNS])
-        for trace in self.traces():
-            yield csv_text(_rows(trace))
 
     def _json(self) -> str:
         counts = [{"src": src, "dst": dst, **msgspec.to_builtins(of)} for (src, dst), of in sorted(self.counts.items())]

@@ -104,12 +104,8 @@ def measured(metrics: Sequence[tuple[str, Callable[[WindowData], Any]]], data: W
     return Measured(values=values, reasons={name: text for name, text in reasons.items() if text})
 
 
-def make_metrics(plugins: Sequence[tuple[str, Plugin]]) -> list[tuple[str, Callable[[WindowData], Any]]]:
-    """Return the functions of some metrics; one that cannot be made fails in every window."""
-    return [(name, _made(plugin)) for name, plugin in plugins]
-
-
-def _made(plugin: Plugin) -> Callable[[WindowData], Any]:
+def metric_of(plugin: Plugin) -> Callable[[WindowData], Any]:
+    """Return a metric; one that cannot be made fails in every window."""
     try:
         return made(METRICS, plugin)  # type: ignore[no-any-return]
     except ValueError as error:

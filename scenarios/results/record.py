@@ -67,11 +67,6 @@ def header(inverters: tuple[str, ...]) -> tuple[str, ...]:
     return ("t_s", *(f"{name}_{quantity}" for name in inverters for quantity in QUANTITIES))
 
 
-def csv_line(row: Row) -> bytes:
-    """Return a row of history.csv: of each number the shortest text that reads back to the same bits."""
-    return (",".join(map(repr, row)) + "\n").encode("ascii")
-
-
 class Recorder:
     """Record one case: call it with every message that the plant publishes for recorders, then `finish()`.
 
@@ -153,7 +148,7 @@ class Recorder:
             self.count += 1
             if self._file is None:
                 self.rows.append(row)
-            self._write(csv_line(row))
+            self._write((",".join(map(repr, row)) + "\n").encode("ascii"))  # `repr` reads back to the same bits
         self._events.extend(telemetry.events)
         self.quiet.extend(telemetry.quiet)
         self.reproducible = self.reproducible and telemetry.reproducible

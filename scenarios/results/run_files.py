@@ -45,7 +45,10 @@ def new_folder(out: Path | None, scenario: str, now: datetime) -> Path:
     if out is not None:
         return empty_folder(out, "--out", "running")
     folder = empty_folder(_made(RUNS / scenario, now), "--out", "running")
-    _point_latest(folder)
+    latest, new = folder.parent / "latest", folder.parent / f".latest-{os.getpid()}"
+    with contextlib.suppress(OSError):  # a file system without links goes without
+        new.symlink_to(folder.name)
+        new.replace(latest)
     return folder
 
 
@@ -176,14 +179,6 @@ def _made(parent: Path, now: datetime) -> Path:
             if not (isinstance(error, FileExistsError) and os.path.lexists(folder)):  # else what is in the way is above
                 raise FolderError(_unmade(folder, error.strerror, "--out")) from None
     raise AssertionError
-
-
-def _point_latest(folder: Path) -> None:
-    """Make `latest` a link to the folder; a file system without links goes without."""
-    latest, new = folder.parent / "latest", folder.parent / f".latest-{os.getpid()}"
-    with contextlib.suppress(OSError):
-        new.symlink_to(folder.name)
-        new.replace(latest)
 
 
 LOCK = ".lock"

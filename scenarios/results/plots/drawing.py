@@ -46,9 +46,6 @@ class Drawing:
     """Times with several islands, by case; only of cases that have any. Measures are those of the worst island then."""
     microgrid_of: Mapping[str, str] = field(default_factory=dict)
 
-    def nameplates_in(self, case: str) -> Nameplates:
-        return self.nameplates.without(self.without_agent.get(case, frozenset()))
-
     def most_islands(self, case: str) -> Islands:
         """Return the islands of a case when there are most of them; they have a figure of their own."""
         return max((interval.islands for interval in self.island_intervals[case]), key=len)

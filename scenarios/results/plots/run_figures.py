@@ -154,7 +154,8 @@ def measured(drawing: Drawing, case: str, name: str) -> Floats:
     """Return one of `MEASURES` of a case, row by row; of the worst island while there are several."""
     measure, intervals = MEASURES[name], drawing.island_intervals.get(case, ())
     nominal = drawing.f_nom if measure.nominal is None else measure.nominal
-    return worst(measure.of_row, nominal, intervals, drawing.histories[case], drawing.nameplates_in(case))
+    nameplates = drawing.nameplates.without(drawing.without_agent.get(case, frozenset()))
+    return worst(measure.of_row, nominal, intervals, drawing.histories[case], nameplates)
 
 
 def _case_curves(drawing: Drawing, values: Callable[[str, History], Floats]) -> list[Curve]:

@@ -21,11 +21,9 @@ from matplotlib.figure import Figure
 from gridpeers.scenarios.results.history import Floats
 from gridpeers.scenarios.results.plots.drawing import Drawing, Mark
 
-LineStyle = tuple[str, Any]
-
 Style = tuple[str, Any, float]  # Colour, dash pattern and line width (pt)
 
-STYLES: tuple[LineStyle, ...] = (
+STYLES: tuple[tuple[str, str], ...] = (
     ("#0072b2", "-"),
     ("#d55e00", "-"),
     ("#009e73", "--"),
@@ -33,7 +31,7 @@ STYLES: tuple[LineStyle, ...] = (
     ("#e69f00", "-"),
     ("#56b4e9", "--"),
 )
-"""Styles of cases, and of inverters, in turn."""
+"""Colours and dash patterns of cases, and of inverters, in turn."""
 
 BLACK, GREY = "#000000", "#444444"
 """Colours of lines and words."""

@@ -10,7 +10,7 @@ import pytest
 from gridpeers.scenarios.results.claims import CLAIMS, Claim, judged
 from gridpeers.scenarios.results.findings import Findings
 from gridpeers.scenarios.results.history import History, Nameplates, Window, read_only
-from gridpeers.scenarios.results.metric import METRICS, make_metrics, measured, name_of
+from gridpeers.scenarios.results.metric import METRICS, measured, metric_of, name_of
 from gridpeers.scenarios.results.window_metrics import WindowData
 from gridpeers.wire.plugins.plugin import Plugin, plugin_problems
 from gridpeers.wire.plugins.registry import PluginError
@@ -80,7 +80,7 @@ def test_gridpeers_own_metrics_are_entries_like_any_other() -> None:
     """Each has a sentence, and gives what metrics.json has."""
     data = window_data()
     plugins = [(name, Plugin(use=name)) for name in METRICS.names if ":" not in name and name in METRICS.names[:16]]
-    values = measured(make_metrics(plugins), data).values
+    values = measured([(name, metric_of(plugin)) for name, plugin in plugins], data).values
 
     assert all(METRICS.resolve(name).__doc__ for name, _ in plugins)
     assert values["MPSI"] == data.steady.MPSI
