@@ -175,11 +175,6 @@ class Simulation:
     def _hook(self, module: Any) -> None:
         start = self.core.clock()
 
-        def desired(flags: int) -> int:
-            # the power flow of the start is solved first; delta mode comes a second later
-            passed = self.core.clock() - start
-            return STAY if passed > 0 else 1
-
         def clock_update(address: int, t: float, h: int, mode: int) -> int:
             try:
                 self._steps.append([inverter.read() for inverter in self._inverters])
@@ -192,7 +187,9 @@ class Simulation:
                 self._go.acquire()
             return mode
 
-        self._callbacks = DESIRED(desired), CLOCK_UPDATE(clock_update)  # kept: the module has only pointers to them
+        # the power flow of the start is solved first; delta mode comes a second later
+        desired = DESIRED(lambda flags: STAY if self.core.clock() > start else 1)
+        self._callbacks = desired, CLOCK_UPDATE(clock_update)  # kept: the module has only pointers to them
         module.delta_desired, module.delta_clock_update = (
             ctypes.cast(callback, ctypes.c_void_p).value for callback in self._callbacks
         )

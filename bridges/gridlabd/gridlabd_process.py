@@ -52,7 +52,6 @@ def messages(printed: str) -> list[str]:
     return list(dict.fromkeys(found or following))
 
 
-DELTA_MODE = Path(__file__).with_name("delta_mode.py")
 SHOWN = 2  # so many of GridLAB-D's own errors are in an error of ours; the first ones are the cause, the others follow
 LONGEST = 600.0  # longest time (s) until a model is loaded and its first power flow solved
 KEPT_MEMORY = {"MALLOC_MMAP_THRESHOLD_": str(32 * 2**20), "MALLOC_TRIM_THRESHOLD_": str(2**30)}
@@ -70,7 +69,7 @@ class DeltaModeProcess:
     def __init__(self, deadline: float) -> None:
         self._deadline = deadline
         self._folder = TransientFolder("gridpeers-gridlabd-")  # GridLAB-D writes files of its own where it stands
-        command = [sys.executable, "-P", str(DELTA_MODE), str(os.getpid())]
+        command = [sys.executable, "-P", str(Path(__file__).with_name("delta_mode.py")), str(os.getpid())]
         self._process = RequestProcess(command, self._folder, KEPT_MEMORY)
 
     @property
@@ -114,9 +113,6 @@ class DeltaModeProcess:
         return f"; its own words: {'; '.join(first)}" if first else "; it has printed no error"
 
 
-POWER_FLOW = "gridpeers.bridges.gridlabd.gridlabd_power_flow"
-
-
 def solved_model(path: Path) -> dict[str, Any]:
     """Return what GridLAB-D's solver holds of a model (`gridlabd_power_flow`).
 
@@ -143,11 +139,12 @@ def solved_model(path: Path) -> dict[str, Any]:
 
 
 def _solved(path: Path, *options: str) -> tuple[dict[str, Any], str]:
+    module = "gridpeers.bridges.gridlabd.gridlabd_power_flow"
     with closing(TransientFolder("gridpeers-gridlabd-")) as folder:
         result = folder.path / "result.pickle"
         try:
             done = subprocess.run(
-                program(POWER_FLOW, str(path), str(result), str(os.getpid()), *options),
+                program(module, str(path), str(result), str(os.getpid()), *options),
                 cwd=path.parent,
                 env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"},
                 stdin=subprocess.DEVNULL,

@@ -148,10 +148,9 @@ def unrepresentable(feeder: Feeder) -> list[str]:
         at.setdefault(row.bus, []).append(row.name)
     for bus, there in at.items():
         if len(there) > 1:
-            text = (
+            problems.append(
                 f'bus "{bus}" has {", ".join(there)}; GridLAB-D takes one inverter a bus: give each a bus behind a line'
             )
-            problems.append(text)
     for kind, rows, prefix in (
         *(("bus", feeder.buses, "n"), ("line", feeder.lines, "l"), ("kind of line", feeder.line_configs, "c")),
         *(("switch", feeder.switches, "s"), ("transformer", feeder.transformers, "t")),

@@ -13,7 +13,6 @@ from gridpeers.bridges.helics.topics import Topic, Value
 from gridpeers.plant.request_process import ProcessEndedError, RequestProcess
 from gridpeers.wire.wording import damaged
 
-PROCESS = Path(__file__).with_name("federate_process.py")
 USER = "a HELICS federate"
 IMPORT = 60.0  # longest time (s) until the process has imported HELICS, on a machine that is busy
 FAREWELL = 3.0  # longest wait (s) for the process to leave the federation
@@ -33,7 +32,7 @@ class HelicsFederate:
         self._settings, self._deadline = settings, deadline
         self._when = BEFORE
         self._others = "nobody"  # names of the other federates
-        self._process = RequestProcess([sys.executable, str(PROCESS)])
+        self._process = RequestProcess([sys.executable, str(Path(__file__).with_name("federate_process.py"))])
         ready = self._take(IMPORT, f"its process did not start within {IMPORT:g} s")
         if "not_importable" in ready:
             self._process.close(FAREWELL)

@@ -115,8 +115,7 @@ class HelicsPlant(RecordedPlant):
     def _hold(self, name: str, *set_points: float) -> None:
         """Keep the set-points that an inverter was given as those that it follows."""
         keys = (topic.key for topic in topics(self._prefix, [name], HELD))
-        own = {key: value for key, value in zip(keys, set_points, strict=True) if key not in self._came}
-        self._values |= own
+        self._values |= {key: value for key, value in zip(keys, set_points, strict=True) if key not in self._came}
 
     def _hear(self, row: int) -> None:
         t = time_of(row, self._record)

@@ -26,7 +26,6 @@ from gridpeers.plant.request_process import ProcessEndedError, RequestProcess, T
 from gridpeers.plant.tables.read import FeederError
 from gridpeers.wire.wording import damaged, printable
 
-MISSING = "reading .dss files needs the OpenDSS engine; install it: pip install 'gridpeers[opendss]'"
 USER = "the import of .dss files"
 CIRCUIT, PLACE = "circuit.pickle", "place"
 """Files in the folder of the process: its answer, and what the engine is about to do."""
@@ -42,7 +41,8 @@ _processes: dict[int, tuple[RequestProcess, TransientFolder]] = {}
 def circuit_of(request: ImportRequest) -> DssCircuit:
     """Return the circuit of a script; FeederError if the engine refuses it, cannot be loaded, or crashes."""
     if importlib.util.find_spec("dss") is None:
-        raise FeederError("OpenDSS", (MISSING,))
+        missing = "reading .dss files needs the OpenDSS engine; install it: pip install 'gridpeers[opendss]'"
+        raise FeederError("OpenDSS", (missing,))
     name = Path(request.path).name
     with _lock:
         if os.getpid() not in _processes:
@@ -126,9 +126,8 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
             Path(CIRCUIT).write_bytes(pickle.dumps(circuit, pickle.HIGHEST_PROTOCOL))
         except OSError as error:
             Path(CIRCUIT).unlink()
-            return {
-                "problems": [f"{Path(request['path']).name}: {no_room('what the OpenDSS engine reads', str(error))}"]
-            }
+            problem = no_room("what the OpenDSS engine reads", str(error))
+            return {"problems": [f"{Path(request['path']).name}: {problem}"]}
     except FeederError as error:
         return {"problems": error.problems}
     except Exception:

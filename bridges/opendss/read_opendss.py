@@ -17,8 +17,6 @@ from gridpeers.bridges.opendss.dss_circuit import ImportRequest
 from gridpeers.bridges.opendss.dss_process import circuit_of
 from gridpeers.plant.equipment import Feeder
 
-UNGROUNDED = "ground a winding, or leave ppm_antifloat as it is"  # remedy where nothing determines a voltage to ground
-
 
 def read_opendss(
     path: str | Path, f_nom: float | None = None, *, leave_out: Sequence[str] = (), switches: Sequence[str] = ()
@@ -29,7 +27,7 @@ def read_opendss(
     """
     path = Path(path).absolute()
     circuit = circuit_of(ImportRequest(str(path), f_nom, list(leave_out), list(switches)))
-    feeder = checked(path, circuit.feeder, circuit.problems, UNGROUNDED)
+    feeder = checked(path, circuit.feeder, circuit.problems, "ground a winding, or leave ppm_antifloat as it is")
     if not circuit.left_out:
         try:
             worst, (bus, letter) = difference(feeder, circuit.V)
