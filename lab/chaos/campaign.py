@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, closing, suppress
 from dataclasses import dataclass, replace
@@ -18,7 +19,7 @@ from gridpeers.lab.chaos.chaos_run import (
     compared,
     run_schedule,
 )
-from gridpeers.lab.chaos.disturbed_scenario import ChaosBase, Schedule, base_of, counted_kinds
+from gridpeers.lab.chaos.disturbed_scenario import KINDS, ChaosBase, Schedule, base_of
 from gridpeers.lab.chaos.machine_error import MachineError
 from gridpeers.lab.chaos.schedules import BATCH, drawn, shrunk
 from gridpeers.plant.request_process import TransientFolder
@@ -69,7 +70,8 @@ class Summary:
     def lines(self) -> Iterator[str]:
         base, rows = self.campaign.base, self.rows.values()
         how = "in one process each" if self.campaign.driver == "inprocess" else "with processes"
-        drawn = counted_kinds(base.effective(row.schedule) for row in rows)
+        numbers = Counter(it.kind for row in rows for it in base.effective(row.schedule))
+        drawn = ", ".join(f"{kind} {numbers[kind]}" for kind in KINDS if numbers[kind]) or "none"
         head = f"{base.scenario.name}, case {base.case}: {len(rows)} of {self.campaign.runs} runs {how}"
         yield f"{head}, seed {self.campaign.seed}; disturbances: {drawn}"
         yield f"{'asked':18} {'judged':>7} {'violated':>9}  first"
@@ -87,10 +89,6 @@ class Summary:
             yield f"{name}, run {found.number}: {failure.simplest.violated.get(name, found.violated[name])}"
             yield from (f"    {line}" for line in base.lines(failure.simplest.schedule))
             yield f"    {again(failure.file)}"
-
-
-def undisturbed(campaign: Campaign) -> ChaosRow:
-    return run_schedule(campaign.base, (), seed_of(campaign.seed, 0))
 
 
 def run_campaign(campaign: Campaign, folder: ChaosFolder, stage: Stage) -> Summary:

@@ -161,14 +161,15 @@ def _refuse_unless_possible(scenario: str, spec: ScenarioModel, case: str | None
 
 def _try_undisturbed(console: Console, campaign: Campaign) -> None:
     from gridpeers.cli.progress import TRYING, explained
-    from gridpeers.lab.chaos.campaign import undisturbed
+    from gridpeers.lab.chaos.chaos_folder import seed_of
+    from gridpeers.lab.chaos.chaos_run import run_schedule
     from gridpeers.scenarios.checks.check_registry import ALWAYS
     from gridpeers.wire.wording import counted
 
     name = f"{campaign.base.scenario.name}, case {campaign.base.case}"
     typer.echo(f"{name}: first a run without disturbances ...")
     with explained(lambda: console.print(TRYING, soft_wrap=True)):
-        row = undisturbed(campaign)
+        row = run_schedule(campaign.base, (), seed_of(campaign.seed, 0))
     if row.violated:
         off = ", ".join(f'{{ use = "{check}", off = true }}' for check in row.violated if check in ALWAYS)
         entry = f": checks = [{off}] at its top" if off else ""

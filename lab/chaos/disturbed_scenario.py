@@ -7,7 +7,6 @@ disturbance has ended (docs/chaos.md).
 from __future__ import annotations
 
 import tomllib
-from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -61,13 +60,7 @@ _AFTER: Mapping[str, Mapping[str, Any]] = {
 RESTORED = frozenset({*_AFTER, "oscillation", RETURNS})
 """Checks of what control restores; the others hold whatever is done to a run."""
 
-TAIL_S = 2.0
-
-_ALWAYS: Mapping[str, Mapping[str, Any]] = {"heal": {"within_s": REJOINED_S}, "oscillation": {"tail_s": TAIL_S}}
-
-_LISTS = ("open", "close", "leave", "join")
-
-_TABLES = ("load", "P_max_kW")
+_ALWAYS: Mapping[str, Mapping[str, Any]] = {"heal": {"within_s": REJOINED_S}, "oscillation": {"tail_s": 2.0}}
 
 _LONGEST_NAME = 24
 
@@ -120,11 +113,6 @@ class Disturbance(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
 
 Schedule = tuple[Disturbance, ...]
 """Disturbances of one run, as they were drawn: not in the order of time."""
-
-
-def counted_kinds(schedules: Iterable[Schedule]) -> str:
-    numbers = Counter(disturbance.kind for schedule in schedules for disturbance in schedule)
-    return ", ".join(f"{kind} {numbers[kind]}" for kind in KINDS if numbers[kind]) or "none"
 
 
 def _pairs(entry: Mapping[str, Any]) -> str:
@@ -270,9 +258,9 @@ def merged_events(own: Iterable[Mapping[str, Any]], schedule: Schedule) -> list[
             found[t_s] = {"label": label, "t_s": t_s}
         event = found[t_s]
         for key, value in entry.items():
-            if key in _LISTS:
+            if key in ("open", "close", "leave", "join"):
                 event[key] = [*event.get(key, []), *value]
-            elif key in _TABLES:
+            elif key in ("load", "P_max_kW"):
                 event[key] = event.get(key, {}) | dict(value)
             elif key != "t_s":
                 event[key] = value

@@ -26,9 +26,7 @@ BATCH = 25
 many follow, and few are drawn again to shrink one."""
 
 TRIES = 150
-
-IDLE_PART = 5
-"""A fifth of these runs is kept for leaving out disturbances one by one, once hypothesis is done."""
+"""Most runs to shrink a schedule; a fifth is kept for leaving out disturbances one by one, once hypothesis is done."""
 
 MOST_DISTURBANCES = 10
 
@@ -44,8 +42,6 @@ BEGIN_S = 0.2
 _FAR = 7_203_117_000_000_061
 """A number that no program is likely to contain. hypothesis prefers integers that it finds in the source code of
 loaded modules, so a seed would draw other schedules after any change of any of them; near this one it finds none."""
-
-Pick = Callable[[int], int]
 
 
 class _FailsError(Exception):
@@ -83,7 +79,7 @@ def shrunk(base: ChaosBase, seed: int, number: int, fails: Callable[[Schedule], 
             if passed <= place:
                 return
             known[msgspec.json.encode(schedule)] = True
-        if known_to_fail(schedule, TRIES - TRIES // IDLE_PART):
+        if known_to_fail(schedule, TRIES - TRIES // 5):
             simplest = schedule
             raise _FailsError
 
@@ -136,7 +132,7 @@ def _disturbances(draw: st.DrawFn, base: ChaosBase) -> Disturbance:
 
 
 class _Draw:
-    def __init__(self, base: ChaosBase, pick: Pick) -> None:
+    def __init__(self, base: ChaosBase, pick: Callable[[int], int]) -> None:
         scenario, feeder = base.scenario, base.feeder
         self._base, self._pick = base, pick
         self._rows = {row.name: row for row in with_agent(scenario, feeder, base.case)}

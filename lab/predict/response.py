@@ -58,12 +58,10 @@ def response(inverters: InverterGroup, plant: PlantModel = "lagged") -> Response
     return _quasi_steady(inverters) if plant == "quasi-steady" else _lagged(inverters)
 
 
-def _follows(inverters: InverterGroup) -> Floats:
-    return np.array([1.0 if isinstance(it, GfmParameters) or it.frequency_watt else 0.0 for it in inverters.parameters])
-
-
 def _quasi_steady(inverters: InverterGroup) -> Response:
-    n, w, follows = inverters.n, inverters.weight, _follows(inverters)
+    n, w = inverters.n, inverters.weight
+    droops = [isinstance(it, GfmParameters) or it.frequency_watt for it in inverters.parameters]
+    follows = np.array(droops, float)
     stiffness = float(w @ follows)
     D, F = w / stiffness, -1.0 / stiffness
     return Response(

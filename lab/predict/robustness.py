@@ -23,8 +23,6 @@ from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 EXACT = 16
 """Most agents for which all pairs of sets are tried: 3^16 pairs, by a recursion over 2^16 sets."""
 
-_BELOW = 1e-9
-
 
 class Robustness(NamedTuple):
     least: int
@@ -57,7 +55,7 @@ def robustness(A: Floats, exact: int = EXACT) -> Robustness:
     if (links != links.T).any():
         return Robustness(0, most)
     L = np.diag(links.sum(axis=1)) - links.astype(float)
-    least = ceil(float(np.linalg.eigvalsh(L)[1]) / 2.0 - _BELOW)
+    least = ceil(float(np.linalg.eigvalsh(L)[1]) / 2.0 - 1e-9)  # less what may be rounding
     return Robustness(min(max(least, 0), most), most)
 
 

@@ -25,9 +25,6 @@ from gridpeers.wire.messages import PLANT
 CUTS = ("cut", "partition", "flap")
 """Fates that are drawn as a slice too: nothing passes for a time."""
 
-_NANO = 1e9
-_SEQUENCE = 1
-
 
 class PerfettoTrace:
     def __init__(self) -> None:
@@ -82,7 +79,7 @@ class PerfettoTrace:
         write_whole(path, b"".join(parts))
 
     def _packet(self, t: float, order: int) -> Any:
-        packet = self._protos.TracePacket(timestamp=round(t * _NANO), trusted_packet_sequence_id=_SEQUENCE)
+        packet = self._protos.TracePacket(timestamp=round(t * 1e9), trusted_packet_sequence_id=1)  # in ns
         self._packets.append((packet.timestamp, order, packet))
         return packet
 
