@@ -59,14 +59,14 @@ class MessageAccount(Check):
                     text = f"states of {link[0]} neither heard nor lost"
                     yield Violation(text=text, t=missing.first, agent=agent, value=missing.count, limit=0)
         if not (found.counts or links):
-            has_arrivals = found.simulated or found.info.level == "all"
+            has_arrivals = found.info.simulated or found.info.level == "all"
             raise NotJudgedError("no agent listens to another" if has_arrivals else _NO_ARRIVALS)
-        if links and not (found.counts or found.simulated):
+        if links and not (found.counts or found.info.simulated):
             require_longer(found.t_end, "in_flight_s", self.in_flight_s)
 
     def _without_account(self, found: CommunicationSummary) -> dict[Link, Missing]:
         """Return the missing states of each link whose receiver keeps no account of it."""
-        if found.simulated:
+        if found.info.simulated:
             return {link: missing for link, missing in found.unheard.items() if link not in found.counts}
         links: dict[Link, Missing] = {}
         for link in sorted(found.arrivals) if found.info.level == "all" else ():
@@ -144,7 +144,8 @@ class StaleValues(Check):
         }
         place = {name: i for i, name in enumerate(found.info.agent_names)}
         order = sorted(beyond, key=lambda link: (-beyond[link].age, place[link[1]], place.get(link[0], 0)))
-        for (neighbour, agent), use in ((link, beyond[link]) for link in order):
+        for neighbour, agent in order:
+            use = beyond[neighbour, agent]
             yield Violation(
                 text=f"age of the value of {neighbour} that was used",
                 t=max(use.t, self.since_s),
@@ -170,11 +171,8 @@ class LastWords(Check):
             raise NotJudgedError("the record has no states of agents")
         joining = {name for event in case.scenario.events for name in event.join}
         setup = planned_faults(found.info)
-        ended = (
-            [(node.name, node.from_s, self.silent_s + 2.0 * case.T_c) for node in setup.netem.nodes if node.kill]
-            if setup
-            else []
-        )
+        nodes = setup.netem.nodes if setup else ()
+        ended = [(node.name, node.from_s, self.silent_s + 2.0 * case.T_c) for node in nodes if node.kill]
         ended += [
             (event.subject, event.t, self.silent_s)
             for event in case.events

@@ -71,10 +71,6 @@ class CommunicationSummary:
     """The oldest value that was used of each link, then the oldest of what was used later, and so on: ages fall."""
     heals: list[Heal]
 
-    @property
-    def simulated(self) -> bool:
-        return self.info.simulated
-
 
 def summarise(path: Path) -> CommunicationSummary:
     """Go through the file of a record once, twice if parts of it are lost; NotJudgedError if it has no decisions."""

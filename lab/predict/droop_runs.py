@@ -155,11 +155,8 @@ def var_delay_limit(inverters: InverterGroup, plant: VarResponse, *, longest_s: 
 
 def _factors(inverters: InverterGroup) -> tuple[Floats, Floats]:
     """Return the factors of z - z_bar and of v - 1 of each inverter, by the law itself, alpha in full."""
-    gains, T, each = (
-        inverters.gains,
-        inverters.T_c,
-        zip(inverters.GFM, inverters.leads, inverters.degree.tolist(), strict=True),
-    )
+    gains, T = inverters.gains, inverters.T_c
+    each = zip(inverters.GFM, inverters.leads, inverters.degree.tolist(), strict=True)
     weights = [(gains.alpha * leads, gains.beta_GFM if GFM else gains.beta_GFL, d) for GFM, leads, d in each]
     a, b = np.array([V_factors(alpha, beta, d, k_q=gains.k_q, T=T) for alpha, beta, d in weights]).T
     return a, b

@@ -175,6 +175,7 @@ class Prediction:
         inverters, found = self._inverters, modes(self._inverters)
         loop, T_c = Loop(inverters=inverters), inverters.T_c
         slowest = settling_in_ticks(loop.spectral_radius, T_c) if loop.stable else math.inf
+        settled = _s(settling(found.slowest_rate), "never")
         limits = [(_s(one, "any"), _limit(other)) for one, other in self.delay_limits.itertuples(index=False)]
         r = robustness(inverters.A[np.ix_(inverters.acts, inverters.acts)])
         return [
@@ -185,12 +186,7 @@ class Prediction:
             ("frequency mode", f"{found.frequency_rate:.2f} 1/s", "", "kappa n_L/N: rate if sharing were at once"),
             ("sharing mode", _rate(found.sharing_rate), "", "kappa lambda_2: rate at which powers agree"),
             ("slowest mode", _rate(found.slowest_rate), _rate(SETTLING / slowest), "exact, of law and plant together"),
-            (
-                "2 % settling",
-                _s(settling(found.slowest_rate), "never"),
-                _s(slowest, "never"),
-                "four time constants of it",
-            ),
+            ("2 % settling", settled, _s(slowest, "never"), "four time constants of it"),
             ("sharing 2 %", _s(settling(found.sharing_rate), "never"), "", "the same of the sharing mode"),
             ("largest step", _s(found.euler_step_s, "any"), "any", "longest T_c; continuous: as explicit Euler"),
             ("delay: links", *limits[0], "agent to agent, own value fresh"),
