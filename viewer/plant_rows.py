@@ -5,7 +5,6 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Mapping
 from functools import lru_cache
-from typing import NamedTuple
 
 from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.scenarios.record.record_reader import RunRecord
@@ -18,12 +17,6 @@ LENGTHS = (LENGTH / 4.0, LENGTH / 2.0, LENGTH)
 
 KEPT = 400
 """Parts whose points are kept: two strips of a run in real time."""
-
-
-class _Rows(NamedTuple):
-    inverters: tuple[str, ...]
-    times: list[float]
-    rows: list[tuple[float, ...]]
 
 
 class PlantRows:
@@ -41,8 +34,8 @@ class PlantRows:
         """Return the inverters and the last row up to a run time (s); None if there is none shortly before."""
         found = None
         for part in self._index.near(t - max(1.0, self.longest_gap), t):
-            inverters, times, rows = self._rows_in(part)
-            at = bisect_right(times, t + 1e-9) - 1
+            inverters, rows = self._rows_in(part)
+            at = bisect_right(rows, t + 1e-9, key=lambda row: row[0]) - 1
             if at >= 0 and (found is None or rows[at][0] > found[1][0]):
                 found = inverters, rows[at]
         return found
@@ -62,17 +55,17 @@ class PlantRows:
             points.append(point_of(*last, self._configs))
         return points
 
-    def _read_rows(self, part: int) -> _Rows:
+    def _read_rows(self, part: int) -> tuple[tuple[str, ...], list[tuple[float, ...]]]:
         inverters: tuple[str, ...] = ()
         rows: list[tuple[float, ...]] = []
         for message in self._index.of_type("telemetry", Telemetry, (part,)):
             inverters = message.inverters
             rows += message.rows
         rows.sort(key=lambda row: row[0])
-        return _Rows(inverters, [row[0] for row in rows], rows)
+        return inverters, rows
 
     def _read_points(self, part: int, length: float) -> list[Point]:
-        inverters, _, rows = self._rows_in(part)
+        inverters, rows = self._rows_in(part)
         points: list[Point] = []
         due = 0.0
         for row in rows:
