@@ -140,27 +140,23 @@ class Channel:
             self._before_hold = None
         models = {kind: span.model for kind, span in active.items()}
         self._rate, self._slots = models.get("rate"), models.get("slots")
-        self._lost, self._delay = self._sampler(active, "loss"), self._sampler(active, "delay")
-        self._copied, self._bit = self._sampler(active, "duplicate"), self._sampler(active, "corrupt")
-        names = sorted(kind for kind, span in active.items() if isinstance(span.model, Plugin))
-        self._own = [self._own_judge(active[name]) for name in names]
+        own = sorted(kind for kind, span in active.items() if isinstance(span.model, Plugin))
+        drawn = ("loss", "delay", "duplicate", "corrupt", *own)
+        samplers = {kind: self._sampler(active[kind]) for kind in drawn if kind in active}
+        self._lost, self._delay = samplers.get("loss"), samplers.get("delay")
+        self._copied, self._bit = samplers.get("duplicate"), samplers.get("corrupt")
+        self._own: list[Judge] = [samplers[name] for name in own]
         self._single = self._copied is None and self._bit is None
         self._fifo = "delay" in models and models["delay"].fifo
         self.checksum = "corrupt" in models and models["corrupt"].checksum
         self._extra_delay = models["duplicate"].extra_delay_s if "duplicate" in models else 0.0
 
-    def _sampler(self, active: dict[str, Span], kind: str) -> Callable[..., Any] | None:
-        """Return the sampler of a kind now; made once a span, so that chains go on from where they are."""
-        span = active.get(kind)
-        if span is None:
-            return None
-        if span not in self._samplers:
-            self._samplers[span] = span.model.sampler(Stream(self._seed, *self.link, kind))
-        return self._samplers[span]
-
-    def _own_judge(self, span: Span) -> Judge:
-        """Return the judge of a user-defined fault; one object a span, like the samplers."""
+    def _sampler(self, span: Span) -> Callable[..., Any]:
+        """Return the sampler or judge of a fault; made once a span, so that chains go on from where they are."""
         if span not in self._samplers:
             stream = Stream(self._seed, *self.link, span.kind)
-            self._samplers[span] = judge_of(span.model, *self.link, stream, self.failures.append)
+            if isinstance(span.model, Plugin):
+                self._samplers[span] = judge_of(span.model, *self.link, stream, self.failures.append)
+            else:
+                self._samplers[span] = span.model.sampler(stream)
         return self._samplers[span]

@@ -239,8 +239,8 @@ def _entry(span: Span) -> dict[str, Any]:
 
 def _cuts_joined(spans: Iterable[Span]) -> list[Span]:
     """Return the spans with cuts and partitions as one kind, so that no two entries of a link overlap."""
-    both = [span for span in spans if span.kind in ("cut", "partition")]
-    rest = [span for span in spans if span.kind not in ("cut", "partition")]
+    both = [span for span in spans if span.kind in CUTS]
+    rest = [span for span in spans if span.kind not in CUTS]
     # where a cut that keeps meets one that loses, messages are lost: the latter comes last, and so takes precedence
     both.sort(key=lambda span: not span.model.hold)
     joined = FaultSchedule(Span("cut", span.from_s, span.to_s, Cut(hold=span.model.hold)) for span in both).flat()

@@ -115,10 +115,7 @@ class LiveHearing:
         needed = self._heard.oldest_needed(state.t) - 2.0 * INSTANT
         while len(states) > 1 and states[1].t <= needed + INSTANT:
             states.popleft()
-        return self._heard.told(state, self._before)
-
-    def _before(self, t: float) -> State:
-        return last_before(self._states, t)
+        return self._heard.told(state, lambda t: last_before(states, t))
 
 
 def last_before(states: Iterable[State], t: float) -> State:

@@ -144,17 +144,15 @@ class Netem(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         found = []
         for j, node in enumerate(self.nodes):
             for i, before in enumerate(self.nodes[:j]):
-                if before.name == node.name and _overlap(before.from_s, before.to_s, node.from_s, node.to_s):
+                if not _overlap(before.from_s, before.to_s, node.from_s, node.to_s):
+                    continue
+                if before.name == node.name:
                     text = f"overlaps node[{i}], also of {node.name}; write one entry, or times that do not meet"
                     found.append(Problem(f"node[{j}]", text))
-                elif _in_one_name(before, node) and _overlap(before.from_s, before.to_s, node.from_s, node.to_s):
+                elif before.lies and node.lies and before.lies.in_name_of == node.lies.in_name_of != "":
                     text = f"node[{i}] lies in that name as well; write another name, or times that do not meet"
                     found.append(Problem(f"node[{j}].lies.in_name_of", text))
         return found
-
-
-def _in_one_name(one: NodeFault, other: NodeFault) -> bool:
-    return one.lies is not None and other.lies is not None and one.lies.in_name_of == other.lies.in_name_of != ""
 
 
 def _entry_of(path: str) -> str:

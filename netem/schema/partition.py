@@ -15,8 +15,6 @@ from gridpeers.wire.messages import PLANT
 from gridpeers.wire.schema.table_schema import Example, Problem, problems_of
 from gridpeers.wire.wording import suggestion
 
-_REST = "the rest"
-
 
 class Partition(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
     """Cuts, both ways, every link between two groups. Agents in no group form one more group.
@@ -51,9 +49,7 @@ class Partition(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         if self.by == "halves":
             order = list(microgrids)
             return "first" if name in order and 2 * order.index(name) < len(order) else "second"
-        if self.alone:
-            return "alone" if name == self.alone else _REST
-        return _REST
+        return "alone" if name == self.alone else "the rest"
 
     def spans(self, src: str, dst: str, microgrids: Mapping[str, str]) -> list[Span]:
         """Return the cut of one link, if it joins two groups."""
@@ -120,9 +116,8 @@ class Partition(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
                     text = f'"{name}" is in groups[{seen[name]}] already; nobody is on both sides'
                     found.append(Problem(f"groups[{i}]", text))
                 seen.setdefault(name, i)
-        if not found and self.by != "island" and not self._parts(names, microgrids):
-            found.append(Problem("", "parts nobody: all agents are in one group"))
+        if not found and self.by != "island":
+            parts = {self.group(name, microgrids) for name in (*names, PLANT)} - {None}
+            if len(parts) < 2:
+                found.append(Problem("", "parts nobody: all agents are in one group"))
         return found
-
-    def _parts(self, names: Sequence[str], microgrids: Mapping[str, str]) -> bool:
-        return len({self.group(name, microgrids) for name in (*names, PLANT)} - {None}) > 1

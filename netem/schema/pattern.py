@@ -55,12 +55,7 @@ class Pattern(NamedTuple):
 
 @lru_cache(maxsize=1024)
 def parse(text: str) -> Pattern:
-    """Read a pattern.
-
-    Raises
-    ------
-    ValueError
-        If it is none, with what one looks like.
+    """Read a pattern; ValueError says what one looks like if it is none.
 
     Examples
     --------
