@@ -1,7 +1,7 @@
 """The initial operating point of a run: an exact equilibrium of network and inverters (section 7).
 
-In an island without a source one GFM (its swing) first holds its terminal, and is then released; where all its GFM are
-single-phase, one on each phase.
+In an island without a source the first GFM with three phases (its swing) first holds its terminal, and is then
+released; where all its GFM are single-phase, the first on each phase.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 
 from gridpeers.plant.dynamics.circuit import PHASES, Circuit, PlantError, aligned_sum
 from gridpeers.plant.dynamics.inverters import Inverters
-from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Integers, Real
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Real
 from gridpeers.plant.dynamics.power_flow_at_rest import PowerFlow, solve_by_droop
 
 
@@ -43,7 +43,10 @@ def equilibrium(
     sourced = np.isin(island, label[circuit.sources])
     swing = np.zeros(n, bool)
     for k in np.unique(island[units.forming & online & ~sourced]):
-        swing[_swings(units, np.flatnonzero((island == k) & units.forming & online))] = True
+        forming = np.flatnonzero((island == k) & units.forming & online)
+        whole = forming[~units.single[forming]]
+        first_on_each_phase = np.unique(units.phase[forming], return_index=True)[1]
+        swing[whole[:1] if whole.size else forming[first_on_each_phase]] = True
 
     held = circuit
     if swing.any():
@@ -78,12 +81,6 @@ def equilibrium(
     I_out = J - flow.y[:, None] * V
     J = I_out + units.y_f[:, None] * V
     return OperatingPoint(J=J, V=V, I=I_out, V_branch=flow.V_b, on_droop=on_droop, on_edge=on_edge)
-
-
-def _swings(units: Inverters, forming: Integers) -> Integers:
-    """Return the swings among the GFM of an island: the first with three phases, else the first on each phase."""
-    whole = forming[~units.single[forming]]
-    return whole[:1] if whole.size else forming[np.unique(units.phase[forming], return_index=True)[1]]
 
 
 def set_equilibrium(units: Inverters, point: OperatingPoint, online: Flags, P: Real, V_set: Real | None) -> None:

@@ -102,7 +102,8 @@ class LiveNetwork:
         else:
             units.V[:] = V
             V_b = self._solve_islands(self.V_branch[branches])
-            units.V[:] = self.reduction.terminal_voltages(units.J, V_b, self.source_voltage)
+            of_nodes = self.reduction.node_voltages(units.J, V_b, self.source_voltage)
+            units.V[:] = self.circuit.turn * of_nodes[self.circuit.terminals]
         self._linearise(V_b)
         self.V_branch[branches] = V_b
 

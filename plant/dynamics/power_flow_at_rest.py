@@ -163,17 +163,12 @@ KRYLOV = {"fatol": 1e-12, "maxiter": 20, "jac_options": {"rdiff": 1e-6}}
 MOST_PLACE_ROUNDS = 100  # rounds in which inverters may change their place at dead bands; 2 to 4 on our feeder
 
 
-class DroopPowers(NamedTuple):
-    J: Complex  # Norton injections (A)
-    V: Complex  # terminal voltages (V)
-    Q: Real  # pu
-    on_droop: Flags  # inverters whose voltage is V_set - m_q q
-    on_edge: Flags  # inverters on the edge of a dead band
-
-
-def solve_by_droop(flow: PowerFlow, J: Complex, P: Real, Q: Real, V_set: Real, swing: Flags) -> DroopPowers:
+def solve_by_droop(
+    flow: PowerFlow, J: Complex, P: Real, Q: Real, V_set: Real, swing: Flags
+) -> tuple[Complex, Complex, Real, Flags, Flags]:
     """Find the Q (pu) that each characteristic gives at its terminal's voltage; J and Q are first guesses.
 
+    Return injections (A), terminal voltages (V), Q, and the flags `on_droop` and `on_edge` of `OperatingPoint`.
     `swing`: inverters that hold their voltage, whatever their droop. PlantError if there are none such Q.
     """
     units = flow.units
@@ -190,7 +185,7 @@ def solve_by_droop(flow: PowerFlow, J: Complex, P: Real, Q: Real, V_set: Real, s
             deviation = V_set - v
             on_droop = (place == DROOP) & (low * units.m_q <= deviation) & (deviation <= high * units.m_q)
             on_droop &= at_rest.beyond(v) == deviation
-            return DroopPowers(J, V, Q, on_droop | ~free, (place == UNDER) | (place == OVER))
+            return J, V, Q, on_droop | ~free, (place == UNDER) | (place == OVER)
         place = right
     raise PlantError(
         "no initial operating point: it is not found which GFL rest within their dead bands (db_UV_pu, db_OV_pu); "

@@ -217,9 +217,6 @@ class Reduction:
         constant = right - C @ (self.loads.currents(V_b) - A * V_b + A * from_sources)
         return np.asarray(splu(sp.csc_matrix(Y)).solve(constant))
 
-    def terminal_voltages(self, J: Complex, V_b: Complex, source_voltage: Complex) -> Complex:
-        return self.circuit.turn * self.node_voltages(J, V_b, source_voltage)[self.circuit.terminals]
-
     def all_voltages(self, J: Complex, I_b: Complex, source_voltage: Complex) -> Complex:
         V = np.zeros(self.circuit.Y.shape[0], complex)
         if self.unknown.size:

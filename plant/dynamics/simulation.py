@@ -133,15 +133,11 @@ class Dynamics:
                     units.gfl_state[name][follower] = w
                 units.gfl_state["f"][follower] = units.gfl_state["f_m"][follower] = units.f_nom + w / (2.0 * np.pi)
 
-    def deenergise(self, islands: Iterable[int], step: int = 0) -> None:
+    def _trip(self, islands: Iterable[int], step: int) -> None:
         """Disconnect all inverters of these islands; where there are none, the substation, which stays off.
 
         An island with the substation thus first loses only its inverters: the grid may be able to feed it without them.
         """
-        self._trip(islands, step)
-        self.connect(self.network.circuit, step)
-
-    def _trip(self, islands: Iterable[int], step: int) -> None:
         units, reduction, numbers = self.inverters, self.network.reduction, list(islands)
         lost = reduction.online & np.isin(reduction.inverter_island, numbers)
         bare = [k for k in numbers if not lost[reduction.inverter_island == k].any()]
@@ -222,7 +218,8 @@ class Dynamics:
             units = self.inverters  # go back to the start of the step that failed
             units.gfm_state[:], units.gfl_state[:], units.J[:] = self._gfm_0, self._gfl_0, self._J_0
             network.note()
-            self.deenergise(sorted(islands), step)
+            self._trip(sorted(islands), step)
+            self.connect(network.circuit, step)
             begin, renewed = 2 * step, -1
         network.refresh(status, 2 * steps - begin)
         network.note()

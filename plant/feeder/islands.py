@@ -10,7 +10,6 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from gridpeers.plant.dynamics import Dynamics, PlantError, Trip
-from gridpeers.plant.dynamics.kernel.compiled import Flags
 from gridpeers.plant.dynamics.reduction import Reduction
 from gridpeers.plant.equipment.imported_equipment import is_behind
 from gridpeers.plant.known_names import SUBSTATION
@@ -68,12 +67,14 @@ class Islands:
 
     def report_dead(self, t: float, closed: frozenset[str], reduction: Reduction) -> list[PlantEvent]:
         """Return the event at t (s) of newly de-energised buses, with their inverters and loads."""
-        before = set(self._dead)
-        self._dead = self._dead_buses(closed, reduction.live[reduction.label])
+        network, before = self._network, set(self._dead)
+        alive = reduction.live[reduction.label][network.merge(closed).representative]
+        fed = {bus for (bus, _), on in zip(network.nodes, alive.tolist(), strict=True) if on}
+        self._dead = [bus.name for bus in network.feeder.buses if bus.name not in fed]
         new = [bus for bus in self._dead if bus not in before]
         if not new:
             return []
-        network, dead = self._network, set(new)
+        dead = set(new)
         lost = sum(S.real for bus, _, S in network.feeder.demands() if bus in dead) / 1e3
         some = ", ".join(new[:6]) + (", ..." if len(new) > 6 else "")
         idle = [unit.name for unit in network.inverters if unit.bus in new]
@@ -81,11 +82,6 @@ class Islands:
         text = f"de-energised: {count} ({some}) without substation or GFM, {lost:.0f} kW of load not served"
         text += f", {', '.join(idle)} idle" if idle else ""
         return [PlantEvent(t=t, kind="dead", subject=new[0], text=text)]
-
-    def _dead_buses(self, closed: frozenset[str], live: Flags) -> list[str]:
-        alive = live[self._network.merge(closed).representative]
-        fed = {bus for (bus, _), on in zip(self._network.nodes, alive.tolist(), strict=True) if on}
-        return [bus.name for bus in self._network.feeder.buses if bus.name not in fed]
 
 
 TOUCHABLE = 50.0  # voltage to earth (V) that may last on what people touch (IEC 60364-4-41)

@@ -58,10 +58,6 @@ class Merge:
         self.representative = representative
         self.ratio = ratio
 
-    @property
-    def representatives(self) -> Integers:
-        return np.flatnonzero(self.representative == np.arange(len(self.representative))).astype(np.int64)
-
     def expand(self, V: Complex) -> Complex:
         return np.asarray(self.ratio * V[self.representative], dtype=np.complex128)
 

@@ -397,7 +397,10 @@ class RealtimePlant(PlantNode):
             self._note(name, text)
         self._reporter.collect()
         self._note_node_faults()
-        if self.tick % self._telemetry_ticks == 0 or self.tick == 1 or self._event_is_due(now):
+        due = self.tick % self._telemetry_ticks == 0 or self.tick == 1
+        if not due and self._reporter.has_events and now >= self._next_event_report:  # watchers see events at once
+            due, self._next_event_report = True, now + TELEMETRY
+        if due:
             self._report(final=False)
             self._report_journal()
         if self.tick % self._report_ticks == 0:
@@ -405,13 +408,6 @@ class RealtimePlant(PlantNode):
         return True
 
     # ---------------------------------------------------------------- events and telemetry
-
-    def _event_is_due(self, now: float) -> bool:
-        """Return whether events are to be reported before the next telemetry, so that watchers see them at once."""
-        if not self._reporter.has_events or now < self._next_event_report:
-            return False
-        self._next_event_report = now + TELEMETRY
-        return True
 
     @property
     def events(self) -> tuple[PlantEvent, ...]:

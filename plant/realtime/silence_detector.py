@@ -106,7 +106,8 @@ class SilenceDetector:
         news = [
             other
             for other, at in agent.unheard.items()
-            if at <= self._clock and other not in agent.reported and self._heard_since(other, recent)
+            if at <= self._clock and other not in agent.reported
+            if not self._agents[other].silent and self._agents[other].last >= recent
         ]
         agent.reported.update(news)
         if back:
@@ -116,7 +117,3 @@ class SilenceDetector:
                 name,
                 f"{name} does not hear {', '.join(news)}: no state for {self._max_age:g} s, though one came here",
             )
-
-    def _heard_since(self, name: str, time: float) -> bool:
-        other = self._agents[name]
-        return not other.silent and other.last >= time
