@@ -207,9 +207,10 @@ class IslandDetector:
         pair = self._pairs.setdefault(name, _Pair())
         if angle is None or (pair.since is not None and t <= pair.t):
             return
-        own = self._own_at(t)
-        if own is not None:
-            pair.compare((self._since, angle.since), t, own - angle.cycles)
+        before = next((own for own in reversed(self._own) if own[0] <= t), None)
+        if before is not None and t - before[0] <= T_GAP:
+            at, e, own = before
+            pair.compare((self._since, angle.since), t, own + e * (t - at) - angle.cycles)
 
     def apart(self, name: str, t: float) -> bool:
         """Return whether the agent takes a neighbour to be in another island at t (s of run time)."""
@@ -229,10 +230,3 @@ class IslandDetector:
 
     def restart(self) -> None:
         self._pairs.clear()
-
-    def _own_at(self, t: float) -> float | None:
-        """Return the own angle (cycles) at t (s), from the last measurement before; None if it is unknown."""
-        for at, e, angle in reversed(self._own):
-            if at <= t:
-                return angle + e * (t - at) if t - at <= T_GAP else None
-        return None

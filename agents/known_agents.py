@@ -29,13 +29,6 @@ class KnownAgents:
     def add(self, nameplate: Nameplate) -> None:
         self._own[nameplate.sender] = nameplate
 
-    def introduce(self, name: str, instance: str, nameplate: Nameplate) -> None:
-        self.members.appeared(name, instance)
-        self.members.meet(instance, nameplate)
-
-    def gone(self, name: str, instance: str) -> None:
-        self.members.vanished(name, instance)
-
     def processes(self, message: Prepare) -> dict[str, str]:
         """Return the process of each name on a roster, in the order of the inverters; for one message one object."""
         if message is not self._latest[0]:

@@ -372,8 +372,10 @@ class LockstepAgent(AgentNode):
             if measured is not grant:
                 measured = replace(measured, seq=grant.seq, t=grant.t)
             state = self._agent.tick(measured, neighbours)
-            if self.journal is not None:
-                self._note_decision(grant.seq, grant.seq - seq, neighbours)
+            noted = self.journal is not None and self._decisions.tick(grant.seq, grant.seq - seq, neighbours)
+            if noted and self._links is None:
+                # Entries are rare then, and none may wait: once the plant has the last state, the run is over.
+                self._publish_decisions()
         self._publish(self.keys.state(self._name), encode(state))
         reports = (grant.seq + 1) % REPORT_TICKS == 0
         if self._links is not None and (reports or now - self._journal_at >= JOURNAL_PERIOD):
@@ -382,14 +384,6 @@ class LockstepAgent(AgentNode):
         if reports:
             self._report_links()
         self._await_next(grant, now)
-
-    def _note_decision(self, tick: int, measurement: int, neighbours: tuple[str, ...]) -> None:
-        """Note a decision, before its state is sent.
-
-        Without emulated links entries are rare, and none may wait: once the plant has the last state, the run is over.
-        """
-        if self._decisions.tick(tick, measurement, neighbours) and self._links is None:
-            self._publish_decisions()
 
     def _publish_decisions(self) -> None:
         """Send the journal; with emulated links an empty one too, as it says up to when nothing has changed."""

@@ -194,7 +194,8 @@ class RealtimeAgent(AgentNode):
         due = now >= self._status.due
         if due:
             self._status.take(now)
-            self._ask_again()
+            for name, instance in self.members.next_unmet():
+                self._ask(name, instance)
         if due or (self.phase, self._used_neighbours) != before:
             self._publish_status(at)
 
@@ -257,10 +258,6 @@ class RealtimeAgent(AgentNode):
     def _met(self, nameplate: Nameplate, now: float) -> None:
         super()._met(nameplate, now)
         self._listen()
-
-    def _ask_again(self) -> None:
-        for name, instance in self.members.next_unmet():
-            self._ask(name, instance)
 
     def _listen(self) -> None:
         self._neighbours = self._agent.in_neighbours((self._name, *sorted(self.members.nameplates)))

@@ -36,14 +36,11 @@ class SessionHealth:
         self._plant_seen = -inf
         """Time (s) at which the plant was last known to be there, though it measures nothing yet."""
         self._patience = SessionDeadline()
-        self._begin()
-
-    def _begin(self) -> None:
         self._came: dict[str, float] = {}
 
     def next_session(self) -> None:
         self._patience = self._patience.next()
-        self._begin()
+        self._came.clear()
 
     def came(self, name: str, now: float) -> None:
         self._came[name] = now

@@ -39,17 +39,12 @@ class TickTimer:
 
     def take(self, now: float) -> int:
         skipped = self._timer.take(now)
-        if self._measured is not None and self._keeps_clear:
-            self._keep_clear(self._measured)
-            self._measured = None
-        return skipped
-
-    def _keep_clear(self, measured: float) -> None:
-        phase = (self._timer.due - measured) / self.period % 1.0
-        if EARLIEST <= phase <= LATEST:
-            self._astride = 0
-            return
-        self._astride += 1
+        if self._measured is None or not self._keeps_clear:
+            return skipped
+        phase = (self._timer.due - self._measured) / self.period % 1.0
+        self._measured = None
+        self._astride = 0 if EARLIEST <= phase <= LATEST else self._astride + 1
         if self._astride >= CONVINCED:
             self._astride = 0
             self._timer.shift((0.5 - phase) * self.period)
+        return skipped

@@ -60,7 +60,9 @@ def fmu_problems(path: Path, parameters: Mapping[str, Any]) -> list[tuple[str, s
         wrong.append(f"{path.name} is for {', '.join(platforms) or 'no platform'}, and this is {fmpy.platform}")
     inputs, outputs = named(description, "input"), named(description, "output")
     for name in inputs:
-        if name not in (*OWN, "T", "neighbours") and not _is_of_neighbour(name):
+        match = NEIGHBOUR.fullmatch(name)
+        of_neighbour = match is not None and ("_shared_" in name or match[2] in OF_NEIGHBOUR)
+        if name not in (*OWN, "T", "neighbours") and not of_neighbour:
             known = (*OWN, "T", "neighbours", *(f"neighbour_1_{field}" for field in OF_NEIGHBOUR))
             wrong.append(f"{path.name} has an input {name}; {suggestion(name, known, 'inputs')}")
     wrong += [f"{path.name} has no output {name}" for name in ("P_set", "V_set") if name not in outputs]
@@ -79,11 +81,6 @@ def fmu_problems(path: Path, parameters: Mapping[str, Any]) -> list[tuple[str, s
 
 def is_fmi3(description: Any) -> bool:
     return str(description.fmiVersion).startswith("3")
-
-
-def _is_of_neighbour(name: str) -> bool:
-    match = NEIGHBOUR.fullmatch(name)
-    return match is not None and ("_shared_" in name or match[2] in OF_NEIGHBOUR)
 
 
 def named(description: Any, causality: str) -> dict[str, Any]:

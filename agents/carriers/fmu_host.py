@@ -66,7 +66,8 @@ class LoadedFmu(Law):
         self._set(self._inputs, self._values(own, neighbours, T))
         self._fmu.doStep(currentCommunicationPoint=self._t, communicationStepSize=T)
         self._t += T
-        got = self._get()
+        values = self._got([variable.valueReference for variable in self._outputs.values()])
+        got = dict(zip(self._outputs, map(float, values), strict=True))
         shared = {name: got[f"shared_{name}"] for name in self._shared} or NOTHING_SHARED
         return SetPoints(got["P_set"], got["V_set"], shared, got.get("send", 1.0) >= 0.5)
 
@@ -87,10 +88,6 @@ class LoadedFmu(Law):
         names = [name for name in known if name in values]
         if names:
             self._put([known[name].valueReference for name in names], [values[name] for name in names])
-
-    def _get(self) -> dict[str, float]:
-        got = self._got([variable.valueReference for variable in self._outputs.values()])
-        return dict(zip(self._outputs, map(float, got), strict=True))
 
 
 def _instance(description: Any, folder: Path) -> Any:

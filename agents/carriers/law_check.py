@@ -17,8 +17,6 @@ from gridpeers.wire.schema.table_reading import read_parameters, read_table
 from gridpeers.wire.schema.table_schema import Problem
 from gridpeers.wire.wording import is_no_path
 
-_NO_FIRST_LINE = "has no first line such as #!/usr/bin/env python3, and is no compiled program; write one"
-
 
 def executable_problem(file: Path) -> str:
     """Return why the system cannot run a script, as the end of a sentence; "" if it may."""
@@ -28,7 +26,9 @@ def executable_problem(file: Path) -> str:
     except OSError:  # a program that may be run but not read
         return ""
     if not first.startswith(b"#!"):
-        return "" if b"\0" in first or not first.isascii() else _NO_FIRST_LINE
+        if b"\0" in first or not first.isascii():  # a compiled program
+            return ""
+        return "has no first line such as #!/usr/bin/env python3, and is no compiled program; write one"
     if first.endswith(b"\r\n"):
         return "has lines that end as those of Windows, which #! cannot have; write it with Unix line ends"
     interpreter, *arguments = first[2:].decode(errors="replace").split() or ["nothing"]

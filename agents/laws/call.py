@@ -54,11 +54,9 @@ def failed_at(law: Law, error: LawError, folder: str) -> str:
     A file in `folder`, that of the scenario, is named from there.
     """
     carried = getattr(law, "carried", law)
-    return (
-        ""
-        if type(carried).__module__.startswith("gridpeers.agents.carriers.")
-        else line_of(carried.step, error, folder)
-    )
+    if type(carried).__module__.startswith("gridpeers.agents.carriers."):
+        return ""
+    return line_of(carried.step, error, folder)
 
 
 def _within_limits(law: Law, result: Any, own: Own) -> SetPoints:

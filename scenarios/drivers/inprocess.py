@@ -130,7 +130,8 @@ class InprocessBus:
         agent.appeared(self._plant.token, 0.0)
         introduced = decode(answer)
         assert isinstance(introduced, Nameplate)
-        self._known.introduce(inverter, instance, introduced)
+        self._known.members.appeared(inverter, instance)
+        self._known.members.meet(instance, introduced)
         self._do(agent, agent.take_actions())
 
     def _do(self, side: _Node, actions: Sequence[Action | Log]) -> None:
@@ -162,7 +163,7 @@ class InprocessBus:
         for agent in stopped:
             self._nameplates.pop(agent.nameplate[0])
             self._plant.vanished(agent.token, 0.0)
-            self._known.gone(*self._plant.keys.parts(agent.token)[2:])
+            self._known.members.vanished(*self._plant.keys.parts(agent.token)[2:])
             for other in self._agents:
                 other.vanished(agent.token, 0.0)
 

@@ -23,7 +23,8 @@ def roster(number: int, *names: str) -> Prepare:
 def introduced(*names: str) -> KnownAgents:
     known = KnownAgents(RING)
     for name in names:
-        known.introduce(name, name, Agent(agent_config(name, RING)).nameplate)
+        known.members.appeared(name, name)
+        known.members.meet(name, Agent(agent_config(name, RING)).nameplate)
     return known
 
 
@@ -46,7 +47,7 @@ def test_a_member_without_a_nameplate_is_missing_to_all_but_itself() -> None:
     """A process whose token is gone, or another one than the roster's, is not met."""
     known = introduced("inv1", "inv2", "inv3")
     known.take(roster(0, *NAMES))
-    known.gone("inv2", "inv2")
+    known.members.vanished("inv2", "inv2")
 
     assert known.unmet("inv1") == ["inv2", "inv4"]
     assert known.unmet("inv2") == ["inv4"]
