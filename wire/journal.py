@@ -140,8 +140,8 @@ class Decision(Entry, frozen=True, array_like=True, tag="decision"):
     """Last state that was heard of each: in simulated time its age in ticks, 1 without an emulated link; in wall-clock
     time its number. None if no state was heard."""
     unused: list[str]
-    """Reason why the state of each was left out of the sums: one of `UNUSED`, empty if it was used; no list if all were
-    used."""
+    """Reason why the state of each was left out of the sums: "silent" (none was heard), "stale" (older than
+    max_age), "island" (it was in another island), empty if it was used; no list if all were used."""
     weights: list[float]
     """Weight of each, from 0 to 1; no list if all used ones have 1."""
     saturated: tuple[int, int] = (0, 0)
@@ -153,14 +153,6 @@ class Decision(Entry, frozen=True, array_like=True, tag="decision"):
     before: list[float] = []
     """Set-points (W, V) before the decision. No list in simulated time, where they are those of the state before, and
     where the agent starts, or starts again after a pause, from those of its measurement."""
-
-
-UNUSED = {
-    "silent": "no state was heard",
-    "stale": "its last state was older than max_age",
-    "island": "it was in another island",
-}
-"""Reasons why an agent leaves out an in-neighbour."""
 
 
 AnyEntry = (
@@ -239,12 +231,6 @@ class JournalBuffer:
 
 EACH_TICK = ("measurement", "state", "set_points")
 """Kinds of keys with a message a tick."""
-
-IN_TELEMETRY = ("telemetry", "journal", "report")
-"""Kinds of keys whose messages the record has anyway: the plant publishes them for recorders."""
-
-CONDITION = ("status", "answer")
-"""Kinds of keys by which a node says how it does; a status decides what events the plant tells."""
 
 TO_LINKS = ("link_request", "command")
 """Kinds of keys on which commands to emulated links come, among others."""

@@ -60,9 +60,6 @@ class Admission:
     def release(self, name: str) -> None:
         self.epochs.pop(name, None)
 
-    def lives(self, message: AnyMessage) -> bool:
-        return self.epochs.get(message.sender) == message.epoch
-
     def check(self, message: AnyMessage) -> None:
         """Raise RejectedError if a message is a ghost's, or its sender's epoch is not known (yet)."""
         name = message.sender

@@ -10,9 +10,7 @@ from msgspec.structs import astuple
 from gridpeers.wire.codec import sound
 from gridpeers.wire.journal import (
     AT_ONCE,
-    CONDITION,
     EACH_TICK,
-    IN_TELEMETRY,
     Exchange,
     JournalBuffer,
     MessageReference,
@@ -29,6 +27,12 @@ from gridpeers.wire.messages import Measurement, State
 
 SHOWN_PAYLOAD = 1_000
 """Most bytes that are noted of a message that was rejected."""
+
+_IN_TELEMETRY = ("telemetry", "journal", "report")
+"""Kinds of keys whose messages the record has anyway: the plant publishes them for recorders."""
+
+_CONDITION = ("status", "answer")
+"""Kinds of keys by which a node says how it does; a status decides what events the plant tells."""
 
 
 class Traffic(Protocol):
@@ -115,14 +119,14 @@ class TimedTraffic:
 
     def sent(self, key: str, payload: bytes) -> None:
         name = key[self._cut :]
-        if kind_of(name) not in _NOT_NOTED:
+        if kind_of(name) not in _IN_TELEMETRY + _CONDITION:
             self._journal.add(SentMessage(self.now, name, payload))
 
     def received(self, key: str, payload: bytes, at: float, rejected: str) -> None:
         self.now = at
         name = key[self._cut :]
         kind = kind_of(name)
-        needless = IN_TELEMETRY if self._arrivals else _NOT_NOTED
+        needless = _IN_TELEMETRY if self._arrivals else _IN_TELEMETRY + _CONDITION
         if not (self._arrivals or self._whole) or (kind in needless and not rejected):
             return
         shown = payload[:SHOWN_PAYLOAD] if rejected else payload
@@ -153,6 +157,3 @@ class TimedTraffic:
 
     def line(self, text: str) -> None:
         self._journal.add(ProcessEvent(self.now, "line", text))
-
-
-_NOT_NOTED = IN_TELEMETRY + CONDITION

@@ -141,7 +141,7 @@ class NeighbourUse(NamedTuple):
     age: float | None
     """Age of that state (s); None if there was none."""
     unused: str
-    """Why it was left out (`gridpeers.wire.journal.UNUSED`); empty if it was used."""
+    """Why it was left out (`gridpeers.wire.journal.Decision`); empty if it was used."""
 
     def number_at(self, own: int) -> int | None:
         """Return the number of the neighbour's state at the decision from which the own state `own` came."""

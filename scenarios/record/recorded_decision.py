@@ -38,7 +38,7 @@ class NeighbourInput:
     weight: float
     """Weight from 0 to 1 of that state in the sums."""
     unused: str
-    """Why it was left out: "silent", "stale" or "island" (`gridpeers.wire.journal.UNUSED`); empty if it was used."""
+    """Why it was left out: "silent", "stale" or "island" (`gridpeers.wire.journal.Decision`); empty if it was used."""
     lie: str = ""
     """The lie that `state` is, in words; empty if it is as its sender decided it."""
 

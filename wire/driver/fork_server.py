@@ -30,9 +30,6 @@ from pathlib import Path
 LONGEST = 65_536
 """Longest request (bytes)."""
 
-_Job = tuple[list[str], list[int]]
-"""Module and its arguments; standard input, output and error."""
-
 
 def main() -> None:
     """Import, then serve requests until the socket closes; in a new process, run its module."""
@@ -55,8 +52,11 @@ def main() -> None:
     runpy.run_module(module, run_name="__main__", alter_sys=True)
 
 
-def _serve(control: socket.socket) -> _Job | None:
-    """Return the job of this process, in a new process; None in the server, once nobody asks any more."""
+def _serve(control: socket.socket) -> tuple[list[str], list[int]] | None:
+    """In a new process return its module with the arguments, and its three standard files.
+
+    Return None in the server, once nobody asks any more.
+    """
     while True:
         data, files, _, _ = socket.recv_fds(control, LONGEST, 3)
         if not data:

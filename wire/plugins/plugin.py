@@ -18,10 +18,6 @@ KEYS = ("use", "folder")
 """Keys of a plug-in's table that are no parameters of it."""
 
 
-Scalar = float | int | bool | str
-"""Value of a parameter."""
-
-
 def scalar_objection(value: Any) -> str:
     """Return why a value cannot be one of a parameter, whatever the parameter; "" if it can."""
     written = printable(repr(value), 60)
@@ -41,7 +37,7 @@ class Plugin(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """Registered name, or `module:Name`."""
     folder: str = ""
     """Where the module is looked for."""
-    parameters: tuple[tuple[str, Scalar], ...] = ()
+    parameters: tuple[tuple[str, float | int | bool | str], ...] = ()
     """Name and value of those that do not keep their default, in the order of the names."""
 
     @property

@@ -53,12 +53,6 @@ class Member(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         following = self._in_generation(self.generation + 1)
         return (following,) if self.revoked else (self.common_name, following)
 
-    def validity(self, now: str) -> str:
-        """Return "revoked", or until when its certificate is or was valid, by the site's list and the time now."""
-        if self.revoked:
-            return "revoked"
-        return f"expired  {self.expires}" if self.expires < now else f"valid    until {self.expires}"
-
     def _in_generation(self, number: int) -> str:
         return f"{self.role}:{self.name}" if number == 1 else f"{self.role}:{self.name}:{number}"
 
