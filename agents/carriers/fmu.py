@@ -67,6 +67,12 @@ def fmu_problems(path: Path, parameters: Mapping[str, Any]) -> list[tuple[str, s
             wrong.append(f"{path.name} has an input {name}; {suggestion(name, known, 'inputs')}")
     wrong += [f"{path.name} has no output {name}" for name in ("P_set", "V_set") if name not in outputs]
     settable = named(description, "parameter")
+    real = "Float64" if is_fmi3(description) else "Real"
+    used = inputs | outputs | {name: variable for name, variable in settable.items() if name in parameters}
+    for name, variable in used.items():
+        if variable.type != real or variable.dimensions:
+            array = "an array of " if variable.dimensions else ""
+            wrong.append(f"{path.name} has {name} as {array}{variable.type}; declare it as a scalar {real}")
     unknown = [name for name in parameters if name not in (*settable, *LIMITS)]
     found = [("fmu", text) for text in wrong]
     found += [(name, f"unknown parameter; {suggestion(name, [*settable, *LIMITS], 'parameters')}") for name in unknown]
