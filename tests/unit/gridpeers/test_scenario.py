@@ -33,7 +33,7 @@ def test_one_slip_is_one_problem() -> None:
     with pytest.raises(gp.ScenarioError, match=r'^replace: gain: unknown key; did you mean "gains"'):
         gp.load("islanding").replace({"gain.k_p": 0.001})
     with pytest.raises(
-        gp.ScenarioError, match=r"^replace: case.IV.link\[0\].delay: .*: give case.IV.link as a list first"
+        gp.ScenarioError, match=r"^replace: case.IV.link\[0\].delay: .*; give case.IV.link as a list first"
     ):
         gp.load("islanding").replace({"case.IV.link[0].delay": 0.1})
 
