@@ -198,8 +198,9 @@ class Recorder:
         if self._folder is not None and self._file is not None and not self._finished:
             with contextlib.suppress(OSError):  # of a full disk: what is in the file stays, and the writer reported it
                 self._file.close()
-            self._write_events(self._folder)
-            self.links.write(self._folder)
+            with contextlib.suppress(OSError):
+                self._write_events(self._folder)
+                self.links.write(self._folder)
 
     @property
     def record_step(self) -> float:
