@@ -6,6 +6,7 @@ Zenoh's threads only enqueue into `Session.inbox`, and one thread, the owner's, 
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import json
 import os
 import re
@@ -43,6 +44,9 @@ ADDRESSES_EVERY = 0.5
 
 _QUERY_TIMEOUT = 600.0
 """Time (s) after which Zenoh forgets a query; the asking node keeps its own deadline."""
+
+_stateful: set[int] = set()
+"""Zenoh's threads that keep their Python state: else each call would map and unmap memory, a quarter of a tick."""
 
 _open_sessions: WeakSet[Session] = WeakSet()
 """Sessions of this process that are not closed."""
@@ -306,4 +310,11 @@ class Session:
                 end_left_links()
 
     def _direct(self, callback: Callable[[Any], None]) -> Any:
-        return self._zenoh.handlers.Callback(callback, indirect=False)
+
+        def from_zenoh(item: Any) -> None:
+            if (thread := threading.get_ident()) not in _stateful:
+                _stateful.add(thread)
+                ctypes.pythonapi.PyGILState_Ensure()  # without its Release, so the state ends with the thread
+            callback(item)
+
+        return self._zenoh.handlers.Callback(from_zenoh, indirect=False)
