@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 
 from gridpeers.wire.plugins.registry import ANYTHING, PluginError, Registry, named
-from gridpeers.wire.schema.table_reading import parameter_values, read_parameters
+from gridpeers.wire.schema.table_reading import in_words, parameter_values, read_parameters, shown
 from gridpeers.wire.schema.table_schema import Problem, fields_of
 from gridpeers.wire.wording import printable
 
@@ -142,6 +142,12 @@ def _parameter_objection(cls: type, taken: tuple[str, ...]) -> str:
                 f"its parameter {field.name} cannot be given, as a scenario has the key {field.name} for something "
                 "else; give it another name"
             )
-    defaults = {field.name: field.default for field in fields if not field.required}
-    wrong = [problem for problem in read_parameters(cls, defaults)[1] if problem.path in defaults]
-    return f"{cls.__name__}.{wrong[0].path}: its default {wrong[0].text}" if wrong else ""
+        if field.required:
+            continue
+        try:
+            wrong = field.objection(msgspec.convert(field.default, field.type))
+        except msgspec.ValidationError:
+            wrong = f"must be {in_words(field.type)}, got {shown(field.default)}"
+        if wrong:
+            return f"{cls.__name__}.{field.name}: its default {wrong}"
+    return ""

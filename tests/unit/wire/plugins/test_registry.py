@@ -1,4 +1,4 @@
-"""What is plugged in by an installed distribution: found by its entry point, like anybody's own."""
+"""What is plugged in by an installed distribution is found by its entry point; defaults of a user's class."""
 
 from collections.abc import Iterator
 from importlib import metadata
@@ -7,7 +7,7 @@ import pytest
 
 from gridpeers.agents.graphs import GRAPHS, ring
 from gridpeers.wire.plugins import registry
-from gridpeers.wire.plugins.plugin import Plugin, made, plugin_problems
+from gridpeers.wire.plugins.plugin import Plugin, callable_objection, made, plugin_problems
 
 
 @pytest.fixture
@@ -37,3 +37,21 @@ def test_an_entry_point_that_leads_nowhere_is_told_where_it_is_used_and_listed(e
 
     assert said.startswith('gridpeers.agents.graphs:nowhere: module gridpeers.agents.graphs has no "nowhere"')
     assert "Cannot be used: gridpeers.agents.graphs:nowhere" in page("graphs")
+
+
+def test_a_default_may_be_anything_of_its_type() -> None:
+    """None where the type has it, as no file can write it; a value that is not of the type is refused."""
+
+    class Star:
+        hub: str | None = None
+        reach: float | None = None
+
+        def __call__(self, members: object) -> dict[str, set[str]]:
+            return {}
+
+    assert callable_objection(Star, "members") == ""
+
+    class Far(Star):
+        reach = "far"  # type: ignore[assignment]
+
+    assert callable_objection(Far, "members") == 'Far.reach: its default must be a number, got "far"'
