@@ -44,7 +44,7 @@ SKEW = timedelta(minutes=5)
 """A certificate is valid from so long before its issue: clocks of hosts differ."""
 
 RESERVED = {text for file in (CA, CA_KEY, LIST) for text in (file, Path(file).stem)}
-"""Names that no member has, as the site's own files have them."""
+"""Names that no member may have: the site's own files are called so."""
 
 FIRST: tuple[tuple[str, Role], ...] = (("plant", "plant"), ("operator", "operator"), ("viewer", "viewer"))
 """Members of every new site."""
@@ -58,9 +58,9 @@ def make_site(folder: Path, *, days: float = LIFE_DAYS, now: datetime | None = N
     site = folder.absolute().name
     if not is_name(site):
         raise KeysError(f'{folder}: "{printable(site)}" cannot name a site; use letters, digits, "_", "-", "."')
-    if folder.exists() or folder.is_symlink():
-        raise KeysError(f"{folder}: is there already; gridpeers keys show --keys {folder} shows it")
     try:
+        if folder.exists() or folder.is_symlink():
+            raise KeysError(f"{folder}: is there already; gridpeers keys show --keys {folder} shows it")
         folder.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=f".{site}-", dir=folder.absolute().parent) as made:
             new = Path(made) / site
@@ -151,8 +151,11 @@ def revoke(folder: Path, name: str) -> Member:
 @contextmanager
 def _changing(folder: Path) -> Iterator[None]:
     """Keep other commands from changing a site meanwhile: the list of one would lack the members of another."""
-    read_list(folder)  # says what is wrong with the folder
-    handle = os.open(folder, os.O_RDONLY)
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+    except OSError as error:
+        read_list(folder)  # says what is wrong with most folders
+        raise KeysError(f"{folder}: cannot be read: {error.strerror}") from None
     try:
         fcntl.flock(handle, fcntl.LOCK_EX)
         yield

@@ -167,6 +167,11 @@ def test_time_decides_whether_a_certificate_counts(lab: Path) -> None:
     assert soon == "the certificate of inv1 ends on 2027-11-23 12:00 UTC; gridpeers keys issue inv1 renews it"
 
 
+def test_a_site_that_cannot_be_made_is_refused_in_one_line(tmp_path: Path) -> None:
+    with pytest.raises(KeysError, match="cannot be made: File name too long"):
+        make_site(tmp_path / ("x" * 300) / "site")
+
+
 def test_a_name_and_a_role_that_do_not_fit_are_refused(lab: Path) -> None:
     """An unknown name, a viewer as an agent, a second role for a name, a name that is none."""
     assert 'no certificate was issued to "inv7"; those of role agent: inv1, inv2; gridpeers keys issue inv7' in refusal(
