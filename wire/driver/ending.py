@@ -36,7 +36,7 @@ ends all processes of a run signals those that their parent ends too. An end mus
 class StopSignal:
     """Handler of signals: SIGINT raises KeyboardInterrupt, any other an error that is made from its name.
 
-    None raises less than `SAME_REQUEST_TIME` after another.
+    A signal that comes less than `SAME_REQUEST_TIME` after the last one that raised does nothing.
     """
 
     def __init__(self, error: Callable[[str], BaseException], clock: Callable[[], float] = monotonic) -> None:
@@ -54,7 +54,10 @@ class StopSignal:
 
 
 def stop_at_signals(error: Callable[[str], BaseException]) -> StopSignal:
-    """Have SIGINT, unless a shell ignores it, and SIGTERM raise in the main thread; return their handler."""
+    """Have SIGINT and SIGTERM raise in the main thread; return their handler.
+
+    A SIGINT that is ignored stays so: a shell ignores it for a program in the background.
+    """
     stop = StopSignal(error)
     signal.signal(signal.SIGTERM, stop)
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
@@ -93,20 +96,22 @@ class _Watched(io.FileIO):
         self._reader_gone = self._raised = False
 
     def write(self, data: ReadableBuffer, /) -> int:
-        lost = OutputLostError(READER_GONE, "nobody reads its output any more")
+        unwritable = ""
         if not (self._raised or self._reader_gone):
             try:
                 return super().write(data)
             except BrokenPipeError:
                 self._reader_gone = True
             except OSError as error:
-                lost = OutputLostError(UNWRITABLE, f"standard output cannot be written: {error.strerror or error}")
+                unwritable = f"standard output cannot be written: {error.strerror or error}"
         # A command that cannot write its error message still has its exit status.
         ends = self.quits and (self._reader_gone or self.name != "<stderr>")
         # Raise once: the rest of the output is dropped. In another thread the error would end only that thread.
         if ends and not self._raised and threading.current_thread() is threading.main_thread():
             self._raised = True
-            raise lost
+            if self._reader_gone:
+                raise OutputLostError(READER_GONE, "nobody reads its output any more")
+            raise OutputLostError(UNWRITABLE, unwritable)
         return memoryview(data).nbytes
 
 
