@@ -34,6 +34,9 @@ _IN_TELEMETRY = ("telemetry", "journal", "report")
 _CONDITION = ("status", "answer")
 """Kinds of keys by which a node says how it does; a status decides what events the plant tells."""
 
+_NOT_NOTED = _IN_TELEMETRY + _CONDITION
+"""Kinds of keys whose messages a sender does not note."""
+
 
 class Traffic(Protocol):
     """Takes all messages and tokens of a node; `at` is the driver's clock (s)."""
@@ -119,19 +122,20 @@ class TimedTraffic:
 
     def sent(self, key: str, payload: bytes) -> None:
         name = key[self._cut :]
-        if kind_of(name) not in _IN_TELEMETRY + _CONDITION:
+        if kind_of(name) not in _NOT_NOTED:
             self._journal.add(SentMessage(self.now, name, payload))
 
     def received(self, key: str, payload: bytes, at: float, rejected: str) -> None:
         self.now = at
         name = key[self._cut :]
         kind = kind_of(name)
-        needless = _IN_TELEMETRY if self._arrivals else _IN_TELEMETRY + _CONDITION
+        needless = _IN_TELEMETRY if self._arrivals else _NOT_NOTED
         if not (self._arrivals or self._whole) or (kind in needless and not rejected):
             return
         shown = payload[:SHOWN_PAYLOAD] if rejected else payload
         entry: MessageReference | ReceivedMessage = ReceivedMessage(at, name, shown, rejected)
-        noted = kind in EACH_TICK and not self._whole and rejected in ("", "stale")  # by the sender
+        # its sender has noted it; any other reject may be of somebody who keeps no journal
+        noted = kind in EACH_TICK and not self._whole and rejected in ("", "stale")
         if noted and (message := sound(payload)):
             entry = MessageReference(at, name, message.epoch, message.seq, rejected)
         (self._journal.add_rejected if rejected else self._journal.add)(entry)
