@@ -135,7 +135,7 @@ def requirement(module: str) -> str:
     with suppress(metadata.PackageNotFoundError):  # run from its sources
         required = metadata.requires("gridpeers") or []
     named = [text for text in required if re.split(r"[\[<>=~! ;]", text)[0].lower() == package.lower()]
-    extras = re.findall(r"extra == [\"']([\w-]+)", " ".join(named))
+    extras, all_extras = (re.findall(r"extra == [\"']([\w-]+)", " ".join(texts)) for texts in (named, required))
     if named and not extras:
         return f"'{named[0].partition(';')[0].strip()}'"
-    return f"'gridpeers[{min(extras, key=' '.join(required).count)}]'" if extras else package
+    return f"'gridpeers[{min(extras, key=all_extras.count)}]'" if extras else package
