@@ -46,7 +46,7 @@ _QUERY_TIMEOUT = 600.0
 """Time (s) after which Zenoh forgets a query; the asking node keeps its own deadline."""
 
 _stateful: set[int] = set()
-"""Zenoh's threads that keep their Python state: else each call would map and unmap memory, a quarter of a tick."""
+"""Threads of Zenoh that keep their Python state between calls; to make it anew at each took a quarter of a tick."""
 
 _open_sessions: WeakSet[Session] = WeakSet()
 """Sessions of this process that are not closed."""
@@ -96,8 +96,9 @@ class Session:
         star: bool = False,
         credentials: Credentials | None = None,
     ) -> None:
+        in_star = star and not rendezvous
         try:
-            load_zenoh(one_thread=star and not rendezvous)
+            load_zenoh(one_thread=in_star)
             import zenoh
         except ImportError as error:
             raise SessionError(f"{who}: {not_importable(error)}; or use --driver inprocess") from None
@@ -113,13 +114,11 @@ class Session:
         self._tokens: dict[str, zenoh.LivelinessToken] = {}
         self._certificates: LinkCertificates | None = None
         if credentials is not None:
-            self._certificates = LinkCertificates(credentials, relayed=star and not rendezvous)
+            self._certificates = LinkCertificates(credentials, relayed=in_star)
         self._addresses = LinkAddresses(listen, host_addresses())
         self._next_look = monotonic() + ADDRESSES_EVERY
-        listening = () if star and not rendezvous else self._addresses.endpoints
-        config = zenoh_settings(listening, connect, gossip=gossip, clock=clock, meets_all=meets_all)
-        if star:
-            config["scouting"]["gossip"]["enabled"] &= rendezvous
+        listening = () if in_star else self._addresses.endpoints
+        config = zenoh_settings(listening, connect, gossip=gossip and not in_star, clock=clock, meets_all=meets_all)
         if star and rendezvous:
             config["mode"] = "router"
             config["scouting"]["delay"] = 0  # else it waits 0.5 s for others
@@ -130,7 +129,6 @@ class Session:
             _open_sessions.add(self)
         self._session = self._open(who, config)
         self._changeable = clock == "wall" and gossip and bool(connect) and not rendezvous
-        in_star = star and not rendezvous
         try:
             while in_star and not self._meets_router():
                 pass  # a signal ends this wait, as it would not end the opening of a client
@@ -310,11 +308,10 @@ class Session:
                 end_left_links()
 
     def _direct(self, callback: Callable[[Any], None]) -> Any:
-
         def from_zenoh(item: Any) -> None:
             if (thread := threading.get_ident()) not in _stateful:
                 _stateful.add(thread)
-                ctypes.pythonapi.PyGILState_Ensure()  # without its Release, so the state ends with the thread
+                ctypes.pythonapi.PyGILState_Ensure()  # never released: the state stays for the next call
             callback(item)
 
         return self._zenoh.handlers.Callback(from_zenoh, indirect=False)
