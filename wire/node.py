@@ -287,8 +287,9 @@ class Node:
             self._publish(key, encode(journal))
 
     def _take_journal(self, epoch: int, t: float, *, empty: bool = False) -> Iterator[Journal]:
-        parts = [] if self.journal is None else self.journal.take_parts() or [b""] * empty
-        for data in parts:
+        if self.journal is None:
+            return
+        for data in self.journal.take_parts() or ([b""] if empty else []):
             yield Journal(sender=self._name, epoch=epoch, seq=self._journal_parts, t=t, data=data)
             self._journal_parts += 1
 

@@ -126,14 +126,16 @@ class NodeGroup:
         return tuple(line for node in self.nodes for line in node.take_rejects())
 
     def appeared(self, key: str, now: float) -> None:
-        self._now = now
-        for node in self._active if key not in self.tokens else ():
-            node.appeared(key, now)
+        if key not in self.tokens:
+            self._now = now
+            for node in self._active:
+                node.appeared(key, now)
 
     def vanished(self, key: str, now: float) -> None:
-        self._now = now
-        for node in self._active if key not in self.tokens else ():
-            node.vanished(key, now)
+        if key not in self.tokens:
+            self._now = now
+            for node in self._active:
+                node.vanished(key, now)
 
     def received(self, key: str, payload: bytes, now: float) -> None:
         self._now = now

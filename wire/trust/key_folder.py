@@ -37,7 +37,7 @@ COMMANDING: tuple[Role, ...] = ("operator",)
 """Roles that may command a run."""
 
 SOON = timedelta(days=30)
-"""Time before its end from which on a certificate ends soon."""
+"""A certificate ends soon if it ends within this time."""
 
 
 class KeysError(ValueError):
@@ -68,7 +68,8 @@ def read_list(folder: Path) -> MemberList:
     from cryptography.hazmat.primitives import hashes
     from cryptography.hazmat.primitives.asymmetric import ec
 
-    if not os.path.isdir(folder):  # noqa: PTH112  a folder that nobody may enter is none either
+    # Path.is_dir may raise an error where the folder above may not be entered
+    if not os.path.isdir(folder):  # noqa: PTH112
         raise KeysError(f"{folder}: there is no such folder of keys; gridpeers keys init {folder} makes one")
     public = read_certificate(folder / CA).public_key()
     try:
@@ -102,20 +103,23 @@ def open_credentials(
     now = now or datetime.now(UTC)
     known, either = read_list(folder), " or ".join(roles)
     there = [member for member in known.members if not member.revoked and (folder / f"{member.name}.key").is_file()]
-    member = known.of(name) or next((each for role in roles for each in there if each.role == role), None)
-    if name and (member is None or member.name != name):
+    preferred = next((each for role in roles for each in there if each.role == role), None)
+    member = known.of(name) if name else preferred
+    if name and member is None:
         have = ", ".join(each.name for each in known.members if each.role in roles) or "none"
         raise KeysError(
             f'{folder}: no certificate was issued to "{printable(name)}"; those of role {either}: {have}; '
             f"gridpeers keys issue {printable(name)} --role {roles[0]} --keys {folder} issues one"
         )
     if member is None or member.role not in roles:
-        meant = member or next((each for each in there if each.role == "viewer"), None)
-        what = f"{member.name} has the role {member.role}; this needs" if member else "has no key of a member with"
-        what = f"{what} the role {either}"
-        if meant and meant.role == "viewer" and tuple(roles) == COMMANDING:
-            what = f"{meant.name} has the role viewer, which may look at a run (status, watch, view) and not command it"
-            what += f"; an {either} may"
+        other = member or next((each for each in there if each.role == "viewer"), None)
+        if other and other.role == "viewer" and tuple(roles) == COMMANDING:
+            look = "which may look at a run (status, watch, view) and not command it"
+            what = f"{other.name} has the role viewer, {look}; an {either} may"
+        elif member:
+            what = f"{member.name} has the role {member.role}; this needs the role {either}"
+        else:
+            what = f"has no key of a member with the role {either}"
         have = " or ".join(each.name for each in known.members if each.role in roles and not each.revoked)
         way = f"--as {have} takes the certificate of one" if have else f"gridpeers keys issue NAME --role {roles[0]}"
         raise KeysError(f"{folder}: {what}: {way}")
@@ -258,12 +262,9 @@ def tls_refusal(host: str, port: int, credentials: Credentials | None, timeout: 
         if alert and credentials is None:
             return "asks for a certificate"
         if alert and credentials is not None:
-            expired = name == "CERTIFICATE_EXPIRED"
-            why = (
-                "it has expired by the clock there"
-                if expired
-                else f"by the ca.pem there it is of another site ({name})"
-            )
+            why = f"by the ca.pem there it is of another site ({name})"
+            if name == "CERTIFICATE_EXPIRED":
+                why = "it has expired by the clock there"
             return f"does not accept the certificate of {credentials.own.name}: {why}"
     except OSError:  # nobody is there, or files of ours have gone
         pass
