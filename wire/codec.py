@@ -166,7 +166,11 @@ T = TypeVar("T")
 
 
 def decode_foreign(decode: Callable[[Text], T], data: Text) -> T:
-    """Return the value of bytes or a text; raise `msgspec.DecodeError` in one printable line if there is none."""
+    """Return the value of bytes or a text; raise `msgspec.DecodeError` in one printable line if there is none.
+
+    msgspec itself raises other errors for a text that is no UTF-8 and for brackets a thousand deep, and quotes the name
+    of an unknown field as it came.
+    """
     try:
         return decode(data)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:

@@ -134,8 +134,7 @@ MOST_PARTS = 6
 def epoch_of(part: str) -> int | None:
     """Return the epoch in the last part of a plant's token; None if no message could have it.
 
-    An epoch has one text: else the end of another one's token, with a zero before, would be that of the plant.
-
+    A leading zero is refused: else the end of a token alive/plant/07 would pass for the end of plant 7.
     """
     return int(part) if re.fullmatch("0|[1-9][0-9]{0,15}", part) and int(part) <= MOST_COUNT else None
 

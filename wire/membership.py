@@ -46,7 +46,7 @@ class Admission:
         self._arrived: dict[str, tuple[int, float]] = {}
         """Number and run time (s) of the last message off the wire."""
         self._behind: dict[str, tuple[int, int]] = {}
-        """Number of the last message behind an earlier one, and the count of rising ones in a row."""
+        """Number of the last message that came after a later one, and how many such have come in rising order."""
         self._passed: dict[str, int] = {}
 
     def bind(self, name: str, epoch: int) -> None:

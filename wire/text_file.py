@@ -30,7 +30,7 @@ class TextFileError(ValueError):
 
 
 def text_of(data: bytes) -> str:
-    """Return the text of a file, with line ends as Python has them; TextFileError if its encoding is not known."""
+    """Return the text of a file, with line ends as Python has them; raise TextFileError if it has no known encoding."""
     encoding = _encoding(data)
     try:
         text = data.decode(encoding)

@@ -154,7 +154,7 @@ _NUMBER = re.compile(r"[0-9]+(?:\.[0-9]+)?")
 class RateLimit:
     """Pass the first lines of a kind, then one at each interval (s) with the number of omitted ones.
 
-    Lines that differ only in numbers are of one kind, and all beyond 200 kinds.
+    Lines that differ only in numbers are of one kind, and so are all lines beyond 200 kinds.
     """
 
     def __init__(self, burst: int = 20, interval: float = 10.0) -> None:

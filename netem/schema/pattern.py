@@ -55,7 +55,7 @@ class Pattern(NamedTuple):
 
 @lru_cache(maxsize=1024)
 def parse(text: str) -> Pattern:
-    """Read a pattern; ValueError says what one looks like if it is none.
+    """Read a pattern; if it is none, raise ValueError with what one looks like.
 
     Examples
     --------

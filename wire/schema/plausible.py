@@ -108,7 +108,7 @@ class Probability:
     what: str
     """Name of the event."""
     above_zero: bool = False
-    """Whether 0 is an error, as the number is divided by; then also what is so small that no number is left."""
+    """Whether 0, and all below 1e-12, is an error: the probability divides another number."""
 
     @property
     def span(self) -> str:

@@ -31,7 +31,7 @@ LONGEST_COMMON_NAME = 64
 
 class Member(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     name: str
-    """Of an agent that of its inverter."""
+    """An agent has that of its inverter."""
     role: Role
     generation: int = 1
     """Number of the certificate: how many of this name have been revoked before, and one."""
@@ -160,7 +160,7 @@ class Credentials(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         )
 
     def stranger(self, common_name: str) -> str:
-        """Return why the other end of a link is believed nothing, "" if it is a member."""
+        """Return why messages from the other end of a link are not believed, "" if it is a member."""
         if any(common_name in member.accepted for member in self.members):
             return ""
         shown = printable(common_name, 64) or "nobody"
