@@ -26,15 +26,18 @@ def executable_problem(file: Path) -> str:
     except OSError:  # a program that may be run but not read
         return ""
     if not first.startswith(b"#!"):
-        if b"\0" in first or not first.isascii():  # a compiled program
+        if b"\0" in first:  # a compiled program
             return ""
         return "has no first line such as #!/usr/bin/env python3, and is no compiled program; write one"
     if first.endswith(b"\r\n"):
         return "has lines that end as those of Windows, which #! cannot have; write it with Unix line ends"
-    interpreter, *arguments = first[2:].decode(errors="replace").split() or ["nothing"]
-    if Path(interpreter).name == "env" and arguments and not arguments[0].startswith("-"):
-        interpreter = arguments[0]
-    return "" if shutil.which(interpreter) else f"asks in its first line for {interpreter}, which is not there"
+    interpreter, _, argument = first[2:].decode(errors="replace").strip().partition(" ")
+    if not Path(interpreter).is_file():
+        return f"asks in its first line for {interpreter or 'nothing'}, which is not there"
+    argument = argument.strip()  # the system hands it on as one, blanks included
+    if Path(interpreter).name == "env" and not argument.startswith("-") and not shutil.which(argument):
+        return f"asks in its first line for {argument or 'nothing'}, which is not there"
+    return ""
 
 
 PAPER = LawChoice().use
