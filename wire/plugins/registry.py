@@ -98,7 +98,7 @@ class Registry(Generic[T]):
             )
 
         def add(it: T) -> T:
-            before = self._added.get(name, it)  # the same again: a cell of a notebook that is run again
+            before = self._added.get(name, it)  # a cell of a notebook that runs again adds the same once more
             if name in self.own or name in self._reserved or _home(before) != _home(it):
                 raise PluginError(f'there is a {self.kind} "{name}" already; choose another name')
             self._check(it, name)
@@ -172,7 +172,7 @@ def _module(name: str, reference: str, folder: str) -> ModuleType:
     meant = PathFinder.find_spec(top, [folder]) if folder else None
     if meant is not None and folder not in sys.path:
         there = PathFinder.find_spec(top)
-        if there is None or there.origin != meant.origin:  # a session has the folder where it runs there, as ""
+        if there is None or there.origin != meant.origin:  # "" on the path is the folder where a session runs
             sys.path.append(folder)  # at the end: a module of the user's never hides one of gridpeers or of Python
     try:
         if name not in sys.modules and find_spec(name) is None:
