@@ -125,7 +125,6 @@ class StaleValues(Check):
     max_age_s: Annotated[float, Unit("s"), Plausible("the greatest age of a state", 0.0, 3600.0)] = 0.0
     """Greatest age (s); 0: `max_age` of the agents, and where they have none, 0.25 s, as in real time."""
     since_s: Since = 0.0
-    """Run time (s) from which on it is judged: the end of the last fault of links or agents, say."""
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
         found: CommunicationSummary = case.communication

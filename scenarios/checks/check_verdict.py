@@ -108,8 +108,17 @@ def read_verdicts(path: Path) -> dict[str, tuple[CheckVerdict, ...]]:
     return msgspec.json.decode(path.read_bytes(), type=dict[str, tuple[CheckVerdict, ...]])
 
 
-Since = Annotated[float, Unit("s"), Plausible("a time of the run", 0.0, 86_400.0)]
-"""Run time (s) from which on a check judges: events open windows, the ends of faults of links and agents open none."""
+Since = Annotated[
+    float,
+    Unit("s"),
+    Plausible("a time of the run", 0.0, 86_400.0),
+    "Run time (s) from which on it is judged: the end of the last fault of links or agents, say.",
+]
+"""Key of a check that does not judge the start of a run: only events open windows, the end of a fault opens none."""
+
+WithKilled = Annotated[
+    bool, "Whether inverters count whose agents the scenario has killed: they stay at their last set-points."
+]
 
 
 def require_time(history: History, since_s: float) -> None:

@@ -13,6 +13,7 @@ from gridpeers.scenarios.checks.check_verdict import (
     NotJudgedError,
     Since,
     Violation,
+    WithKilled,
     require_longer,
     require_time,
 )
@@ -63,9 +64,7 @@ class Rating(Check):
     longest_s: Annotated[float, Unit("s"), Plausible("a time of overload", 0.0, 3600.0)] = 1.0
     """Longest time (s) above one of them."""
     since_s: Since = 0.0
-    """Run time (s) from which on it is judged: the end of the last fault of links or agents, say."""
-    with_killed: bool = True
-    """Whether inverters count whose agents the scenario has killed: they stay at their last set-points."""
+    with_killed: WithKilled = True
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
         history, s = case.history, case.nameplates.s

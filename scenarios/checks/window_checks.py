@@ -7,7 +7,7 @@ from typing import Annotated
 
 import numpy as np
 
-from gridpeers.scenarios.checks.check_verdict import Check, NotJudgedError, Since, Violation
+from gridpeers.scenarios.checks.check_verdict import Check, NotJudgedError, Since, Violation, WithKilled
 from gridpeers.scenarios.checks.checked_case import CheckedCase, IslandWindow
 from gridpeers.scenarios.results.history import Flags, Floats
 from gridpeers.scenarios.results.metrics import FEWEST, STEADY, Ends, ends_of
@@ -16,31 +16,30 @@ from gridpeers.wire.schema.plausible import Plausible, Unit
 from gridpeers.wire.schema.table_schema import Below
 
 _SETTLING = Plausible("a settling time", 0.0, 3600.0)
+_After = Annotated[
+    float, Unit("s"), _SETTLING, "Shortest time (s) from the event to the end of a window that is judged."
+]
 _RATE = Plausible("a rate", 1e-6, 100.0, above_zero=True)
 
 
-class _WindowCheck(Check):
-    since_s: Since = 0.0
-    """Run time (s) from which on it is judged: the end of the last fault of links or agents, say."""
-
-    def _each_island(
-        self,
-        case: CheckedCase,
-        delay_s: float,
-        judge: Callable[[IslandWindow, Flags], list[Violation] | None],
-        unjudged: str = "no event has a window of more than {:g} s",
-    ) -> Iterator[Violation]:
-        """Judge the islands of all windows, each with its rows from `delay_s` after the event on; None: not judged."""
-        if not case.windows:
-            raise NotJudgedError("the run has no event")
-        judged = 0
-        for part in case.parts:
-            found = judge(part, case.rows_from(part, delay_s, self.since_s))
-            if found is not None:
-                judged += 1
-                yield from found
-        if not judged:
-            raise NotJudgedError(unjudged.format(delay_s))
+def _each_island(
+    case: CheckedCase,
+    delay_s: float,
+    since_s: float,
+    judge: Callable[[IslandWindow, Flags], list[Violation] | None],
+    unjudged: str = "no event has a window of more than {:g} s",
+) -> Iterator[Violation]:
+    """Judge the islands of all windows, each with its rows from `delay_s` after the event on; None: not judged."""
+    if not case.windows:
+        raise NotJudgedError("the run has no event")
+    judged = 0
+    for part in case.parts:
+        found = judge(part, case.rows_from(part, delay_s, since_s))
+        if found is not None:
+            judged += 1
+            yield from found
+    if not judged:
+        raise NotJudgedError(unjudged.format(delay_s))
 
 
 def _worst(
@@ -56,9 +55,10 @@ def _worst(
     return found
 
 
-class Frequency(_WindowCheck):
+class Frequency(Check):
     """Each grid-forming inverter is within a band of nominal frequency some time after each event, and stays there."""
 
+    since_s: Since = 0.0
     band_Hz: Annotated[float, Unit("Hz"), Plausible("a band of frequency", 1e-4, 10.0, above_zero=True)] = 0.01
     """Largest abs(f - f_nom) (Hz): what the paper calls restored."""
     within_s: Annotated[float, Unit("s"), _SETTLING] = 2.0
@@ -76,12 +76,13 @@ class Frequency(_WindowCheck):
                 found.append(Violation(text=text, t=float(history.t[dark][0]), agent=history.inverters[0]))
             return found if late.any() else None
 
-        return self._each_island(case, self.within_s, judge)
+        return _each_island(case, self.within_s, self.since_s, judge)
 
 
-class Voltage(_WindowCheck):
+class Voltage(Check):
     """The terminal voltage of each inverter is within a band some time after each event, and stays there."""
 
+    since_s: Since = 0.0
     low_pu: Annotated[float, Unit("pu"), Plausible("a least voltage", 0.3, 1.2), Below("high_pu")] = 0.88
     """Least voltage (pu of nominal): the end of continuous operation of IEEE 1547-2018."""
     high_pu: Annotated[float, Unit("pu"), Plausible("a greatest voltage", 0.8, 1.5)] = 1.10
@@ -96,60 +97,61 @@ class Voltage(_WindowCheck):
             low = _worst(part, V, (self.low_pu > V) & judged, "V", "pu", self.low_pu, least=True)
             return high + low if late.any() else None
 
-        return self._each_island(case, self.within_s, judge)
+        return _each_island(case, self.within_s, self.since_s, judge)
 
 
-class _Sharing(_WindowCheck):
-    after_s: Annotated[float, Unit("s"), _SETTLING] = 2.0
-    """Shortest time (s) from the event to the end of a window that is judged."""
-    with_killed: bool = True
-    """Whether inverters count whose agents the scenario has killed: they stay at their last set-points."""
-
-    def _unequal(self, case: CheckedCase, index: str, limit: float) -> Iterator[Violation]:
-        def judge(part: IslandWindow, late: Flags) -> list[Violation] | None:
-            history, plates = part.history, part.nameplates
-            end = late & ends_of(history.t, part.window.start, part.window.end).steady
-            shares = history.present & plates.shares & ~case.at_limit(part)
-            shares = (shares if self.with_killed else shares & ~case.killed(history))[end]
-            if part.fed or not end.any() or not (shares.sum(axis=1) >= 2).all():
-                return None
-            power, m = (history.P, plates.m_p) if index == "MPSI" else (history.Q, plates.m_q)
-            x, s = power[end], plates.s
-            total, rated = np.where(shares, x, 0.0).sum(axis=1), np.where(shares, s, 0.0).sum(axis=1)
-            if (np.abs(total) / rated).mean() < NO_LOAD:
-                return None
-            found = float(np.nanmean(sharing_index(x, s, m, shares)))
-            equal = total.sum() / np.where(shares, s / m, 0.0).sum()
-            far = int(np.abs(np.where(shares, m * x / s - equal, 0.0)).sum(axis=0).argmax())
-            return [part.violation(f"{index}, {part.label}", far, found, limit)] if found > limit else []
-
-        nothing = "no island of two inverters shares anything {:g} s after an event"
-        return self._each_island(case, self.after_s, judge, nothing)
-
-
-class PowerSharing(_Sharing):
+class PowerSharing(Check):
     """At the end of each window, the inverters of an island deliver equal real power per unit of their ratings."""
 
+    since_s: Since = 0.0
+    after_s: _After = 2.0
+    with_killed: WithKilled = True
     limit: Annotated[float, Plausible("a sharing index", 1e-4, 2.0, above_zero=True)] = 0.01
     """Largest MPSI, (16): what the paper calls shared."""
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
-        return self._unequal(case, "MPSI", self.limit)
+        return _unequal(self, case, "MPSI")
 
 
-class VarSharing(_Sharing):
+class VarSharing(Check):
     """At the end of each window, the inverters of an island deliver equal vars per unit of their ratings."""
 
+    since_s: Since = 0.0
+    after_s: _After = 2.0
+    with_killed: WithKilled = True
     limit: Annotated[float, Plausible("a sharing index", 1e-4, 2.0, above_zero=True)] = 0.2
     """Largest MQSI, (17): a fifth of what islanding leaves without coordination, as in the paper."""
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
-        return self._unequal(case, "MQSI", self.limit)
+        return _unequal(self, case, "MQSI")
 
 
-class SteadyEnd(_WindowCheck):
+def _unequal(check: PowerSharing | VarSharing, case: CheckedCase, index: str) -> Iterator[Violation]:
+    def judge(part: IslandWindow, late: Flags) -> list[Violation] | None:
+        history, plates = part.history, part.nameplates
+        end = late & ends_of(history.t, part.window.start, part.window.end).steady
+        shares = history.present & plates.shares & ~case.at_limit(part)
+        shares = (shares if check.with_killed else shares & ~case.killed(history))[end]
+        if part.fed or not end.any() or not (shares.sum(axis=1) >= 2).all():
+            return None
+        power, m = (history.P, plates.m_p) if index == "MPSI" else (history.Q, plates.m_q)
+        x, s = power[end], plates.s
+        total, rated = np.where(shares, x, 0.0).sum(axis=1), np.where(shares, s, 0.0).sum(axis=1)
+        if (np.abs(total) / rated).mean() < NO_LOAD:
+            return None
+        found = float(np.nanmean(sharing_index(x, s, m, shares)))
+        equal = total.sum() / np.where(shares, s / m, 0.0).sum()
+        far = int(np.abs(np.where(shares, m * x / s - equal, 0.0)).sum(axis=0).argmax())
+        return [part.violation(f"{index}, {part.label}", far, found, check.limit)] if found > check.limit else []
+
+    nothing = "no island of two inverters shares anything {:g} s after an event"
+    return _each_island(case, check.after_s, check.since_s, judge, nothing)
+
+
+class SteadyEnd(Check):
     """At the end of each window, frequency, power and voltage of every inverter stand still: they can be measured."""
 
+    since_s: Since = 0.0
     f_Hz_per_s: Annotated[float, Unit("Hz/s"), _RATE] = 0.05
     """Fastest change of a grid-forming inverter's frequency (Hz/s) between the means of the last two parts of 0.2 s:
     that of `docs/results.md`, as the next two."""
@@ -157,8 +159,7 @@ class SteadyEnd(_WindowCheck):
     """Fastest change of real power (pu of rating per s)."""
     V_pu_per_s: Annotated[float, Unit("pu/s"), _RATE] = 0.005
     """Fastest change of the terminal voltage (pu of nominal per s)."""
-    after_s: Annotated[float, Unit("s"), _SETTLING] = 2.0
-    """Shortest time (s) from the event to the end of a window that is judged."""
+    after_s: _After = 2.0
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
         def judge(part: IslandWindow, late: Flags) -> list[Violation] | None:
@@ -173,7 +174,7 @@ class SteadyEnd(_WindowCheck):
                 *_fastest(part, ends, history.V / plates.V_nom, there, "V", "pu/s", self.V_pu_per_s),
             ]
 
-        return self._each_island(case, self.after_s, judge)
+        return _each_island(case, self.after_s, self.since_s, judge)
 
 
 def _fastest(
