@@ -11,7 +11,7 @@ from gridpeers.scenarios.checks.check_verdict import Check, NotJudgedError, Sinc
 from gridpeers.scenarios.checks.checked_case import CheckedCase, IslandWindow
 from gridpeers.scenarios.results.history import Flags, Floats
 from gridpeers.scenarios.results.metrics import FEWEST, STEADY, Ends, ends_of
-from gridpeers.scenarios.results.sharing_index import NO_LOAD, sharing_index
+from gridpeers.scenarios.results.sharing_index import NO_LOAD, sharing_index, total_load
 from gridpeers.wire.schema.plausible import Plausible, Unit
 from gridpeers.wire.schema.table_schema import Below
 
@@ -136,11 +136,10 @@ def _unequal(check: PowerSharing | VarSharing, case: CheckedCase, index: str) ->
             return None
         power, m = (history.P, plates.m_p) if index == "MPSI" else (history.Q, plates.m_q)
         x, s = power[end], plates.s
-        total, rated = np.where(shares, x, 0.0).sum(axis=1), np.where(shares, s, 0.0).sum(axis=1)
-        if (np.abs(total) / rated).mean() < NO_LOAD:
+        if total_load(x, s, shares).mean() < NO_LOAD:
             return None
         found = float(np.nanmean(sharing_index(x, s, m, shares)))
-        equal = total.sum() / np.where(shares, s / m, 0.0).sum()
+        equal = np.where(shares, x, 0.0).sum() / np.where(shares, s / m, 0.0).sum()
         far = int(np.abs(np.where(shares, m * x / s - equal, 0.0)).sum(axis=0).argmax())
         return [part.violation(f"{index}, {part.label}", far, found, check.limit)] if found > check.limit else []
 

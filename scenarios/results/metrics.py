@@ -20,7 +20,7 @@ import numpy as np
 
 from gridpeers.scenarios.results.history import Flags, Floats, History, Nameplates, Window
 from gridpeers.scenarios.results.metric import DIGITS, UNITS, Measure
-from gridpeers.scenarios.results.sharing_index import NO_LOAD, mean_over, sharing_index
+from gridpeers.scenarios.results.sharing_index import NO_LOAD, mean_over, sharing_index, total_load
 
 F_BAND, MPSI_BAND = 0.01, 0.01  # Frequency (Hz) and MPSI below which a microgrid counts as restored
 LOAD_BAND = 0.02  # Part of the steady total real power within which the load counts as taken over
@@ -76,7 +76,7 @@ SHARING = ("MPSI", "MQSI", "t_restore_s", "t_share_s")
 """Measures of sharing. They mean nothing over several islands at once, as each island shares for itself."""
 
 SHARING_OF_ISLANDS = tuple(each.name for each in fields(Steady) if each.name in SHARING)
-"""Those of them that each island has instead: its steady values."""
+"""Measures of sharing among the steady values: where there are several islands, each has its own."""
 
 
 def mean_voltage(history: History, nameplates: Nameplates) -> Floats:
@@ -158,10 +158,9 @@ def _idle(x: Floats, nameplates: Nameplates, ends: Ends, present: Flags) -> str:
     """Return why a share of x (W or var) means nothing: there is next to nothing to share. "" where there is."""
     rows = ends.steady
     if not rows.any() or not present[rows].any(axis=1).all():
-        return ""  # dead, or without rows: told as that
-    total = np.abs(np.where(present, x, 0.0).sum(axis=1))[rows]
-    rated = np.where(present, nameplates.s, 0.0).sum(axis=1)[rows]
-    return f"nothing shared: the total is below {NO_LOAD:.1%} of the ratings" if _mean(total / rated) < NO_LOAD else ""
+        return ""  # `reason` says that nobody is present, or that there are no rows
+    load = _mean(total_load(x[rows], nameplates.s, present[rows]))
+    return f"nothing shared: the total is below {NO_LOAD:.1%} of the ratings" if load < NO_LOAD else ""
 
 
 def _mean(x: Floats) -> float:
@@ -204,7 +203,7 @@ class Ends(NamedTuple):
     """Time (s) between the middles of the last two parts."""
     last: Flags
     before: Flags
-    """Rows of the part before it."""
+    """Rows of the part before `last`."""
     steady: Flags
     """Rows over which steady values are means: the last `STEADY`."""
 

@@ -37,6 +37,13 @@ def sharing_index(x: Floats, s: Floats, m: Floats, present: Flags | None = None)
     return index
 
 
+def total_load(x: Floats, s: Floats, present: Flags) -> Floats:
+    """Return abs(total x) of the inverters present in each row, as a part of their ratings s; nan without any."""
+    total: Floats = np.abs(np.where(present, x, 0.0).sum(axis=1))
+    rated: Floats = np.where(present, s, 0.0).sum(axis=1)
+    return total / np.where(rated > 0.0, rated, np.nan)
+
+
 def mean_over(x: Floats, present: Flags) -> Floats:
     """Return the mean of each row over the inverters that are present in it; nan where there are none."""
     count = present.sum(axis=1)

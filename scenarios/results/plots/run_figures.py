@@ -37,7 +37,7 @@ from gridpeers.scenarios.results.plots.style import (
     stacked_styles,
     time_axis,
 )
-from gridpeers.scenarios.results.sharing_index import NO_LOAD
+from gridpeers.scenarios.results.sharing_index import NO_LOAD, total_load
 from gridpeers.wire.wording import suggestion
 
 WIDTH = 7.4  # Width of a page (inches)
@@ -106,9 +106,8 @@ def _where_shared(index: RowMeasure, power: str) -> RowMeasure:
 
     def measure(history: History, nameplates: Nameplates) -> Floats:
         sharing = history.present & nameplates.shares
-        total = np.abs(np.where(sharing, getattr(history, power), 0.0).sum(axis=1))
-        rated = np.where(sharing, nameplates.s, 0.0).sum(axis=1)
-        return np.where(total < NO_LOAD * rated, np.nan, index(history, nameplates))
+        load = total_load(getattr(history, power), nameplates.s, sharing)
+        return np.where(load < NO_LOAD, np.nan, index(history, nameplates))
 
     return measure
 
