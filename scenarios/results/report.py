@@ -6,7 +6,6 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import groupby
 from typing import NamedTuple
 
 from rich.console import Console, RenderableType
@@ -45,8 +44,10 @@ def folded(grid: Grid, width: int) -> Iterator[Grid]:
         for column in zip(grid.header, *grid.rows, strict=True)
     ]
     parts: list[list[int]] = []
-    for _, event in groupby(range(1, len(grid.header)), lambda i: grid.header[i].partition("\n")[0]):
-        columns = list(event)
+    events: dict[str, list[int]] = {}  # a metric that only a later case has comes last in the header
+    for i, text in enumerate(grid.header[1:], 1):
+        events.setdefault(text.partition("\n")[0], []).append(i)
+    for columns in events.values():
         if parts and sum(widths[i] for i in (0, *parts[-1], *columns)) <= width:
             parts[-1] += columns
         else:

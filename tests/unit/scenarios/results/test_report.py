@@ -14,7 +14,7 @@ from gridpeers.scenarios.results.claims import NO_BENCHMARK, judge
 from gridpeers.scenarios.results.findings import Findings
 from gridpeers.scenarios.results.metrics import Steady
 from gridpeers.scenarios.results.metrics_file import RunMetrics, metrics_json
-from gridpeers.scenarios.results.report import RunReport, plain, show
+from gridpeers.scenarios.results.report import Grid, RunReport, folded, plain, show
 from gridpeers.scenarios.schema import load_scenario
 
 
@@ -55,6 +55,14 @@ def test_ours_stand_beside_the_papers() -> None:
     assert "I no control" in text
     assert "PASS" in text
     assert text.endswith("Results: runs/islanding/x/\n")
+
+
+def test_the_columns_of_an_event_stay_together_though_only_a_later_case_has_one_of_them() -> None:
+    grid = Grid("", ("case", "a\nf", "b\nf", "a\ng"), (("I", "1", "2", ""), ("II", "1", "2", "3")))
+
+    (part,) = folded(grid, 80)
+
+    assert part.header == ("case", "a\nf", "a\ng", "b\nf")
 
 
 def test_a_number_that_is_off_is_marked_and_fails() -> None:
