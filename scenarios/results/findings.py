@@ -110,8 +110,9 @@ def find(scenario: ScenarioModel, feeder: Feeder, cases: Mapping[str, CaseRecord
         for window in record.windows:
             history = within if window.end <= scenario.time.end_s else record.history
             at_end = islands_at_end(intervals, window)
+            inside = window.cut(history)
             parts = {
-                name: measure(*part_of(window.cut(history), nameplates, island.inverters), window, feeder.f_nom)
+                name: measure(*part_of(inside, nameplates, island.inverters), window, feeder.f_nom)
                 for name, island in at_end.items()
                 if len(at_end) > 1
             }
