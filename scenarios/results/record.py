@@ -196,7 +196,8 @@ class Recorder:
         if self._recording is not None:
             self._recording.close()
         if self._folder is not None and self._file is not None and not self._finished:
-            with contextlib.suppress(OSError):  # of a full disk: what is in the file stays, and the writer reported it
+            # On a full disk both may fail: what is in the files stays, and the caller has the first error already.
+            with contextlib.suppress(OSError):
                 self._file.close()
             with contextlib.suppress(OSError):
                 self._write_events(self._folder)
