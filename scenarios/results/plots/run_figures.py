@@ -57,7 +57,7 @@ PAIR: tuple[Style, Style] = (("#0072b2", "-", 2.2), ("#d55e00", (0, (4, 2)), 1.6
 P_LABEL = "P (pu of rating)"
 
 
-class Curve(NamedTuple):
+class PanelCurve(NamedTuple):
     t: Floats
     y: Floats
     style: Style
@@ -68,7 +68,7 @@ class Panel(NamedTuple):
     title: str
     label: str
     """Label of the axis, with the unit."""
-    curves: Sequence[Curve]
+    curves: Sequence[PanelCurve]
     nominal: float | None = None
     """Value at which the axis has a line."""
     bounds: Bounds | None = None
@@ -157,11 +157,11 @@ def measured(drawing: Drawing, case: str, name: str) -> Floats:
     return worst(measure.of_row, nominal, intervals, drawing.histories[case], nameplates)
 
 
-def _case_curves(drawing: Drawing, values: Callable[[str, History], Floats]) -> list[Curve]:
+def _case_curves(drawing: Drawing, values: Callable[[str, History], Floats]) -> list[PanelCurve]:
     """Return a curve for each case; the later ones lie on top."""
     styles = stacked_styles(len(drawing.histories))
     return [
-        Curve(history.t, values(case, history), style, drawing.words(case))
+        PanelCurve(history.t, values(case, history), style, drawing.words(case))
         for (case, history), style in zip(drawing.histories.items(), styles, strict=True)
     ]
 
@@ -199,13 +199,13 @@ def plug_and_play(drawing: Drawing) -> Figure:
     rows: list[list[Panel]] = [[], [], []]
     for number, (case, history) in enumerate(drawing.histories.items()):
         shares = (history.P / nameplates.s).T
-        powers = [Curve(history.t, *each) for each in zip(shares, styles, nameplates.names, strict=True)]
+        powers = [PanelCurve(history.t, *each) for each in zip(shares, styles, nameplates.names, strict=True)]
         labels = (P_LABEL, "f, mean of the GFM (Hz)", "mean V (pu)") if number == 0 else ("", "", "")
         f, V = (of(history, nameplates) for of in (metrics.mean_frequency, metrics.mean_voltage))
         style = stacked_styles(len(drawing.histories))[number]
         rows[0].append(Panel(_case_title(drawing, case), labels[0], powers))
-        rows[1].append(Panel("", labels[1], [Curve(history.t, f, style, case)], drawing.f_nom))
-        rows[2].append(Panel("", labels[2], [Curve(history.t, V, style, case)]))
+        rows[1].append(Panel("", labels[1], [PanelCurve(history.t, f, style, case)], drawing.f_nom))
+        rows[2].append(Panel("", labels[2], [PanelCurve(history.t, V, style, case)]))
     figure, grid = _page(drawing, rows, (max(3.7 * len(drawing.histories), 5.2), 5.4), sharey="row")
     movers = ", ".join(name for name, stay in zip(nameplates.names, stays, strict=True) if not stay)
     words = {MOVER: movers, STAYERS[True]: "grid-forming", STAYERS[False]: "grid-following"}
@@ -231,7 +231,7 @@ def powers(drawing: Drawing, *, GFM: bool) -> Figure:
         for number, i in enumerate(chosen):
             again, of = divmod(number, len(STYLES))  # more inverters than colours: those of a later round dashed
             style = (STYLES[of][0], ROUNDS[again % len(ROUNDS)], widths[number])
-            curves.append(Curve(history.t, history.P[:, i] / nameplates.s[i], style, nameplates.names[i]))
+            curves.append(PanelCurve(history.t, history.P[:, i] / nameplates.s[i], style, nameplates.names[i]))
         _fill(axes, Panel(_case_title(drawing, case), "" if place % columns else P_LABEL, curves))
         time_axis(axes, drawing)
         mark_events(axes, drawing, labelled=True)
@@ -283,7 +283,7 @@ def _keep_in_view(axes: Axes, drawing: Drawing) -> None:
 def microgrids(drawing: Drawing, case: str) -> Figure:
     """Draw P and Q in total, f and mean V over time of each part that is an island when there are most."""
     islands = drawing.most_islands(case).values()
-    of: list[list[Curve]] = [[], [], [], []]
+    of: list[list[PanelCurve]] = [[], [], [], []]
     for island, style in zip(islands, stacked_styles(len(islands)), strict=True):
         history, nameplates = part_of(drawing.histories[case], drawing.nameplates, island.inverters)
         for curves, y in zip(
@@ -296,7 +296,7 @@ def microgrids(drawing: Drawing, case: str) -> Figure:
             ),
             strict=True,
         ):
-            curves.append(Curve(history.t, y, style, drawing.island_title(island)))
+            curves.append(PanelCurve(history.t, y, style, drawing.island_title(island)))
     top = [Panel("Real power", "P in total (kW)", of[0]), Panel("Reactive power", "Q in total (kvar)", of[1])]
     bottom = [
         Panel("Frequency", "mean of its GFM, f (Hz)", of[2], drawing.f_nom),
@@ -322,7 +322,7 @@ def comparison(pairs: Sequence[tuple[str, Mapping[str, Drawing]]]) -> Figure:
                 measure, curves = MEASURES[name], []
                 for (run, drawing), style in zip(drawings.items(), PAIR, strict=True):
                     ((case, history),) = drawing.histories.items()
-                    curves.append(Curve(history.t, measured(drawing, case, name), style, run))
+                    curves.append(PanelCurve(history.t, measured(drawing, case, name), style, run))
                 title = f"{words}: {measure.title}" if words else measure.title
                 label = measure.island_label if name == "frequency" else measure.label
                 _fill(axes, Panel(title, label, curves, bounds=measure.bounds))
