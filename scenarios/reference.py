@@ -97,9 +97,8 @@ def _written_in(cls: type) -> dict[str, tuple[str, str]]:
     found: dict[str, tuple[str, str]] = {}
     for statement, after in zip(definition.body, [*definition.body[1:], None], strict=True):
         if isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name):
-            is_text = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
-            text = _one_line(after.value.value) if is_text else ""  # type: ignore[union-attr]
-            found[statement.target.id] = ast.unparse(statement.annotation), text
+            text = after.value.value if isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant) else ""
+            found[statement.target.id] = ast.unparse(statement.annotation), _one_line(text)
     return found
 
 

@@ -18,7 +18,7 @@ from typing import Any, cast
 
 import lz4.frame  # noqa: F401  # without these two mcap fails at the first chunk
 import msgspec
-import zstandard  # noqa: F401
+import zstandard  # noqa: F401  # as lz4.frame
 from mcap.data_stream import RecordBuilder
 from mcap.records import ChunkIndex
 from mcap.writer import CompressionType, Writer
@@ -125,7 +125,8 @@ class RecordWriter:
         # LZ4 takes a third of the time and half as much room again: beside a run in one process that time counts.
         compression = CompressionType.LZ4 if info.driver == "inprocess" else CompressionType.ZSTD
         self._writer = Writer(cast("Any", self._file), chunk_size=2 * CHUNK, compression=compression)
-        # the one place where a run of days would grow: should the library name it otherwise, a test tells
+        # mcap has no public way to keep the index out of memory, where that of a run of days grows; a test fails if the
+        # library renames it
         self._writer._Writer__chunk_indices = self._index  # type: ignore[attr-defined,unused-ignore]  # noqa: SLF001
         self._writer.start(profile=PROFILE, library=f"gridpeers {info.versions.get('gridpeers', '')}".strip())
         self._writer.add_metadata(METADATA, info.to_metadata())

@@ -107,7 +107,8 @@ def measured(metrics: Sequence[tuple[str, Callable[[WindowData], Any]]], data: W
 def metric_of(plugin: Plugin) -> Callable[[WindowData], Any]:
     """Return a metric; one that cannot be made fails in every window."""
     try:
-        return made(METRICS, plugin)  # type: ignore[no-any-return]
+        metric: Callable[[WindowData], Any] = made(METRICS, plugin)
+        return metric
     except ValueError as error:
         kept = error
 
