@@ -33,7 +33,7 @@ SPEEDS = (0.1, 50.0)
 
 
 Other = LinkReport | Journal | LinkRequest
-"""What a driver gives its recorder beside telemetry, if the configurations ask for it."""
+"""Messages that a driver gives its recorder beside telemetry, if the configurations ask for them."""
 
 Driver = Literal["processes", "inprocess"]
 """Driver of a case: one process per agent over Zenoh, or all in this process."""

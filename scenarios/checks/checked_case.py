@@ -146,7 +146,7 @@ class CheckedCase:
         return found
 
     def at_limit(self, part: IslandWindow) -> Flags:
-        """Return which inverters of an island deliver all power that an event left them, by row; shape (T, N)."""
+        """Return which inverters of an island deliver all power that an event limits them to, by row; shape (T, N)."""
         names = part.history.inverters
         found: Flags = np.zeros(part.history.P.shape, bool)
         for limit in limits_of(self.scenario, self.case):  # in the order of time: a later one replaces an earlier one

@@ -141,7 +141,7 @@ class EmulatedLinks:
         self._receiver = Receiver(self._name, config.netem, config.microgrids, keep_trace=config.keep_trace)
         self._schedules = LinkSchedules(config.netem, config.microgrids)
         self._lies.clear()
-        self._liars = {  # senders about whom lies are told here at some time
+        self._liars = {  # senders whose states are lies here at some time
             src: LiveHearing(HeardFrom(config.netem.seed, src, self._name, lies))
             for src in self._senders
             if (lies := lies_about(config.netem, src, self._name))

@@ -1,4 +1,4 @@
-"""What travels of emulated links: the configuration that processes start with, reports for the record, their status."""
+"""Data of emulated links that processes exchange: their configuration, reports for the record, and their status."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ class FeederMap(msgspec.Struct, frozen=True):
     source: int = -1
     """Number of the substation's bus; -1 if there is none."""
     to_scale: bool = True
-    """Whether both axes have the same unit: not if the places are those of a tree."""
+    """True if both axes have the same unit; False if the places are those of a tree."""
     scenario: str = ""
     """Name of the scenario that runs; empty of a diagram of a feeder alone."""
     case: str = ""

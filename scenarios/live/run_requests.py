@@ -66,7 +66,7 @@ def request(
     wait: float = ANSWER,
     **command_fields: Any,
 ) -> tuple[Answer, dict[str, LinkAcknowledgement]]:
-    """Give the plant a command; return its answer, and those that come in time of the receivers that follow from it.
+    """Give the plant a command; return its answer, and those of its `receivers` that come in time.
 
     The command has a number that nobody else knows, which the plant repeats: anybody may have answers sent here.
     Acknowledgements have the number that the plant's answer names. A question is asked again until its answer comes.

@@ -28,8 +28,8 @@ INSTANT = 1e-6  # Run time (s) far below any control period
 class JournalCoverage:
     """Follow the parts of one journal by their numbers, and find where some are lost.
 
-    Parts of a periodic one come all the time, as of an agent with emulated links. Of another, one comes with each
-    change, and says nothing about the time since the one before.
+    A periodic journal, such as that of an agent with emulated links, has parts all the time. Any other has one with
+    each change, which says nothing about the time since the part before.
     """
 
     def __init__(self, *, periodic: bool) -> None:
@@ -39,16 +39,16 @@ class JournalCoverage:
         """Run time of the last part (s)."""
         self._span: Callable[[], Hole | None] = lambda: None
         self._since: float | None = None
-        """Since when (s) parts are lost, as far as none has come that tells how it went on."""
+        """Run time (s) since which parts are lost; None once a later part says how the agent decided."""
         self._gaps: list[Hole] = []
 
     @property
     def known_until(self) -> float:
-        """Run time (s) behind which nothing is known: parts of a run that goes on, or was killed, are still missing."""
+        """Run time (s) after which nothing is known: a run that goes on, or was killed, lacks its last parts."""
         return self._t if self._periodic else inf
 
     def take(self, journal: Journal, span: Callable[[], Hole | None]) -> None:
-        """Take the next part; `span`, asked beside a lost part, gives the run times (s) of which it tells all."""
+        """Take the next part; `span`, called only next to a lost part, returns the run times (s) that it covers."""
         restarted = journal.epoch != self._epoch
         if not restarted and journal.seq <= self._number:
             return  # published again
@@ -83,7 +83,7 @@ class DecisionEntries:
         self._simulated = self._info.simulated
         self._parts = 0
         self._places: dict[str, tuple[list[int], list[int]]] = {}
-        """Of each agent: first ticks of the parts that have entries of it, and these parts."""
+        """By agent: the first tick of each part that has entries of it, and the numbers of these parts."""
         self._coverage: dict[str, JournalCoverage] = {}
         self._holes: dict[str, Sequence[Hole]] = {}
         self._in_part = lru_cache(maxsize=64)(self._read_part)
@@ -160,8 +160,8 @@ class DecisionEntries:
         self._parts = self._index.parts
 
     def _span(self, journal: Journal, first: int | None) -> Hole | None:
-        """Return the first and the last run time (s) of which a part of a journal tells; None if it tells nothing."""
-        if not self._simulated:  # each entry tells all by itself
+        """Return the first and the last run time (s) that a part of a journal covers; None if it covers none."""
+        if not self._simulated:  # each entry is complete by itself
             return journal.t, journal.t
         T_c = self._info.T_c
         if journal.sender != PLANT:  # the last entry holds on

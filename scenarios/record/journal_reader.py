@@ -55,7 +55,7 @@ def _whole_entries(data: bytes) -> Sequence[Entry]:
 
 
 def _raw_entries(data: bytes, note_damage: Callable[[ValueError], None] | None) -> Iterator[Any]:
-    """Yield what follows each other in the data of a journal: any msgpack values, which `_entry_of` checks."""
+    """Yield the msgpack values in the data of a journal, whatever they are; `_entry_of` checks them."""
     most, end = LONGEST_MESSAGE, 0
     unpacker = msgpack.Unpacker(max_buffer_size=most, max_array_len=most, max_map_len=most, strict_map_key=False)
     try:
@@ -109,7 +109,7 @@ def message_of(
 
 
 def values_of(payload: bytes) -> dict[str, Any]:
-    """Return what a payload says, whether a receiver would take it or not; empty if it is no msgpack map.
+    """Return the values in a payload, also in one that no receiver would take; empty if it is no msgpack map.
 
     It reads messages of later versions and of other people's agents, and those that a link has corrupted.
     """

@@ -97,7 +97,7 @@ class MessageIndex:
         return len(self._ends)
 
     def _note_parts(self) -> None:
-        for _, until in self.file.spans[len(self._ends) :]:  # they rise, should a part hold late entries alone
+        for _, until in self.file.spans[len(self._ends) :]:  # a part may have late entries alone; the ends must rise
             self._ends.append(max(until, self._ends[-1]) if self._ends else until)
 
     def note_damage(self, text: str) -> None:

@@ -68,7 +68,7 @@ class RecordFile:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.complete = False
-        """Whether the file was closed properly: everything that was recorded is in it."""
+        """True if the file was closed properly: everything that was recorded is in it."""
         self._damage: list[str] = []
         self.holes: list[tuple[float, float]] = []
         """Run times (s) of the first and the last message of each chunk that turned out to be damaged."""
@@ -114,7 +114,7 @@ class RecordFile:
             yield from (message for message in self.part(index) if topics is None or message.topic in topics)
 
     def part(self, index: int) -> tuple[RecordMessage, ...]:
-        """Return the messages of one of `spans`; none if it is damaged, which `damage` then tells."""
+        """Return the messages of one of `spans`; none if it is damaged: `damage` says so then."""
         # not an lru_cache of a method: in a cycle with its file it would stay in memory long after
         messages = self._recent.pop(index) if index in self._recent else self._load_chunk(index)
         self._recent[index] = messages

@@ -1,4 +1,4 @@
-"""The measures of a run from its record alone: as its report has them; of a run that was killed, up to its end."""
+"""The measures of a run from its record alone, as in its report; those of a killed run end with its record."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ BEHIND = 64_000_000
 
 
 class _WholeWrites:
-    """A file to which all that was written since the last flush goes at once, or none of it."""
+    """A file that takes all that was written since the last flush at once, or none of it."""
 
     def __init__(self, path: Path) -> None:
         self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
@@ -206,7 +206,7 @@ class RecordWriter:
 
     def _sync_all(self, descriptor: int) -> None:
         """Have the disk keep what is written against a loss of power; the writer does not wait for a busy disk."""
-        with contextlib.suppress(OSError):  # of a full disk, which the writer tells
+        with contextlib.suppress(OSError):  # of a full disk, which the writer reports
             while not self._closed.wait(SYNC):
                 os.fsync(descriptor)
         os.close(descriptor)

@@ -66,7 +66,7 @@ class RecordedDecision:
     """Agents of the run that the graph makes in-neighbours, but that were not there: not started, gone, or not met."""
     before: tuple[float, float]
     restarted: bool
-    """Whether the agent started, or started again after a pause, from the set-points of its measurement."""
+    """True if the agent started, or started again after a pause, from the set-points of its measurement."""
     saturated: tuple[int, int]
     """Saturated sides of P and V: 1, -1 or 0; see `gridpeers.agents.laws.law.Own`."""
     action: Action
@@ -74,7 +74,7 @@ class RecordedDecision:
 
     @property
     def is_whole(self) -> bool:
-        """Whether the record has all states that the agent used: at its end it may lack some, if it is cut off."""
+        """True if the record has all states that the agent used: a record that is cut off may lack the last ones."""
         return all(each.state is not None for each in self.neighbours if each.number is not None and not each.unused)
 
     @property

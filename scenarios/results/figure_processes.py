@@ -47,7 +47,7 @@ def drawn_on_all_cores(drawing: Drawing, folder: Path) -> Iterator[None]:
         for process in started:
             process.send_signal(signal.SIGKILL)
             process.wait()
-            with suppress(BrokenPipeError):  # of what it never read
+            with suppress(BrokenPipeError):  # it has not read everything
                 process.stdin.close()
         for unfinished in folder.glob(".*.png"):
             unfinished.unlink(missing_ok=True)
@@ -62,7 +62,7 @@ def _start(started: list[ForkedProcess], drawing: Drawing, folder: Path, number:
     if number < 2 or server is None:
         return False
     try:
-        with Path(os.devnull).open("wb") as log:  # what went wrong is said by the process that draws again
+        with Path(os.devnull).open("wb") as log:  # the process that draws again says what went wrong
             started += [server.fork([MODULE], log, speaks=False) for _ in range(number)]
         for first, process in enumerate(started):
             process.stdin.write(pickle.dumps((drawing, folder, first, number)))

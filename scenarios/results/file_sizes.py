@@ -21,7 +21,7 @@ from gridpeers.wire.messages import PLANT
 NUMBER = 18  # Bytes of a number in history.csv with its comma: 17.5 measured over 600 s of islanding
 
 VERDICT, VERDICT_UNDER_WAY = 36, 26
-"""Bytes of a message's row in links.csv, and in the file of the case that gives way to it."""
+"""Bytes of a message's row in links.csv, and in the file that keeps it while the case runs."""
 
 RECORDED_NUMBER = 6
 """Bytes of a number of telemetry in run.mcap, compressed: 5.2 to 7.5 measured with the rows for viewers."""
@@ -33,8 +33,8 @@ process) and 135 measured."""
 RECORDED_ARRIVAL, RECORDED_VERDICT = 9, 8
 """Bytes of a message that arrives in wall-clock time, and of a verdict of an emulated link: 7.7 and 3 to 9 found."""
 
-LONG = 20_000_000  # Bytes from which on a run's size is told before its start
-HOUR = 3600.0  # Run time (s) for which the size of a live run without an end is told
+LONG = 20_000_000  # Bytes from which on a run says its size before it starts
+HOUR = 3600.0  # Run time (s) for which a live run without an end says its size
 
 MB = 1e6
 

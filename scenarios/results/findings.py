@@ -36,7 +36,7 @@ class Findings:
     settled: Mapping[str, Mapping[str, Settling]] = field(default_factory=dict)
     """Settling by case and event."""
     islands: Mapping[str, Mapping[str, Mapping[str, Steady]]] = field(default_factory=dict)
-    """Steady values of each island at the end of a window, by case, event and its first inverter; where several are."""
+    """Steady values of each island at the end of a window, by case, event and its first inverter; only of several."""
     available: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     """Available power at the end, by case and inverter (pu of rating); only where it was changed."""
     without_agent: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
@@ -51,7 +51,7 @@ class Findings:
         return self.islands.get(case, {}).get(event, {})
 
     def parts(self, case: str, event: str) -> dict[str, Steady]:
-        """Return the steady values of a window, and of each island beside by ", island of NAME"."""
+        """Return the steady values of a window by "", and those of its islands, if several, by ", island of NAME"."""
         islands = {f", island of {name}": steady for name, steady in self.apart(case, event).items()}
         return {"": self.results[case][event]} | islands
 

@@ -66,7 +66,7 @@ class Island(NamedTuple):
     inverters: tuple[str, ...]
     """Inverters at its buses, in the order of the history's columns; one that has left is still counted."""
     fed: bool
-    """Whether the substation is part of it."""
+    """True if the substation is part of it."""
 
 
 Islands = Mapping[str, Island]  # Islands by name: that of the first inverter

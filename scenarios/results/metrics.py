@@ -209,7 +209,7 @@ class Ends(NamedTuple):
 
 
 def ends_of(t: Floats, start: float, end: float) -> Ends:
-    """Return the rows at the end of a window that lasts from start to end (s) and has rows at the times t (s) alone."""
+    """Return the rows at the end of a window from start to end (s); t has the times (s) of its rows."""
     span = min(STEADY, 0.5 * (end - start))
     last = t >= end - span - 1e-9
     before = ~last & (t >= end - 2.0 * span - 1e-9)

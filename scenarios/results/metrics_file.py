@@ -40,7 +40,7 @@ class RunMetrics:
 
 
 def case_facts(recorded: Recorded, pacing: Pacing | None = None, **more: Any) -> dict[str, Any]:
-    """Return what metrics.json has of a case beside its measures: hashes, `more`, and the pacing (s of wall time)."""
+    """Return the other entries of a case in metrics.json: hashes, `more`, and the pacing (s of wall time)."""
     links = {"links_sha256": recorded.links.sha256} if recorded.links.sha256 else {}
     paced = {} if pacing is None else {"pacing": msgspec.to_builtins(pacing)}
     return {"history_sha256": recorded.sha256} | links | more | paced
@@ -81,7 +81,7 @@ def metrics_json(
 
 
 def _numbers(steady: dict[str, Any]) -> dict[str, Any]:
-    """Return measures that are numbers and steady; beside the reason of others is the mean of the last 0.2 s."""
+    """Return the measures; one that is no number, or not steady, is None. Reasons name the mean of the last 0.2 s."""
     reasons: Mapping[Measure, str] = steady["reasons"]
     finite = {name: x for name, x in steady.items() if isinstance(x, float) and math.isfinite(x)}
     numbers: dict[str, Any] = {

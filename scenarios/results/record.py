@@ -53,7 +53,7 @@ class Recorded(msgspec.Struct, frozen=True, kw_only=True):
     sha256: str
     """Of the bytes of history.csv."""
     reproducible: bool
-    """Whether the same scenario and seed give the same bytes again."""
+    """True if the same scenario and seed give the same bytes again."""
     record_failure: str = ""
     """Sentence on why run.mcap ends early, or is not there; empty if it is whole, or was not asked for."""
 

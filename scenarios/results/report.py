@@ -212,7 +212,7 @@ def _cells(report: RunReport, case: str, event: str, island: str, quantities: tu
 
 
 def _nothing_shared(values: Steady, name: str) -> bool:
-    """Return whether a share means nothing, as there is next to nothing to share: it is never equal then."""
+    """Return True if there is too little power for a sharing index to mean anything."""
     return values.reasons.get(name, "").startswith("nothing shared")
 
 

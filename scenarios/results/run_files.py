@@ -101,17 +101,17 @@ def set_status(folder: Path, status: str) -> None:
 
 
 def set_complete(folder: Path, missing: Iterable[str] = ()) -> None:
-    """Write to status.txt that a run came to its end and has its results, and sentences on what is missing beside."""
+    """Write to status.txt that a run has ended and has its results, with sentences on what is missing."""
     set_status(folder, ": ".join(filter(None, ("complete", "; ".join(missing)))))
 
 
 def is_complete(status: str) -> bool:
-    """Return whether the run of a status came to its end and has its results."""
+    """Return True if a status says that the run has ended and has its results."""
     return status.partition(":")[0] == "complete"
 
 
 def set_broken(folder: Path, why: str) -> None:
-    """Write "broken: why" to status.txt, if need be into the room that it has already; it is no error if none can."""
+    """Write "broken: why" to status.txt, on a full disk over its old text; it is no error if that fails too."""
     with contextlib.suppress(OSError):
         try:
             set_status(folder, f"broken: {why}")
@@ -168,7 +168,7 @@ def shown(folder: Path) -> str:
 
 
 def _made(parent: Path, now: datetime) -> Path:
-    """Make a folder that is named by a time, and return it; a number tells those of one second apart."""
+    """Make a folder that is named by a time, and return it; further ones of the same second have a number too."""
     stem = now.strftime("%Y-%m-%dT%H-%M-%S")
     for number in count(1):
         folder = parent / (stem if number == 1 else f"{stem}-{number}")

@@ -226,13 +226,13 @@ def check_netem(scenario: ScenarioModel, feeder: Feeder | None, problems: Proble
 
 
 def _noted(prefix: str, problems: Problems) -> set[str]:
-    """Return the keys of entries with a problem, seen from a table."""
+    """Return the paths of entries with a problem, within the table of a prefix."""
     entries = tuple(f"{prefix}{list_.key}[" for list_ in LISTS)
     return {path.removeprefix(prefix) for path in problems.paths if path.startswith(entries)}
 
 
 def _place(path: str, common: Netem, case: str) -> str:
-    """Return where an entry is written that stands at a path among all entries of a case."""
+    """Return the path of an entry in the file, given its path among all entries of a case."""
     kind, _, rest = path.partition("[")
     index, _, rest = rest.partition("]")
     before = next(len(getattr(common, list_.name)) for list_ in LISTS if list_.key == kind)

@@ -62,7 +62,7 @@ def judges_laws(scenario: ScenarioModel) -> bool:
 
 
 def with_folders(scenario: ScenarioModel, folder: Path) -> ScenarioModel:
-    """Return the scenario with the folder of all that stands beside its file, so that any process can find it."""
+    """Return the scenario with the folder of each plug-in beside its file, so that any process can find it."""
 
     def change(key: PluginKey, registry: Registry[Any]) -> PluginKey:
         named = _labelled(key, registry) if registry in (METRICS, CHECKS) else key
@@ -243,7 +243,7 @@ def _rosters(scenario: ScenarioModel, feeder: Feeder, case: str) -> Iterator[dic
 
 
 def with_relative_folders(scenario: ScenarioModel, folder: Path) -> ScenarioModel:
-    """Return a checked scenario as it is written into a file that moves together with what stands beside it."""
+    """Return a checked scenario for a file that moves with the plug-ins and feeder beside it, by relative paths."""
     here = folder.resolve()
 
     def change(key: PluginKey, registry: Registry[Any]) -> PluginKey:

@@ -63,7 +63,7 @@ def _lines(
         if default or common_too:
             continue
         where = f"{path}.{_key(field.key)}" if path else _key(field.key)
-        below_terse = terse and INHERITED not in field.marks  # beside a common table, a default is not what is left out
+        below_terse = terse and INHERITED not in field.marks  # left out, it would be the common table's
         if others := field.mark(OtherKeys):
             keys += [f"{_key(key)} = {inline(given)}" for key, given in map(others.write, value)]
         elif INLINE in field.marks:

@@ -37,7 +37,7 @@ def put(tree: Tree, path: str, value: Any) -> None:
 
 
 def remove(tree: Tree, path: str) -> None:
-    """Take a key, a table or an entry out of the tables of a scenario, if it is written; PathError as of `put`."""
+    """Take a key, a table or an entry out of the tables of a scenario, if it is written; PathError as in `put`."""
     way = steps(path)
     node, last = _parent(tree, way, whole=False), way[-1]
     if isinstance(last, int) or last in node:
@@ -62,7 +62,7 @@ def _parent(tree: Tree, way: list[str | int], *, whole: bool) -> Any:
         if following is None:
             break
         if step in ("law", "graph") and isinstance(node.get(step), str):
-            node[step] = {"use": node[step]}  # what is given by its name alone is this table, which takes parameters
+            node[step] = {"use": node[step]}  # a name alone stands for this table, which takes parameters
         node = node[step] if isinstance(step, int) else node.setdefault(step, [] if isinstance(following, int) else {})
     return node
 

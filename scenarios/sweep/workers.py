@@ -1,4 +1,4 @@
-"""Many runs, as of a sweep: in this process, over all cores of this machine, or over a Dask cluster by joblib.
+"""Many runs, such as a sweep's: in this process, over all cores of this machine, or over a Dask cluster by joblib.
 
 Ctrl-C is for the command alone: workers are started with SIGINT blocked, and ended when the command leaves. They write
 nothing to the terminal: a run's error comes as its result.

@@ -39,9 +39,9 @@ class Drawing:
     without_agent: Mapping[str, frozenset[str]] = field(default_factory=dict)
     """Inverters that have no agent, by case: the sharing indices leave them out."""
     moves: bool = False
-    """Whether inverters leave or join, which has a figure of its own."""
+    """True if inverters leave or join: that has a figure of its own."""
     limited: Sequence[str] = ()
-    """Inverters whose available power changes, which has one too."""
+    """Inverters whose available power changes: that has a figure of its own too."""
     island_intervals: Mapping[str, Sequence[IslandInterval]] = field(default_factory=dict)
     """Times with several islands, by case; only of cases that have any. Measures are those of the worst island then."""
     microgrid_of: Mapping[str, str] = field(default_factory=dict)

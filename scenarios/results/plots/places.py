@@ -76,15 +76,15 @@ def _tree(feeder: Feeder) -> dict[str, tuple[float, float]]:
 
 Points = NDArray[np.float64]
 
-WIDTH, HEIGHT = 0.62, 1.2  # Width of a letter and height of a line beside the size of the type, about
+WIDTH, HEIGHT = 0.62, 1.2  # Width of a letter and height of a line, about, in sizes of the type
 
 SIDES = ((1, 1), (1, -1), (-1, 1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1, 0))
 """Sides of a mark on which its label can stand, to the right and upwards, the preferred one first."""
 
-PREFERENCE = 0.05  # Length of line (pt) that a label rather covers than to stand on the next side
+PREFERENCE = 0.05  # Length of covered line (pt) that is as bad as the next side
 
 WORD, MARK = 20.0, 6.0
-"""Length of line (pt) that a label rather covers than a square point of another label, or of a mark."""
+"""Length of covered line (pt) that is as bad as a covered square point of another label, or of a mark."""
 
 
 class Label(NamedTuple):

@@ -74,7 +74,7 @@ class Bounds(NamedTuple):
 def from_zero(axes: Axes, curves: Iterable[Floats], bounds: Bounds) -> None:
     """Start the axis at 0, and let spikes of a few ms at a switching leave the frame instead of flattening the rest.
 
-    A curve that settles beyond the frame is told.
+    A note has the value of a curve that settles beyond the frame.
     """
     finite = [some for curve in curves if (some := curve[np.isfinite(curve)]).size]
     if not finite:
@@ -127,7 +127,7 @@ TextSide = Literal["left", "center", "right"]  # Which part of a text stands at 
 LETTER = 0.056  # Width of a letter of these texts (inches), a little more than the mean of DejaVu Sans at 7 pt
 LONGEST = 20  # Letters of a word that is written whole
 GAP = 0.06  # Least distance between two texts (inches)
-ROUNDING = 1e-9  # By how much less (inches) is no less: an edge at GAP from a text may come out so by the last bit
+ROUNDING = 1e-9  # Tolerance of a distance (inches): rounding may bring an edge at GAP nearer by the last bit
 MOST = 12.0  # Lines in an inch of a frame that leave its curves to be seen
 FRAME = 0.78  # Part of a column of panels that is the frame of one; the rest are its axis and margins
 
@@ -146,7 +146,7 @@ def mark_events(
 ) -> None:
     """Draw a fine line at each event; if labelled, say above the frame what happens, as far as there is room.
 
-    Of so many events that lines would hide the curves, only those have one for whose words there is room.
+    Where the lines of all events would hide the curves, only events whose words have room get a line.
     """
     place, figure = axes.get_subplotspec(), axes.get_figure(root=True)
     assert figure is not None
@@ -188,7 +188,7 @@ def place_texts(marks: Sequence[Mark], inches_per_s: float) -> list[EventText]:
     for each, leftmost in zip(options, first, strict=True):
         found: dict[float, tuple[float, tuple[EventText, ...]]] = {}
         for right, (cost, texts) in best.items():
-            edge = max(right, leftmost - GAP)  # nothing stands further left any more, so these are alike
+            edge = max(right, leftmost - GAP)  # no later text begins further left, so these edges are alike
             for option in each:
                 if option.start >= edge + GAP - ROUNDING:
                     end, total = max(edge, option.end), cost + option.price
