@@ -136,7 +136,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
             notes += [f"case {case}: {one.note}"] if one.note else []
         if saved := cases[case].messages_saved:
             shares = ", ".join(f"{100.0 * share:.0f} % in {window}" for window, share in saved.items())
-            notes.append(f"case {case}: states not told to neighbours: {shares}")
+            notes.append(f"case {case}: states not sent to neighbours: {shares}")
         facts[case] = case_facts(record, pacing.get(case), **unlike)
     write_whole(folder / "metrics.json", metrics_json(request, findings, facts))
     stop = JudgingStop()
@@ -148,7 +148,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
     if request.clock == "wall":
         notes.append("in wall-clock time no two runs are the same: each has its own delays")
     else:
-        why = "something happened in it that the scenario does not tell"
+        why = "something happened in it that the scenario does not have"
         unlike_any = [case for case, one in recorded.items() if not one.reproducible]
         notes += [f"case {case} cannot be reproduced: {why}" for case in unlike_any]
     with ExitStack() as beside:

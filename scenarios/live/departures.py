@@ -63,7 +63,7 @@ class Departures:
             return ""
         lines = self.lines(self.disturbed[-1].end) or ["rows that are missing"]
         names = ", ".join(window.label for window in self.disturbed)
-        return f"{names}: not what the scenario means by it, which does not tell of: {few(lines)}"
+        return f"{names}: disturbed by what the scenario does not have: {few(lines)}"
 
 
 def compare(

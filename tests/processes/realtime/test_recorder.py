@@ -60,7 +60,7 @@ def test_a_recorder_that_stood_still_has_every_row(desk: Desk) -> None:
     times = [float(line.split(",")[0]) for line in (here / "IV" / "history.csv").read_text().splitlines()[1:]]
     assert times == pytest.approx([0.01 * k for k in range(len(times))])
     assert times[-1] >= 8.0
-    command.expect("NOTE  case IV: early.*: not what the scenario means by it, which does not tell of: .* inv3 is sil")
+    command.expect("NOTE  case IV: early.*: disturbed by what the scenario does not have: .* inv3 is sil")
     metrics = json.loads((here / "metrics.json").read_text())
     found = metrics["live"]
     assert "missing" not in found
