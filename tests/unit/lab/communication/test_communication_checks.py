@@ -93,7 +93,7 @@ def test_one_time_that_cannot_be_puts_no_account_off(sound: CheckedCase, monkeyp
 
 @pytest.mark.parametrize("clock", ["simulated", "wall"])
 def test_the_memory_of_a_pass_does_not_grow_with_the_run(sound: CheckedCase, clock: str) -> None:
-    """Twice the run, the same memory but for what waits for its journal: what is done with is forgotten."""
+    """Three times the run, the same memory: what is done with is forgotten."""
     info = sound.content.info
     info = msgspec.structs.replace(info, plant=msgspec.structs.replace(info.plant, clock=clock))
 
@@ -113,4 +113,5 @@ def test_the_memory_of_a_pass_does_not_grow_with_the_run(sound: CheckedCase, clo
         assert sums.finish(0).oldest
         return size
 
-    assert memory(2400) < 1.3 * memory(1200)
+    memory(300)  # makes what is kept for good
+    assert memory(4500) < 1.1 * memory(1500)
