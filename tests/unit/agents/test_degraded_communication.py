@@ -12,11 +12,13 @@ from msgspec.structs import replace
 
 from gridpeers.agents.agent import Agent
 from gridpeers.agents.agent_config import Control, DegradedCommunication, Gains
-from gridpeers.agents.degraded_communication import IslandDetector, SaturationDetector
+from gridpeers.agents.degraded_communication import IslandDetector, SaturationDetector, StalenessWeights, gains_in_force
+from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.sweep.sweep_case import run_one
-from gridpeers.wire.codec import encode
+from gridpeers.wire.codec import decode, encode
 from gridpeers.wire.messages import Measurement, State
+from gridpeers.wire.node import Publish
 from tests.toy.toy_configs import agent_config
 
 T, M_P, M_Q, ALPHA = 0.02, 0.01, 0.05, 1.0
@@ -25,6 +27,7 @@ ROSTER = ("inv1", "inv2", "inv3")
 
 
 def agent(name: str = "inv1", **degraded_communication: Any) -> Agent:
+    """An agent of the toy that knows the two others; inv1 is a leader."""
     control = Control(
         secondary="all", graph="full", degraded_communication=DegradedCommunication(**degraded_communication)
     )
@@ -35,10 +38,12 @@ def agent(name: str = "inv1", **degraded_communication: Any) -> Agent:
 
 
 def state(sender: str, k: int, *, P_set: float = 80e3, Q: float = 10e3) -> State:
+    """State of a neighbour at tick k."""
     return State(sender=sender, epoch=1, seq=k, t=T * k, P_set=P_set, V_set=277.0, Q=Q)
 
 
 def measured(k: int, **changes: Any) -> Measurement:
+    """Measurement in an island at nominal frequency and voltage, on the droop characteristic."""
     values: dict[str, Any] = dict(
         sender="plant", epoch=1, seq=k, t=T * k, to="inv1", P=50e3, Q=0.0, V=277.0, f=60.0, P_set=50e3,
         V_set=277.0, grid_connected=False, island="", roster=ROSTER,
@@ -47,6 +52,7 @@ def measured(k: int, **changes: Any) -> Measurement:
 
 
 def moved(P_set: float, P_bar: float, rate: float) -> float:
+    """P_set (pu) a tick later, at nominal frequency, where `rate` (1/s) is gain times the sum of weights."""
     return P_set + 0.5 * (1.0 - exp(-2.0 * rate * T)) * (P_bar - P_set)
 
 
@@ -65,6 +71,15 @@ def test_a_neighbour_that_sent_nothing_new_is_skipped() -> None:
     assert holds.tick(measured(2), ROSTER[1:]).P_set / 1e5 == pytest.approx(moved(first, 0.7, 2 * KAPPA), rel=1e-12)
 
 
+def test_what_came_while_on_hold_is_not_new_afterwards() -> None:
+    """A tick without the law uses up what has arrived, too."""
+    it = agent(stale="skip")
+    it.hear(state("inv2", 0))
+    it.tick(measured(1, grid_connected=True), ROSTER[1:])
+
+    assert it.tick(measured(2), ROSTER[1:]).P_set == pytest.approx(50e3)
+
+
 def test_a_state_fades_beside_the_usual_age_of_its_own_link() -> None:
     """With "age-weighted" a link that is always 0.1 s late counts in full; one that falls silent fades with T_age."""
     it = agent(stale="age-weighted", T_age=0.1)
@@ -79,6 +94,32 @@ def test_a_state_fades_beside_the_usual_age_of_its_own_link() -> None:
     r = exp(-T / 0.1)
     P = moved(P, (0.8 + r * 0.6) / (1 + r), (1 + r) * KAPPA)
     assert it.tick(measured(8), ROSTER[1:]).P_set / 1e5 == pytest.approx(P, rel=1e-12)
+
+
+@given(st.floats(0.0, 5.0), st.floats(0.0, 5.0), st.floats(0.01, 10.0))
+def test_the_older_the_less_it_is_worth(age: float, longer: float, T_age: float) -> None:
+    """From 1 for what is new down to 0, whatever the ages."""
+    worth = StalenessWeights(DegradedCommunication(stale="age-weighted", T_age=T_age))
+    worth.arrived("inv2")
+    new, later = worth.at_tick({"inv2": age})["inv2"], worth.at_tick({"inv2": age + longer})["inv2"]
+
+    assert new == 1.0
+    assert 0.0 <= later <= 1.0
+    assert later == pytest.approx(exp(-longer / T_age), rel=1e-6, abs=1e-12)
+
+
+def test_a_neighbour_older_than_max_age_is_none() -> None:
+    """Beyond max_age it is left out of the sums and of the degree; by default the last value counts for ever."""
+    for degraded_communication, P_bar, rate in (
+        ({}, 0.7, 2 * KAPPA),
+        ({"max_age": 0.1}, 0.6, KAPPA),
+        ({"max_age": 0.1, "weights": "degree-normalised", "kappa_c": 5.0}, 0.6, 5.0),
+    ):
+        it = agent(**degraded_communication)
+        it.hear(state("inv2", 94, P_set=80e3))
+        it.hear(state("inv3", 96, P_set=60e3))
+
+        assert it.tick(measured(100), ROSTER[1:]).P_set / 1e5 == pytest.approx(moved(0.5, P_bar, rate), rel=1e-12)
 
 
 def test_degree_normalised_weights_have_a_gain_of_their_own() -> None:
@@ -100,6 +141,7 @@ def test_degree_normalised_weights_have_a_gain_of_their_own() -> None:
 
 
 def overloaded(ticks: int, **degraded_communication: Any) -> list[float]:
+    """P_set (pu) of a lone leader that gives 0.9 pu and not more, at 59.88 Hz."""
     it = agent(**degraded_communication)
     P_set, held = [], 90e3
     for k in range(ticks):
@@ -139,6 +181,21 @@ def test_a_saturated_leader_stops_after_t_sat_and_goes_on_as_a_follower() -> Non
     assert down == pytest.approx(agreed - 0.5 * step)
 
 
+def test_vars_that_do_not_follow_stop_v_set_on_that_side_only() -> None:
+    """A GFL at its var limit leaves V_set where it is while that is to rise, and lets it fall at once."""
+    it = agent("inv2", anti_windup="conditional")
+    V, held = [], 277.0
+    for k in range(60):
+        it.hear(state("inv1", k, P_set=50e3, Q=40e3))
+        held = it.tick(measured(k, to="inv2", V=260.0, Q=20e3, V_set=held), ("inv1",)).V_set
+        V.append(held)
+    it.hear(state("inv1", 60, P_set=50e3, Q=0.0))
+    falls = it.tick(measured(60, to="inv2", V=260.0, Q=20e3, V_set=held), ("inv1",)).V_set
+
+    assert V[0] < V[24] == V[-1]
+    assert falls < V[-1]
+
+
 @given(st.floats(0.01, 0.4), st.booleans())
 def test_a_slow_inverter_is_not_saturated(lag: float, up: bool) -> None:
     """A first-order lag below T_sat is off its characteristic for seconds, but on the way to it."""
@@ -147,6 +204,33 @@ def test_a_slow_inverter_is_not_saturated(lag: float, up: bool) -> None:
 
     assert {follows.saturated_side(float(sign), y, k * T) for k, y in enumerate(does)} == {0}
     assert [follows.saturated_side(2.0 * sign, does[-1], (300 + k) * T) for k in range(27)] == [0] * 25 + [sign] * 2
+
+
+def test_the_default_is_the_papers() -> None:
+    """Without a word all gains and limits are as given, and every state heard counts in full."""
+    worth = StalenessWeights(DegradedCommunication())
+
+    assert gains_in_force(Gains(P_set_max=0.7), DegradedCommunication()) == Gains(P_set_max=0.7)
+    assert [worth.at_tick({"inv2": age}) for age in (0.02, 1e6)] == [{"inv2": 1.0}] * 2
+
+
+@pytest.mark.parametrize(("max_age", "pulls"), [(0.0, False), (0.5, True)])
+def test_in_wall_clock_time_the_age_is_that_on_the_own_clock(max_age: float, pulls: bool) -> None:
+    """A state that came 0.3 s ago is out by default, and counts where max_age is more; its own time is no matter."""
+    control = Control(secondary="all", graph="full", degraded_communication=DegradedCommunication(max_age=max_age))
+    side = RealtimeAgent(replace(agent_config("inv1", control), clock="wall"), "me")
+    keys = side.keys
+    side.start(0.0)
+    side.appeared(keys.alive_plant(1), 0.0)
+    side.appeared(keys.alive_agent("inv2", "a"), 0.0)
+    side.received(keys.nameplate("inv2", "a"), encode(Agent(agent_config("inv2")).nameplate), 0.0)
+    side.received(keys.state("inv2"), encode(state("inv2", 0)), 0.0)
+    side.received(keys.measurement("inv1"), encode(measured(0)), 0.2)
+    side.expire(0.3)
+
+    published = [action for action in side.take_actions() if isinstance(action, Publish)]
+    decided = [decode(action.payload) for action in published if action.key == keys.state("inv1")]
+    assert [message.P_set > 50e3 for message in decided if isinstance(message, State)] == [pulls]
 
 
 @pytest.mark.parametrize(
@@ -183,8 +267,15 @@ def test_a_neighbour_out_of_step_is_left_out_until_the_grid_is_back() -> None:
 @pytest.mark.parametrize(
     "degraded_communication",
     [
+        DegradedCommunication(stale="skip"),
+        DegradedCommunication(stale="age-weighted"),
+        DegradedCommunication(max_age=0.1),
+        DegradedCommunication(anti_windup="none"),
+        DegradedCommunication(anti_windup="conditional"),
+        DegradedCommunication(weights="degree-normalised"),
         DegradedCommunication(weights="degree-normalised", stale="age-weighted", anti_windup="conditional"),
-        DegradedCommunication(islands="frequency", stale="skip"),
+        DegradedCommunication(islands="frequency"),
+        DegradedCommunication(islands="ignored"),
     ],
 )
 def test_with_good_links_every_way_restores_and_shares(degraded_communication: DegradedCommunication) -> None:

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
+from numpy.typing import NDArray
 
 from gridpeers.agents.agent import Agent
 from gridpeers.agents.agent_config import Control, GraphRule
@@ -60,11 +61,27 @@ def test_each_rule_gives_the_neighbours_it_is_named_for(graph: GraphRule, name: 
     assert set(in_neighbours(rule(graph), name, PAPER)) == expected
 
 
+def adjacency(graph: GraphRule) -> NDArray[np.float64]:
+    heard = {name: in_neighbours(rule(graph), name, PAPER) for name in PAPER}
+    return np.array([[other in heard[name] for other in PAPER] for name in PAPER], float)
+
+
+@pytest.mark.parametrize(
+    ("graph", "links", "fiedler"), [("full", 36, 9.0), ("clustered", 12, 0.551), ("ring", 9, 0.468)]
+)
+def test_graphs_have_the_papers_number_of_links_and_speed(graph: GraphRule, links: int, fiedler: float) -> None:
+    """Links and the second smallest eigenvalue of L of full, reduced and ring, as in the theory's table."""
+    A = adjacency(graph)
+    L = np.diag(A.sum(axis=1)) - A
+
+    assert np.trace(L) == 2 * links
+    assert np.sort(np.linalg.eigvalsh(L))[1] == pytest.approx(fiedler, abs=5e-4)
+
+
 @pytest.mark.parametrize("graph", RULES)
 def test_who_listens_is_heard(graph: GraphRule) -> None:
     """Every rule is symmetric, and nobody listens to itself."""
-    heard = {name: in_neighbours(rule(graph), name, PAPER) for name in PAPER}
-    A = np.array([[other in heard[name] for other in PAPER] for name in PAPER])
+    A = adjacency(graph)
 
     assert np.array_equal(A, A.T)
     assert not A.diagonal().any()

@@ -19,19 +19,23 @@ T = 0.02
 
 
 def own(P_set: float = 0.5, Q: float = 0.0, *, t: float = 1.0, e: float = 0.0, name: str = "inv1") -> Own:
+    """A follower."""
     return Own(name, False, t, P_set, Q, 1.0, e, 0.05 * Q, P_set, 1.0, 0.01, 0.05, 6e5, 277.0, 60.0)
 
 
 def neighbour(name: str, P_set: float = 0.5, Q: float = 0.0) -> Neighbour:
+    """A neighbour with these values."""
     return Neighbour(name, False, T, 1.0, P_set, 1.0, Q, 0.01, 0.05, 6e5)
 
 
 def graph_of(rng: np.random.Generator, n: int, links: float) -> np.ndarray:
+    """A random undirected graph."""
     A = np.triu(rng.random((n, n)) < links, 1).astype(float)
     return np.asarray(A + A.T)
 
 
 def spread_after(A: np.ndarray, start: np.ndarray, liars: set[int], F: int, said: np.ndarray) -> list[np.ndarray]:
+    """Return P_set of all honest agents, step by step; liar i says said[k, i, j] to agent j at step k."""
     n = len(A)
     laws = [Resilient(F=F) for _ in range(n)]
     P = start.copy()
@@ -47,7 +51,7 @@ def spread_after(A: np.ndarray, start: np.ndarray, liars: set[int], F: int, said
     return steps
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 10_000), n=st.integers(4, 9), F=st.integers(0, 2), links=st.floats(0.3, 1.0))
 def test_w_msr_never_leaves_the_range_of_the_honest_and_they_agree_where_the_graph_is_robust(
     seed: int, n: int, F: int, links: float
@@ -75,6 +79,14 @@ def test_where_robustness_is_missing_the_honest_may_never_agree() -> None:
     assert robustness(A).F == 0
     assert np.ptp(spread_after(A, start, set(), 1, nobody)[-1]) == pytest.approx(0.6)
     assert np.ptp(spread_after(A, start, set(), 0, nobody)[-1]) < 1e-3
+
+
+def test_more_liars_than_F_take_the_honest_wherever_they_want() -> None:
+    """Two liars where one is borne: in a full graph of seven all honest agents end at the liars' value."""
+    A = np.ones((7, 7)) - np.eye(7)
+    steps = spread_after(A, np.full(7, 0.5), {5, 6}, 1, np.full((600, 7, 7), 0.9))
+
+    assert steps[-1].min() > 0.89
 
 
 def test_without_defences_it_is_the_paper_s_law() -> None:
@@ -111,6 +123,46 @@ def test_a_rate_limit_holds_back_what_jumps() -> None:
     assert fast > slow
 
 
+def test_a_rate_limit_holds_vars_as_well_and_grows_with_the_time_of_silence() -> None:
+    """Q of a neighbour moves by 0.01 pu a step at 0.5 pu/s; one that was silent for 0.2 s by 0.1 pu."""
+
+    def V_set(Q: float, silent: int) -> float:
+        law = Resilient(F=0, rate=0.5)
+        law.step(own(t=1.0), [neighbour("a", Q=0.0)], T)
+        for k in range(silent):
+            law.step(own(t=1.0 + T * (k + 1)), [], T)
+        return law.step(own(t=1.0 + T * (silent + 1)), [neighbour("a", Q=Q)], T).V_set
+
+    for silent, most in ((0, 0.01), (9, 0.1)):
+        assert V_set(0.9, silent) == pytest.approx(V_set(most, silent), abs=1e-12)
+        assert V_set(0.9, silent) != pytest.approx(V_set(0.9 * most, silent), abs=1e-12)
+        assert V_set(-0.9, silent) == pytest.approx(V_set(-most, silent), abs=1e-12)
+
+
+def test_plausibility_goes_by_the_neighbour_s_droop() -> None:
+    """With half the own droop it delivers twice as much of a frequency error."""
+    law, low = Resilient(F=0, tolerance=0.1), own(e=-0.004)
+
+    def counts(m_p: float) -> bool:
+        terms = law.terms(low, [neighbour("a", 0.5)._replace(m_p=m_p)], T)
+        return "implausible" not in {term.name for term in terms.P_set}
+
+    assert counts(0.01)  # 0.9 pu
+    assert not counts(0.005)  # 1.3 pu
+
+
+def test_asking_why_changes_nothing() -> None:
+    """Terms may be asked for at any time: trust ages by steps alone."""
+    asked, law = (Resilient(F=0, tolerance=0.1, T_out=0.2) for _ in range(2))
+    for k in range(5):
+        for each in (asked, law):
+            each.step(own(t=k * T), [neighbour("a", 5.0)], T)
+        asked.terms(own(t=k * T), [neighbour("a", 5.0)], T)
+
+    later = own(t=5 * T), [neighbour("a", 0.6)], T
+    assert asked.step(*later) == law.step(*later)
+
+
 def test_who_is_implausible_ages_out_and_comes_back_slowly() -> None:
     """After three times T_out its weight is e^-3; a start forgets it."""
     law, T_out = Resilient(F=0, tolerance=0.1, T_out=0.2), 0.2
@@ -125,6 +177,26 @@ def test_who_is_implausible_ages_out_and_comes_back_slowly() -> None:
     assert weighed < 0.1 * full
     law.start(own())
     assert law.step(own(t=1.0), [neighbour("a", 0.6)], T).P_set - 0.5 == pytest.approx(full)
+
+
+@pytest.mark.parametrize(("T_out", "held_back"), [(0.0, False), (0.2, True)])
+def test_a_neighbour_that_was_only_ever_implausible_is_held_back_if_it_is_distrusted(
+    T_out: float, held_back: bool
+) -> None:
+    """Nothing of it has counted, so no rate limits its first plausible value; one that lied is no such stranger."""
+    law = Resilient(F=0, tolerance=0.1, rate=0.5, T_out=T_out)
+    law.step(own(t=1.0), [neighbour("a", 5.0)], T)
+    P_set = law.step(own(t=1.0 + T), [neighbour("a", 0.9)], T).P_set
+    trusted = 1.0 if not T_out else 1.0 - (1.0 - math.exp(-T / T_out)) * math.exp(-T / (10.0 * T_out))
+    expected = neighbour("a", 0.51 if held_back else 0.9)._replace(weight=trusted)
+
+    assert P_set == pytest.approx(Resilient(F=0).step(own(), [expected], T).P_set, abs=1e-12)
+
+
+def test_distrust_without_a_tolerance_is_refused() -> None:
+    """Nobody would ever be implausible, so that T_out did nothing."""
+    with pytest.raises(ValueError, match=r"has T_out = 0\.5 s and no tolerance, so that nobody is ever implausible"):
+        Resilient(T_out=0.5, rate=1.0)
 
 
 def test_why_names_the_trimmed_and_the_implausible() -> None:
