@@ -51,6 +51,16 @@ def test_on_the_3_robust_graph_nobody_leads_the_honest_astray(liar: int) -> None
     assert np.ptp(steps[-1]) < 1e-3
 
 
+def test_below_3_robust_one_constant_liar_keeps_the_honest_apart() -> None:
+    """On the reduced graph, r 1, the range of the honest does not close with F = 1, and not even without a liar."""
+    start = np.array([0.2, 0.2, 0.2, 0.5, 0.5, 0.5, 0.8, 0.8, 0.8])
+    lies = np.full((400, 9, 9), 0.2)
+
+    assert np.ptp(spread_after(graph("reduced"), start, {1}, 1, lies)[-1]) > 0.1
+    assert np.ptp(spread_after(graph("reduced"), start, set(), 1, lies)[-1]) > 0.1
+    assert np.ptp(spread_after(graph("robust"), start, {1}, 1, lies)[-1]) < 1e-3
+
+
 def test_every_run_is_in_the_table_and_has_words_of_its_own() -> None:
     """No two attacks or defences have one name, so that none hides another; each graph has all of them."""
     plan = sweep()

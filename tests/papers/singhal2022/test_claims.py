@@ -6,7 +6,7 @@ import pytest
 
 from gridpeers.papers.singhal2022.communication_claims import GraphFindings, GraphRun
 from gridpeers.papers.singhal2022.paper_benchmarks import CLAIMS, headline, numbers
-from gridpeers.papers.singhal2022.tables import tables_of
+from gridpeers.papers.singhal2022.tables import TABLE, tables_of
 from gridpeers.scenarios.results.claims import Verdict, judge
 from gridpeers.scenarios.results.findings import Findings
 from gridpeers.scenarios.results.metrics import Settling, Steady
@@ -109,6 +109,30 @@ def test_a_claim_about_a_case_that_was_left_out_is_not_judged() -> None:
     assert verdicts["only_IV_restores"].found == "needs case I, II, III"
 
 
+def test_a_claim_about_an_event_that_is_not_there_is_not_judged() -> None:
+    """A copy of the experiment with other events is not compared with the paper's."""
+    results = {case: {"event1": events["event1"], "storm": events["event2"]} for case, events in paper().items()}
+
+    assert {verdict.status for verdict in judged(results)} == {"NOT RUN"}
+    assert verdict("IV_within_1_s", results).found == "needs event2"
+
+
+def test_nothing_left_to_better_is_better_by_any_factor() -> None:
+    """An MQSI of exactly 0 in case IV passes what asks for a factor."""
+    results = changed("IV", "event1", MQSI=0.0)
+
+    assert verdict("IV_5_times_below_II_and_III", results).status == "PASS"
+    assert verdict("IV_MQSI_5_times_better_than_I", results).status == "PASS"
+
+
+def test_every_tolerance_has_its_reason() -> None:
+    """No number is compared, or left uncompared, without a word on why; every claim has a name and a place."""
+    assert all(tolerance.reason for tolerance in TABLE.values())
+    for claims in CLAIMS.values():
+        assert len({claim.name for claim in claims}) == len(claims)
+        assert all(claim.source for claim in claims)
+
+
 def over_graphs(**times: float | None) -> Findings:
     """Results over graphs whose links are l8, l12 ..., with these times to share (s)."""
     runs = []
@@ -181,3 +205,8 @@ def test_what_is_not_steady_is_farther_off_than_any_number() -> None:
     lines = headline_with("II", "event1", reasons={"MQSI": "not steady: it grows"})
 
     assert "7 of 8 within a factor of 2; farthest off: not steady for 2.03 (Table II, case II, event1)." in lines[1]
+
+
+def test_a_scenario_without_tables_has_no_headline() -> None:
+    """Nothing is counted where there is nothing of the paper's."""
+    assert headline(numbers(Findings(results={}), ())) == []

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from gridpeers.agents.graphs import in_neighbours
+from gridpeers.papers.singhal2022.islanding_claims import EVENTS
+from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.scenarios.results import metrics
 from gridpeers.scenarios.results.history import History
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.schema.configs import configs
+from gridpeers.wire.messages import Telemetry
 
 from .experiment import Experiment, expected, experiment
 
@@ -42,6 +47,13 @@ def test_without_the_followers_the_leaders_run_into_their_limit(case: str) -> No
     assert [p[name] for name in ("inv1", "inv4", "inv7")] == pytest.approx([1.0] * 3, abs=0.005)
 
 
+def test_full_coordination_moves_every_inverter_alike() -> None:
+    """Case IV: after each event all nine run at the same per-unit power. Section 4, figure of P, (9)."""
+    for event in EVENTS:
+        p = list(experiment("islanding").steady["IV"][event].p.values())
+        assert max(p) - min(p) < 0.005
+
+
 def test_grid_connected_nothing_moves() -> None:
     """Before event 1 secondary control is on hold: every case starts from the same operating point. Section 4."""
     histories = experiment("islanding").histories
@@ -51,6 +63,35 @@ def test_grid_connected_nothing_moves() -> None:
         assert np.ptp(history.P_set[before], axis=0).max() == 0.0
         assert np.abs(history.P[before] - start).max() < 1.0
         assert np.abs(history.f[before] - 60.0).max() < 1e-4
+
+
+def test_the_mean_voltage_returns_to_nominal_with_secondary_control() -> None:
+    """At the end mean V is within 0.002 pu of 1 in cases II to IV, and below it in case I. Figure of mean V."""
+    islanding = experiment("islanding")
+    mean = {case: float((h.V[-1] / islanding.nameplates.V_nom).mean()) for case, h in islanding.histories.items()}
+
+    assert mean["I"] < 0.996
+    assert [mean[case] for case in ("II", "III", "IV")] == pytest.approx([1.0] * 3, abs=0.002)
+
+
+def test_the_indices_fall_to_what_is_left_and_stay_there() -> None:
+    """Case IV: MPSI of every row in the last second before event 2 is below 0.001. Figure of MPSI, (16)."""
+    islanding = experiment("islanding")
+    history = islanding.histories["IV"]
+    last_second = (history.t > 3.0) & (history.t < 4.0)
+
+    assert metrics.MPSI(history, islanding.nameplates)[last_second].max() < 0.001
+
+
+def test_below_200_kW_the_frequency_falls_on_and_on() -> None:
+    """At 175 kW all others are at their rating. Section 4."""
+    intermittency = experiment("intermittency")
+    history = intermittency.histories["175kW"]
+    f = history.f[:, intermittency.nameplates.GFM].mean(axis=1)
+    last = history.t > history.t[-1] - 1.0
+
+    assert np.all(np.diff(f[last]) < 0.0)
+    assert f[-1] < 59.5
 
 
 # ---------------------------------------------------------------- intermittency, wind-up
@@ -92,6 +133,22 @@ def test_wound_up_set_points_overshoot_when_power_is_back() -> None:
     assert over["none"] > 1.3 * max(over["clamp"], over["conditional"])
 
 
+def test_a_reference_that_is_not_clipped_overshoots_three_times_as_far() -> None:
+    """The clipping decides: with a bound of 3 pu for GFL too, the frequency goes to 60.38 Hz instead of 60.12 Hz."""
+    wind_up = experiment("wind-up")
+    scenario, feeder = load_scenario("wind-up")
+    plant = replace(scenario.plant, gfl=replace(scenario.plant.gfl, P_set_lim=3.0))
+    rows: list[tuple[float, ...]] = []
+
+    def take(telemetry: Telemetry) -> None:
+        rows.extend(telemetry.rows)
+
+    run_inprocess(*configs(replace(scenario, plant=plant), feeder, "none"), take)
+
+    assert overshoot(History.of(wind_up.nameplates.names, rows), wind_up) == pytest.approx(0.384, abs=0.005)
+    assert overshoot(wind_up.histories["none"], wind_up) == pytest.approx(0.121, abs=0.005)
+
+
 # ---------------------------------------------------------------- communication
 
 
@@ -102,6 +159,30 @@ def test_graphs_have_the_papers_links(case: str, links: int) -> None:
     members = {agent.name: agent for agent in agents}
 
     assert sum(len(in_neighbours(agents[0].control, name, members)) for name in members) == 2 * links
+
+
+def test_an_adaptive_alpha_is_better_in_both_at_once() -> None:
+    """Two seconds after islanding V_error and MQSI are below those of the re-tuned constant alpha. Section 4, (15)."""
+    communication = experiment("reduced-communication")
+    at: dict[str, list[float]] = {}
+    for case in ("reduced", "adaptive"):
+        history = communication.histories[case]
+        rows = (history.t > 2.9) & (history.t <= 3.1)
+        both = (metrics.V_error, metrics.MQSI)
+        at[case] = [float(of(history, communication.nameplates)[rows].mean()) for of in both]
+
+    assert at["adaptive"][0] < at["reduced"][0]
+    assert at["adaptive"][1] < at["reduced"][1]
+
+
+def test_the_others_take_the_load_of_the_one_that_left_at_once() -> None:
+    """In the first row after inverter 2 left, the total power is within 2 % of that before. Section 4, figure of P."""
+    history = experiment("plug-n-play").histories["IV"]
+    before, after = (int(np.searchsorted(history.t, t - 1e-9)) for t in (2.0, 2.01))
+
+    assert history.P[after, INV2] == 0.0
+    assert history.P[before, INV2] > 300e3
+    assert history.P[after].sum() == pytest.approx(history.P[before].sum(), rel=0.02)
 
 
 # ---------------------------------------------------------------- plug-n-play, switching
@@ -127,6 +208,15 @@ def test_without_secondary_control_the_returned_inverter_stays_at_no_load() -> N
 
     assert abs(steady.p["inv2"]) < 0.01
     assert steady.t_restore_s is None
+
+
+def test_mean_sharing_is_that_of_eight_while_one_is_away() -> None:
+    """MPSI of every row in the last 0.2 s before the return is below 0.001, as the absent one does not count. (16)."""
+    plug_n_play = experiment("plug-n-play")
+    history = plug_n_play.histories["IV"]
+    away = (history.t > 2.8) & (history.t <= 3.0)
+
+    assert metrics.MPSI(history, plug_n_play.nameplates)[away].max() < 0.001
 
 
 @pytest.mark.parametrize("island", ["inv1", "inv4", "inv7"])

@@ -87,6 +87,15 @@ def test_frequency_watt() -> None:
     assert crossing(p - 0.3, 0.5 * 0.95, plant.h) == pytest.approx(1.54, rel=0.01)
 
 
+def test_frequency_watt_with_the_default_droop() -> None:
+    """Row 17: 5 % droop gives 0.1 pu for -0.3 Hz."""
+    plant = on_stiff_bus(WATT, m_p=0.05)
+
+    p = frequency_step(plant, -0.3, 6.0)[:, 1]
+
+    assert p[-1] == pytest.approx(0.1, abs=1e-3)
+
+
 def test_the_dead_band_jumps() -> None:
     """Row 18: past the edge of the dead band the full deviation acts."""
     record = on_stiff_bus(replace(WATT, db_UF=0.036, db_OF=0.036)).inverters.gfl[0]
@@ -154,6 +163,17 @@ def test_a_diverging_current_controller_is_refused(wrong: GflParameters) -> None
     """Row 23: gains whose one-pass feedback grows on a stiff bus are refused with the ratio and the remedy."""
     with pytest.raises(ValueError, match=r"must be below 1, got 1\.\d\d"):
         gfl.pack(wrong, S_B, V_B, 0.01, 0.05, 60.0)
+
+
+def test_the_refused_gains_do_diverge() -> None:
+    """Row 23: the refusal is not overcautious: let through, the gains blow up."""
+    plant = on_stiff_bus(GFL_D)
+    plant.inverters.gfl["F_current"] = 1.0
+    plant.inverters.set_points[0, 0] = 0.3
+
+    p = plant.run(200)[:, 0, 1] / S_B
+
+    assert np.abs(p).max() > 100.0
 
 
 OPEN_LOOP = 5.0

@@ -11,6 +11,7 @@ from scipy.linalg import expm
 from gridpeers.plant.dynamics import Circuit, Dynamics
 from gridpeers.plant.dynamics.circuit import aligned_sum
 from gridpeers.plant.dynamics.inverters import Inverters
+from gridpeers.plant.dynamics.kernel import gfm
 from gridpeers.plant.equipment.inverter_parameters import REGFM_A1, GfmParameters
 from gridpeers.plant.plant_config import Method
 from tests.unit.plant.dynamics.circuits import (
@@ -42,6 +43,15 @@ def crossing(y: Series, level: float, h: float) -> float:
 def settled(y: Series, end: float, within: float, h: float) -> float:
     """Time (s) from which y stays within +-within of end."""
     return float((np.flatnonzero(np.abs(y - end) > within)[-1] + 1) * h)
+
+
+def test_bases() -> None:
+    """Row 1: 200 kVA at 277.1363 V has 1.15207 ohm, and the autotest's filter 0.4507 - j5.2672 S."""
+    record = gfm.pack(GFM_A, S_B, V_B, 0.01, 0.05, 60.0)
+
+    assert pytest.approx(240.56, rel=1e-4) == S_B / (3.0 * V_B)
+    assert pytest.approx(1.15207, rel=1e-4) == Z_B
+    assert complex(record["y_f"]) == pytest.approx(0.4507 - 5.2672j, rel=1e-4)
 
 
 def test_a_lone_gfm_droops() -> None:
@@ -96,6 +106,22 @@ def test_power_step_on_a_stiff_bus() -> None:
     assert crossing(p, 0.15, plant.h) == pytest.approx(0.0245, abs=0.003)
     assert crossing(p, 0.27, plant.h) == pytest.approx(0.075, abs=0.003)
     assert p.max() < 0.3003
+
+
+def test_the_default_filter_is_critically_damped() -> None:
+    """Row 8: with the default filter the P-f loop has the poles -50 +- j1.5 1/s."""
+    plant = on_stiff_bus(GFM_D, h=0.0002)
+    plant.inverters.set_points[0, 0] = 0.001
+
+    filtered = []
+    for _ in range(300):
+        plant.run(5)
+        filtered.append(float(plant.inverters.gfm_state["p"][0]) / 0.001)
+    t = 0.001 * np.arange(1, 301)
+    a, b = 50.0, 1.5
+    expected = 1.0 - np.exp(-a * t) * (np.cos(b * t) + a / b * np.sin(b * t))
+
+    assert np.abs(np.array(filtered) - expected).max() < 0.02
 
 
 def test_two_gfm_share_by_their_set_points() -> None:
@@ -188,6 +214,20 @@ def positive_sequence(dynamics: Dynamics) -> tuple[complex, float]:
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("parameters", [REGFM_A1, DIRECT], ids=["VFlag 1", "VFlag 0"])
+def test_it_rests_where_it_starts_on_unequal_phases(parameters: GfmParameters, method: Method) -> None:
+    """The start is an equilibrium of what the model measures: nothing moves in 1 s."""
+    dynamics = unbalanced(parameters, method)
+    before = dynamics.readings()[0].copy()
+
+    out = dynamics.run(500)[:, 0]
+
+    assert np.abs(out[:, 0] - 60.0).max() < 1e-9
+    assert np.abs(out[:, 1:3] - before[1:3]).max() / S_B < 1e-9
+    assert np.abs(out[:, 3] - before[3]).max() / V_B < 1e-9
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("parameters", [REGFM_A1, DIRECT], ids=["VFlag 1", "VFlag 0"])
 def test_a_given_v_set_is_met_at_the_start(parameters: GfmParameters, method: Method) -> None:
     """Behind a line with unequal loads it starts with the Q at which its own droop gives V_set, and rests."""
     y = np.eye(3) / ((0.02 + 0.04j) * Z_B)
@@ -220,6 +260,18 @@ def test_it_droops_by_the_positive_sequence(parameters: GfmParameters, method: M
     assert min(abs(total.real - S.real), abs(total.imag - S.imag)) > 0.002
     assert f - 60.0 == pytest.approx(0.6 * (P_set - S.real), abs=1e-7)
     assert (v if parameters.voltage_control else E) == pytest.approx(V_set - 0.05 * S.imag, abs=1e-7)
+
+
+def test_the_overload_limiter_of_regfm_a1_hands_over() -> None:
+    """The first unit stays at P_max = 0.9 pu, the second takes the rest and sets the frequency."""
+    dynamics = pair(REGFM_A1, replace(REGFM_A1, P_max=2.0), 1.2)
+    dynamics.inverters.set_points[:, 0] = 1.1, 0.1
+
+    end = dynamics.run(10000)[-1]
+    p = end[:, 1] / S_B
+
+    assert p[0] == pytest.approx(0.9, abs=1e-4)
+    assert end[:, 0] == pytest.approx(60.0 + 0.6 * (0.1 - p[1]), abs=1e-5)
 
 
 @pytest.mark.parametrize(("V_set", "Q"), [(1.1, 0.44), (0.9, -0.44)])
@@ -273,6 +325,27 @@ def test_a_sag_draws_no_more_than_the_largest_current(method: Method) -> None:
 def units() -> Inverters:
     """A GFL, a GFM and another GFL."""
     return Inverters((inverter(GFL_D), inverter(GFM_D), inverter(GFL_D)), connected=(True, True, False))
+
+
+def test_each_kind_has_its_own_records(units: Inverters) -> None:
+    """Records and states of each kind are found at the inverters they belong to."""
+    assert (units.gfm_at.tolist(), units.gfl_at.tolist()) == ([1], [0, 2])
+    assert (len(units.gfm_state), len(units.gfl_state)) == (1, 2)
+    assert units.y_f.tolist() == [units.gfl["y_f"][0], units.gfm["y_f"][0], units.gfl["y_f"][1]]
+    assert units.S_max.tolist() == [1.0, np.inf, 1.0]
+    assert units.connected.tolist() == [True, True, False]
+
+
+def test_rest_is_that_of_the_inverter_asked_for(units: Inverters) -> None:
+    """An inverter is set to rest by its place among all, and no other is touched."""
+    units.J[1] = units.y_f[1] * units.V_b[1] * 1j
+    units.rest(1, 0.2 + 0.1j, 1.01)
+    units.rest(2, 0.4 + 0.3j, 0.98)
+
+    assert units.theta() == pytest.approx([0.0, np.pi / 2.0, 0.0])
+    assert (units.gfm_state["p"][0], units.gfm_state["q"][0], units.gfm_state["v"][0]) == (0.2, 0.1, 1.01)
+    assert units.gfl_state["P_f"].tolist() == [0.0, 0.4]
+    assert units.gfl_state["V_m"].tolist() == [0.0, 0.98]
 
 
 def test_only_a_gfl_has_its_power_limited(units: Inverters) -> None:

@@ -19,9 +19,9 @@ from gridpeers.plant.equipment.inverter_parameters import GfmParameters
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.feeder.circuits import Circuits
 from gridpeers.plant.network import Network, solve_power_flow
-from gridpeers.plant.plant_config import PlantSettings
+from gridpeers.plant.plant_config import PlantSettings, Protection, SwitchEvent
 from gridpeers.plant.tables import read_feeder
-from tests.unit.plant.dynamics.circuits import BALANCED, GFM_D, S_B, V_B, Z_B, circuit, inverter, lone
+from tests.unit.plant.dynamics.circuits import BALANCED, GFM_D, S_B, V_B, Z_B, circuit, inverter, loaded, lone
 
 X, E = 0.5, 240.0
 
@@ -64,6 +64,11 @@ def test_a_load_behind_next_to_no_impedance_has_the_textbook_voltage(B: float) -
 
     assert V is not None
     assert abs(V[1]) ** 2 == pytest.approx(E**2 / 2.0 + np.sqrt(E**4 / 4.0 - (X_all * P) ** 2), rel=1e-7)
+
+
+def test_what_is_not_finite_has_no_solution() -> None:
+    """Injections that are not numbers give no voltages."""
+    assert voltage_of(1e3, complex("nan"), E) is None
 
 
 @pytest.mark.parametrize("scale", [1.0, 1.6])
@@ -136,6 +141,19 @@ def test_an_overloaded_phase_carries_no_more_than_its_limit_and_the_others_what_
     assert out[0, 0, 6] == 1.0
 
 
+def test_the_controller_goes_on_unlimited_once_the_overload_ends() -> None:
+    """The limit leaves no trace in the injection: without overload the next step has full voltage again."""
+    dynamics = lone(replace(GFM_D, I_max=1.2), 0.5)
+    dynamics.connect(loaded(3.0))
+    dynamics.run(1)
+    dynamics.connect(loaded(0.5))
+
+    out = dynamics.run(1)
+
+    assert out[0, 0, 6] == 0.0
+    assert out[0, 0, 3] / V_B > 0.9
+
+
 def unequal(*P: float) -> Circuit:
     """One terminal and, behind lines, constant power (pu) on each phase, which gives way below 0.7 pu."""
     y, one = 20.0 / Z_B, np.eye(3)
@@ -159,6 +177,37 @@ def test_an_island_whose_limited_currents_settle_is_not_de_energised() -> None:
     assert current[1:] == pytest.approx([1.5, 1.5], abs=0.01)
     assert V[0] > 1.0
     assert (V[1:] < 0.75).all()
+
+
+def test_a_limit_that_does_not_act_changes_no_number() -> None:
+    """The same bytes with 2 pu and with 1000 pu, through an islanding in which phases reach 1.9 pu."""
+
+    def rows(I_max: float) -> tuple[tuple[float, ...], ...]:
+        return islanded(I_max).take_rows()
+
+    assert rows(2.0) == rows(1000.0)
+
+
+def islanded(I_max: float) -> Plant:
+    """Microgrid123 0.1 s after islanding."""
+    settings = PlantSettings(
+        gfm=GfmParameters(I_max=I_max),
+        protection=Protection(category="off"),
+        events=(SwitchEvent(t=0.02, switch="13-152", action="open"),),
+    )
+    plant = Plant(Network(read_feeder("microgrid123")), settings, 0.02, 0.002)
+    for _ in range(6):
+        plant.advance()
+    return plant
+
+
+def test_limiting_is_an_event_once_a_spell() -> None:
+    """An inverter that limits in many steps says so once, with its limit."""
+    events = [event for event in islanded(1.7).take_events() if event.kind == "limit"]
+
+    assert events
+    assert len({event.subject for event in events}) == len(events)
+    assert events[0].text == f"{events[0].subject} limits its phase currents to 1.7 pu"
 
 
 def test_a_start_beyond_the_limit_is_refused() -> None:

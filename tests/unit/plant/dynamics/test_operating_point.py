@@ -18,7 +18,7 @@ from gridpeers.plant.feeder import Plant
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings
 from gridpeers.plant.tables import read_feeder
-from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, S_B, V_B, Z_B, circuit, inverter
+from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, S_B, V_B, Z_B, circuit, inverter, move_source
 
 
 def start() -> Plant:
@@ -50,6 +50,15 @@ def test_many_inverters_start_where_few_do(monkeypatch: pytest.MonkeyPatch) -> N
 
     assert methods == ["krylov"]
     assert reactive_powers(many) == pytest.approx(reactive_powers(few), abs=1e-10)
+
+
+def test_many_inverters_that_newton_krylov_does_not_solve_start_as_few_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where Newton-Krylov does not converge, the full Jacobian decides."""
+    few = start()
+    monkeypatch.setattr(power_flow_at_rest, "MOST_BY_DIFFERENCES", 0)
+    monkeypatch.setattr(power_flow_at_rest, "KRYLOV", power_flow_at_rest.KRYLOV | {"maxiter": 1})
+
+    assert reactive_powers(start()) == pytest.approx(reactive_powers(few), abs=1e-10)
 
 
 VOLT_VAR = replace(GFL_D, volt_var=True, F_current=0.6, T_qf=0.1)
@@ -143,6 +152,15 @@ def test_a_droop_from_the_edge_of_its_band_has_a_rest(band: float, most: float, 
     assert moved(dynamics) < 1e-4
 
 
+def test_an_inverter_at_its_limit_of_vars_keeps_its_set_point() -> None:
+    """0.9 pu of P leave 0.44 pu of Q, where the droop asks for 1 pu: V_set stays 1 pu, and nothing moves."""
+    dynamics = started(VOLT_VAR, 0.9, P=0.9)
+
+    assert powers(dynamics)[1] == pytest.approx(np.sqrt(1.0 - 0.9**2), abs=1e-9)
+    assert dynamics.inverters.set_points[0, 1] == 1.0
+    assert moved(dynamics) < 1e-4
+
+
 def test_there_is_one_rest_and_the_search_finds_it() -> None:
     """Of all ways to place four coupled inverters within, beyond and on the edges of their bands, one is a rest."""
     random = np.random.default_rng(1)
@@ -209,3 +227,40 @@ def test_phases_of_unequal_voltage_deliver_equal_powers_at_rest(model: str) -> N
     powers = dynamics.inverters.V[0] * np.conj(dynamics.inverters.I[0]) / (S_B / 3.0)
 
     assert powers == pytest.approx(np.full(3, 0.6 + 0.2j), abs=1e-9)
+
+
+def test_in_positive_sequence_the_currents_are_equal_instead() -> None:
+    """The other mode drives the same current in all phases at the same voltages."""
+    dynamics = at_unequal_voltages(GFL_D)
+
+    dynamics.run(500)
+    currents = np.abs(dynamics.inverters.I[0])
+
+    assert currents == pytest.approx(np.full(3, currents[0]), rel=1e-9)
+
+
+def test_a_power_step_reaches_every_phase_alike() -> None:
+    """After a step of P the phases have a third of it each, whatever their voltages."""
+    dynamics = at_unequal_voltages(replace(GFL_D, mode="balanced_power"))
+    dynamics.inverters.hold(0, 0.9, 1.0)
+
+    dynamics.run(2000)
+    powers = dynamics.inverters.V[0] * np.conj(dynamics.inverters.I[0]) / (S_B / 3.0)
+
+    assert powers.real == pytest.approx(np.full(3, 0.9), abs=1e-6)
+
+
+def test_the_frequency_is_the_mean_of_the_three_plls() -> None:
+    """A jump of phase B alone moves the reading by a third of what that PLL sees."""
+    dynamics = at_unequal_voltages(replace(GFL_D, mode="balanced_power"))
+    moved = UNEQUAL * np.exp(1j * np.array([0.0, 0.1, 0.0]))
+    move_source(dynamics, moved)
+
+    out = dynamics.run(1)
+    k_p, k_i, u_B = 50.0, 900.0, 0.9
+    first = u_B * np.sin(0.1)
+    theta = 0.002 * (k_p + 0.002 * k_i) * first  # the predictor's angle; the corrector sees what remains
+    second = u_B * np.sin(0.1 - theta)
+    w = k_p * second + 0.001 * k_i * (first + second)
+
+    assert out[0, 0, 0] - 60.0 == pytest.approx(w / 3.0 / (2.0 * np.pi), rel=1e-6)

@@ -13,7 +13,7 @@ from gridpeers.plant.dynamics import Circuit, Dynamics, Inverter
 from gridpeers.plant.dynamics.circuit import LoadLaw
 from gridpeers.plant.equipment.inverter_parameters import REGFM_A1, GflParameters, GfmParameters
 from gridpeers.plant.plant_config import Method
-from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, GFM_D, S_B, V_B, Z_B, circuit, inverter
+from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, GFM_D, S_B, V_B, Z_B, circuit, inverter, lone
 
 GFL_ON = changed(GFL_D, frequency_watt=True, volt_var=True)
 METHODS: tuple[Method, ...] = ("first-order", "second-order")
@@ -96,6 +96,20 @@ def test_its_power_is_that_of_its_terminal_and_balances_the_network() -> None:
         assert np.sum(out[:, 1] + 1j * out[:, 2]) == pytest.approx(drawn, rel=1e-9)
 
 
+def test_each_of_three_legs_holds_its_own_phase() -> None:
+    """Three single-phase GFM on A, B, C of one bus with equal loads rest as one three-phase GFM does."""
+    network = circuit(np.eye(3, dtype=complex) * 0.6 / Z_B, [[0, 0, 0], [1, 1, 1], [2, 2, 2]])
+    dynamics = Dynamics(network, tuple(single(GFM_D, phase) for phase in "ABC"), 0.002)
+    dynamics.start(np.zeros(3), np.zeros(3))
+
+    out = dynamics.run(500)[-1]
+    whole = lone(GFM_D, 0.6).run(500)[-1]
+
+    assert dynamics.inverters.V[:, 0] == pytest.approx(V_B * BALANCED, rel=1e-9)
+    assert out[:, 0] == pytest.approx(np.full(3, 60.0), abs=1e-9)
+    assert out[:, 1] == pytest.approx(np.full(3, whole[0, 1] / 3.0), rel=1e-9)
+
+
 def test_legs_that_a_load_couples_start_as_one_island() -> None:
     """With loads between the phases each leg still holds its phase at the start, and all rest at 60 Hz."""
     y = 0.3 / Z_B
@@ -122,3 +136,15 @@ def test_it_starts_its_dead_lateral_at_its_own_phase() -> None:
     dynamics.run(1)
 
     assert np.degrees(np.angle(dynamics.inverters.V[0, 0])) == pytest.approx(120.0, abs=6.0)
+
+
+def test_its_available_power_is_of_its_own_rating() -> None:
+    """A bound of half of its rating in watts is half of its P reference."""
+    stiff = circuit(np.zeros((3, 3), complex), [[1, 1, 1]], source=V_B * BALANCED)
+    dynamics = Dynamics(stiff, (single(GFL_D, "B"),), 0.002)
+    dynamics.start(np.array([0.9]), np.zeros(1))
+    dynamics.inverters.limit_power(0, 0.5 * S_B / 3.0)
+
+    P = dynamics.run(2000)[-1, 0, 1]
+
+    assert pytest.approx(0.5 * S_B / 3.0, rel=1e-6) == P

@@ -13,8 +13,9 @@ from gridpeers.plant.dynamics.circuit import PlantError
 from gridpeers.plant.dynamics.inverters import Inverters
 from gridpeers.plant.dynamics.power_flow_at_rest import PowerFlow
 from gridpeers.plant.equipment import Bus, Feeder, Line, LineConfig, Load, Source, Switch
+from gridpeers.plant.equipment.imported_equipment import LinearElement
 from gridpeers.plant.network import Network, solve_power_flow
-from gridpeers.plant.network.merging import Merge
+from gridpeers.plant.network.merging import DELTA, Merge
 from gridpeers.plant.tables import read_feeder
 from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, V_B, Z_B, circuit, inverter
 from tests.unit.plant.networks import diagonal, feeder, three_phase_bus
@@ -78,12 +79,35 @@ def test_constant_current_turns_with_the_voltage(connection: str) -> None:
 
 
 @pytest.mark.parametrize("model", ["Z", "I", "P"])
+@pytest.mark.parametrize("connection", ["Y", "D"])
+def test_nominal_power_at_nominal_voltage(model: str, connection: str) -> None:
+    """At nominal voltage every load takes what its table says, phase by phase."""
+    network = one_bus(load(model, connection, S, 0j, 0.5 * S))
+
+    power = network.nominal @ np.conj(drawn(network, network.nominal))
+
+    assert power == pytest.approx(1.5 * S, rel=1e-12)
+
+
+@pytest.mark.parametrize("model", ["Z", "I", "P"])
 def test_balanced_delta_equals_wye(model: str) -> None:
     """At balanced voltages a balanced delta load draws the line currents of a wye load of the same power."""
     wye, delta = (one_bus(load(model, connection, S, S, S)) for connection in "YD")
     V = 0.93 * np.exp(0.2j) * wye.nominal
 
     np.testing.assert_allclose(drawn(delta, V), drawn(wye, V), rtol=1e-12)
+
+
+@pytest.mark.parametrize("model", ["Z", "I", "P"])
+def test_delta_currents_sum_to_zero(model: str) -> None:
+    """A delta load has no return through ground, whatever the voltages."""
+    network = one_bus(load(model, "D", S, 2 * S, 0j))
+    V = network.nominal * np.array([0.9, 1.05, 1.0]) + 100.0
+
+    current = drawn(network, V)
+
+    assert abs(current.sum()) < 1e-12 * abs(current).max()
+    assert abs(current).min() > 1.0
 
 
 def test_delta_branch_currents_are_differences() -> None:
@@ -95,11 +119,47 @@ def test_delta_branch_currents_are_differences() -> None:
     np.testing.assert_allclose(drawn(network, V), [I_ab - I_ca, I_bc - I_ab, I_ca - I_bc], rtol=1e-12)
 
 
+def test_constant_current_of_the_table() -> None:
+    """I0 is conj(S) / V_nom, and phi0 are 0, -120, +120 degrees in wye, +30, -90, +150 in delta."""
+    wye, delta = (one_bus(load("I", connection, S, S, S)).loads() for connection in "YD")
+
+    np.testing.assert_allclose(wye.law.I0, S.conjugate() / V_NOM)
+    np.testing.assert_allclose(delta.law.I0, S.conjugate() / (np.sqrt(3.0) * V_NOM))
+    np.testing.assert_allclose(np.degrees(wye.phi0), [0.0, -120.0, 120.0])
+    np.testing.assert_allclose(np.degrees(delta.phi0), [30.0, -90.0, 150.0])
+    assert not wye.law.S.any()
+    assert not delta.law.S.any()
+
+
+def test_nominal_angles_are_those_of_the_nominal_voltages() -> None:
+    """phi0 and V_nom of every branch of the feeder are its voltage at nominal phasors."""
+    network = Network(read_feeder("microgrid123"))
+    loads = network.loads()
+
+    np.testing.assert_allclose(loads.voltages(network.nominal), loads.V_nom * np.exp(1j * loads.phi0), rtol=1e-12)
+
+
+def test_loads_of_an_imported_feeder_have_the_angles_without_load() -> None:
+    """phi0 of a branch is the angle of the voltage across it without load, which transformers of any kind turn."""
+    network = Network(read_feeder("ieee34"))
+    loads = network.loads()
+
+    np.testing.assert_allclose(loads.phi0, np.angle(loads.voltages(network.nominal)), rtol=1e-12)
+
+
 def test_dead_loads_draw_nothing() -> None:
     """Without voltage a load draws no current, instead of an infinite one."""
     loads = one_bus(load("P", "Y", S, S, S), load("I", "D", S, S, S)).loads()
 
     assert not loads.currents(np.zeros(3, dtype=np.complex128)).any()
+
+
+def test_no_loads_draw_nothing() -> None:
+    """A network without non-linear loads has an empty LoadBranches that works as any other."""
+    loads = one_bus().loads()
+
+    assert len(loads) == 0
+    assert loads.currents(np.ones(3, dtype=np.complex128)).tolist() == [0.0, 0.0, 0.0]
 
 
 def test_merged_loads_are_the_same_loads() -> None:
@@ -164,6 +224,25 @@ def test_dead_buses_have_no_voltage_and_no_load() -> None:
     assert abs(solved.S_source) < 1e-3
 
 
+def test_injection_and_shunt_are_part_of_the_balance() -> None:
+    """A current fed in at the load relieves the source by its power; a shunt takes its own."""
+    network = two_buses(100e3 + 50e3j)
+    at = [network.index("3", phase) for phase in "ABC"]
+    shunt = np.zeros(9, dtype=np.complex128)
+    shunt[at] = 1e-3 - 2e-3j
+
+    def feed(V: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        current = np.zeros(9, dtype=np.complex128)
+        current[at] = np.conj((100e3 + 50e3j) / V[at]) + shunt[at] * V[at]
+        return current
+
+    solved = solve_power_flow(network, network.closed0, shunt=shunt, injection=feed)
+
+    np.testing.assert_allclose(np.abs(solved.V), 2448.0, rtol=1e-9)
+    assert abs(solved.S_source) < 1.0
+    assert solved.S_loads == pytest.approx(300e3 + 150e3j)
+
+
 def test_unbearable_load_is_told() -> None:
     """A load beyond what the line can carry ends in an error that names the bus, not in numbers."""
     network = two_buses(5e6 + 0j)
@@ -176,6 +255,40 @@ def test_feeder_without_source_has_no_power_flow() -> None:
     """Without a substation there is no slack, and the error says so."""
     with pytest.raises(ValueError, match='feeder "test" has no source'):
         solve_power_flow(Network(feeder(buses=(three_phase_bus("1"),))), frozenset())
+
+
+@pytest.mark.parametrize("seed", [434, 1017, 2071])
+def test_a_section_with_next_to_nothing_to_ground_is_solved_as_far_as_rounding_lets(seed: int) -> None:
+    """Behind a delta winding its voltage to ground may change by more than 1e-8 pu for ever; that is no overload."""
+    rng = np.random.default_rng(seed)
+    g = -1j * 10.0 ** rng.uniform(-11, -7)
+    y_transformer, y_line = (complex(*rng.uniform(5, most, 2) * (1, -1)) for most in (50, 5000))
+    across = DELTA.T @ DELTA
+    line = y_line * np.linalg.inv(np.full((3, 3), 0.3j) + (0.7 + 0.9j) * np.eye(3))
+    behind = y_transformer * across + g * np.eye(3)
+    matrices = {
+        "12": np.block([[y_transformer * across, -y_transformer * across], [-y_transformer * across, behind]]),
+        "23": np.block([[line, -line], [-line, line]]),
+    }
+    network = Network(
+        feeder(
+            buses=tuple(three_phase_bus(name) for name in "123"),
+            elements=tuple(
+                LinearElement(
+                    name=ends,
+                    nodes=tuple((bus, phase) for bus in ends for phase in "ABC"),
+                    Y=tuple(tuple(map(complex, row)) for row in matrix),
+                )
+                for ends, matrix in matrices.items()
+            ),
+            loads=(Load(bus="3", connection="D", model="P", S=(200e3 + 100e3j, 100e3 + 0j, 50e3 + 30e3j)),),
+            source=Source(bus="1", V_pu=1.0, angle=0.3),
+        )
+    )
+
+    V = solve_power_flow(network, network.closed0).V.reshape(3, 3)
+
+    assert np.abs(np.abs(V @ DELTA.T) / 2400.0 / np.sqrt(3.0) - 1.0).max() < 0.05
 
 
 REACTANCE = 1.0

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -15,6 +16,22 @@ def test_nodes_are_in_the_order_of_the_tables(network: Network) -> None:
     """Nodes follow buses.csv and then A, B, C; index finds them again."""
     assert network.nodes[:5] == (("1", "A"), ("1", "B"), ("1", "C"), ("2", "B"), ("3", "C"))
     assert [network.index(*node) for node in network.nodes] == list(range(286))
+
+
+def test_nominal_phasors(network: Network) -> None:
+    """Nominal phasors are V_nom at 0, -120, +120 degrees, behind the delta-delta transformer too."""
+    a, b, c = (network.nominal[network.index("610", phase)] for phase in "ABC")
+
+    assert abs(a) == pytest.approx(480 / 3**0.5)
+    np.testing.assert_allclose(np.degrees(np.angle([a, b, c])), [0.0, -120.0, 120.0], atol=1e-12)
+
+
+def test_source_is_bus_150_at_nominal_voltage(network: Network) -> None:
+    """The substation is bus 150 at 1.0 pu, and its nodes represent themselves."""
+    assert [network.nodes[i] for i in network.source_nodes] == [("150", "A"), ("150", "B"), ("150", "C")]
+    np.testing.assert_allclose(network.source_voltage, network.nominal[network.source_nodes])
+    merge = network.merge(network.closed0)
+    assert list(merge.representative[network.source_nodes]) == list(network.source_nodes)
 
 
 @pytest.mark.parametrize("text", ["67s-67", "67-67s", "sw1_2"])
@@ -42,6 +59,36 @@ def test_aliases_are_not_names(network: Network) -> None:
         network.admittance(frozenset({"sw1_2"}))
 
 
+def test_all_is_one_island_at_first(network: Network) -> None:
+    """Grid-connected, every bus hangs together."""
+    assert network.islands(network.closed0) == (frozenset(bus.name for bus in network.feeder.buses),)
+
+
+def test_event_1_islands_the_microgrids(network: Network) -> None:
+    """Opening 13-152 leaves 1-34 with the substation and islands everything beyond."""
+    assert network.islands(opened(network, "13-152")) == (
+        zones(network, "rest"),
+        zones(network, "passive", "MG1", "MG2", "MG3"),
+    )
+
+
+def test_event_2_drops_the_passive_zone(network: Network) -> None:
+    """Opening 60-160 as well leaves the passive zone dead and the three microgrids together."""
+    assert set(network.islands(opened(network, "13-152", "60-160"))) == {
+        zones(network, "rest"),
+        zones(network, "passive"),
+        zones(network, "MG1", "MG2", "MG3"),
+    }
+
+
+def test_opening_60_160_alone_keeps_the_passive_zone_on_the_grid(network: Network) -> None:
+    """With 13-152 closed, opening 60-160 leaves the passive zone with the substation."""
+    assert set(network.islands(opened(network, "60-160"))) == {
+        zones(network, "rest", "passive"),
+        zones(network, "MG1", "MG2", "MG3"),
+    }
+
+
 def test_three_microgrids(network: Network) -> None:
     """sw1_2 and sw2_3 split the island into MG1 with the passive zone, MG2 and MG3, one GFM in each."""
     islands = network.islands(opened(network, *PAPER_ISLANDS))
@@ -54,6 +101,16 @@ def test_three_microgrids(network: Network) -> None:
     }
     grid_forming = {inverter.bus for inverter in network.inverters if inverter.kind == "GFM"}
     assert sorted(len(grid_forming & island) for island in islands) == [0, 1, 1, 1]
+
+
+def test_islands_are_ordered_by_their_first_bus(network: Network) -> None:
+    """Islands come in the order of their first bus in the table, whatever the switches."""
+    order = [bus.name for bus in network.feeder.buses]
+    islands = network.islands(opened(network, *PAPER_ISLANDS, "60-160"))
+
+    firsts = [min(order.index(bus) for bus in island) for island in islands]
+    assert firsts == sorted(firsts)
+    assert sum(len(island) for island in islands) == len(order)
 
 
 def test_lines_without_charging_carry_no_current_at_equal_voltages() -> None:
@@ -102,6 +159,23 @@ def test_delta_transformer_passes_no_zero_sequence() -> None:
     np.testing.assert_allclose(current, 0.0, atol=1e-9)
 
 
+def test_capacitors_give_their_reactive_power_at_rated_voltage(network: Network) -> None:
+    """The banks of the feeder give 750 kvar together at their rated voltage."""
+    V = network.nominal * 2401.8 / (4160 / 3**0.5)
+
+    assert V @ np.conj(network.Y_capacitors @ V) == pytest.approx(-750e3j)
+
+
+def test_closing_again_restores_exactly(network: Network) -> None:
+    """The matrix is a function of the switches alone: opened and closed again, it is the same to the bit."""
+    before = network.admittance(network.closed0)
+    apart = network.admittance(opened(network, *PAPER_ISLANDS))
+    after = network.admittance(opened(network, *PAPER_ISLANDS) | set(map(network.switch_name, PAPER_ISLANDS)))
+
+    assert np.array_equal(before.toarray(), after.toarray())
+    assert not np.array_equal(before.toarray(), apart.toarray())
+
+
 def test_matrix_is_symmetric_and_separates_islands(network: Network) -> None:
     """The admittance matrix is symmetric and has no entry between two islands."""
     closed = opened(network, *PAPER_ISLANDS, "60-160")
@@ -112,6 +186,19 @@ def test_matrix_is_symmetric_and_separates_islands(network: Network) -> None:
 
     assert abs(Y - Y.T).max() < 1e-9 * abs(Y).max()
     assert np.array_equal(label[entries.row], label[entries.col])
+
+
+def test_only_representatives_have_entries(network: Network) -> None:
+    """Rows and columns of nodes that follow another one are empty; each representative is its own, at ratio 1."""
+    merge = network.merge(network.closed0)
+    followers = np.setdiff1d(np.arange(len(network.nodes)), np.unique(merge.representative))
+    Y = network.admittance(network.closed0)
+
+    assert len(followers) > 0
+    assert abs(Y[followers]).sum() == abs(Y[:, followers]).sum() == 0.0
+    assert np.all(merge.ratio[np.unique(merge.representative)] == 1.0)
+    terminals = [network.index(inverter.bus, phase) for inverter in network.inverters for phase in "ABC"]
+    assert np.isin(terminals, np.unique(merge.representative)).all()
 
 
 def test_merging_keeps_power(standard: Network) -> None:
@@ -139,10 +226,39 @@ def test_regulators_hold_their_ratio(standard: Network) -> None:
     assert list(gain.values()) == pytest.approx([1 + 0.00625 * tap for tap in (7, -1, 0, -1, 8, 5)], rel=1e-14)
 
 
+def test_ideal_switches_are_the_limit_of_small_impedances(standard: Network) -> None:
+    """Very short lines in place of the closed switches give the same voltages, only less exactly."""
+    table = standard.feeder
+    short = LineConfig(name="short", phases="ABC", Z=diagonal(1e-3j), B=diagonal(0.0))
+    lines = [
+        Line(name=s.name, from_bus=s.from_bus, to_bus=s.to_bus, phases=s.phases, config="short", length=1e-3)
+        for s in table.switches
+        if s.closed
+    ]
+    other = Network(
+        msgspec.structs.replace(
+            table, switches=(), lines=(*table.lines, *lines), line_configs=(*table.line_configs, short)
+        )
+    )
+
+    ideal = solve_power_flow(standard, standard.closed0).V
+    nearly = solve_power_flow(other, frozenset(), tolerance=1e-9).V
+
+    assert 1e-6 < np.abs(ideal - nearly).max() < 5e-3
+
+
 def test_parallel_regulator_and_switch_are_an_error() -> None:
     """Two ties between the same nodes at different ratios are a short circuit, which is told with both nodes."""
     with pytest.raises(ValueError, match=r"a bus and b bus are tied twice, at 1.00000 and at 1.05000"):
         merge_nodes(["a bus", "b bus"], [(0, 1, 1.0), (0, 1, 1.05)], [])
+
+
+def test_ties_in_a_loop_are_no_error() -> None:
+    """Closed switches in a ring tie their nodes more often than needed, which is harmless."""
+    merge = merge_nodes(["a", "b", "c"], [(0, 1, 1.0), (1, 2, 1.0), (2, 0, 1.0)], [2])
+
+    assert merge.representative.tolist() == [2, 2, 2]
+    assert merge.ratio.tolist() == [1.0, 1.0, 1.0]
 
 
 def test_ratios_multiply_along_a_chain() -> None:
