@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
-from bench.validation.gfm_gfl import Z_LOAD4, gfm_gfl_circuit, gfm_gfl_dynamics
+from bench.validation.gfm_gfl import GFL, Z_LOAD4, gfm_gfl_circuit, gfm_gfl_dynamics
 
 # t label (s): published P_A (W, loose initial convergence), tight P_A (W), tight f (Hz)
 TRAJECTORY = {
@@ -61,3 +62,27 @@ def test_the_autotest_trajectory_is_gridlabds() -> None:
         assert seen[t][0] == pytest.approx(published, abs=1.0), f"published P_A at label {t}"
         assert seen[t][1] == pytest.approx(f, abs=1e-6), f"f at label {t}"
     assert first_solution == pytest.approx(21474.649, abs=1e-3), "the true electrical jump"
+
+
+@pytest.mark.parametrize("model", ["voltage_source", "current_source"])
+def test_an_equilibrium_stays(model: str) -> None:
+    """Row 2: without an event nothing moves for 10 s, in both representations of the GFL."""
+    plant = gfm_gfl_dynamics(replace(GFL, model=model))
+    start = plant.readings()
+
+    out = plant.run(5000)
+
+    assert np.abs(out[:, :, 1:3] - start[:, 1:3]).max() < 1e-6
+    assert np.abs(out[:, :, 0] - 60.0).max() < 1e-9
+
+
+def test_both_representations_of_the_gfl_settle_alike() -> None:
+    """The current source and the voltage source differ in the first milliseconds, not in where they end."""
+    ends = []
+    for model in ("voltage_source", "current_source"):
+        plant = gfm_gfl_dynamics(replace(GFL, model=model))
+        plant.connect(gfm_gfl_circuit(Z_LOAD4[1]))
+        ends.append(plant.run(5000)[-1])
+
+    assert ends[0][:, 1:3] == pytest.approx(ends[1][:, 1:3], abs=0.1)
+    assert ends[0][:, 0] == pytest.approx(ends[1][:, 0], abs=1e-6)

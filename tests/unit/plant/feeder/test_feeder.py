@@ -140,6 +140,41 @@ def test_a_gfl_alone_stops_and_comes_back() -> None:
     assert pytest.approx(2401.8, rel=0.05) == on.V
 
 
+def test_closing_again_restores_the_start() -> None:
+    """Opened and closed again at the passive zone, the island comes back to where it was."""
+    p = plant(*opened(0.1, "13-152"), *opened(3.0, "60-160"), SwitchEvent(t=4.0, switch="60-160", action="close"))
+
+    run(p, 3.0)
+    before = p.measure()
+    run(p, 8.0)
+
+    for name, reading in p.measure().items():
+        assert pytest.approx(before[name].P, rel=2e-3) == reading.P
+        assert reading.f == pytest.approx(before[name].f, abs=1e-3)
+
+
+def test_both_gfl_representations_settle_alike() -> None:
+    """Voltage-source and current-source GFL end at the same operating point on the feeder."""
+    ends = []
+    for model in ("voltage_source", "current_source"):
+        p = plant(*opened(0.1, "13-152"), gfl=GflParameters(model=model))
+        run(p, 6.0)
+        ends.append([(r.P, r.Q) for r in p.measure().values()])
+
+    assert np.array(ends[0]) == pytest.approx(np.array(ends[1]), abs=50.0)
+
+
+def test_rows_come_at_the_recording_step() -> None:
+    """Rows stand at every multiple of the recording step, the first at t = 0, none twice."""
+    p = plant(*opened(0.03, "13-152"), record=0.004)
+
+    run(p, 0.1)
+    t = [row[0] for row in p.take_rows()]
+
+    assert t == pytest.approx([0.004 * k for k in range(26)], abs=1e-12)
+    assert p.take_rows() == ()
+
+
 def test_an_event_between_ticks_acts_at_its_own_step() -> None:
     """A switch operated at 0.03 s, between two ticks of 0.02 s, shows in the row of 0.032 s and not before."""
     p = plant(*opened(0.03, "13-152"), record=0.002)
@@ -182,6 +217,20 @@ def test_an_inverter_leaves_and_comes_back_without_a_bump(name: str) -> None:
     ]
 
 
+def test_a_switch_can_be_operated_by_hand() -> None:
+    """Without any schedule a switch opens when told to, by its alias as well, and it is told if it was open already."""
+    p = plant(*opened(0.1, "13-152"))
+    run(p, 1.0)
+
+    already = [p.switch("67-67s", "close"), p.switch("sw1_2", "open"), p.switch("67s-67", "open")]
+    p.advance()
+    already.append(p.switch("sw1_2", "open"))
+
+    assert already == [True, False, True, True], "what was told for the same step counts too"
+    assert p.measure()["inv1"].island == "inv1"
+    assert p.measure()["inv4"].island == "inv4"
+
+
 def test_a_spare_is_off_until_it_is_connected() -> None:
     """A spare inverter changes nothing while it is off, and shares the load once it is on and has set-points."""
     events = opened(0.1, "13-152")
@@ -222,6 +271,17 @@ def scaled(factor: float, *events: SwitchEvent) -> Plant:
     feeder = read_feeder("microgrid123")
     loads = tuple(replace(load, S=tuple(factor * S for S in load.S)) for load in feeder.loads)
     return Plant(Network(replace(feeder, loads=loads)), PlantSettings(events=events), T_C, T_C)
+
+
+def test_the_grid_takes_back_an_island_out_of_phase() -> None:
+    """Two and a half seconds of droop put the island 122 degrees behind; closed so, it is pulled back into step."""
+    p = plant(*opened(0.1, "13-152"), SwitchEvent(t=2.5, switch="13-152", action="close"))
+
+    run(p, 6.0)
+
+    assert [event for event in p.take_events() if event.kind == "trip"] == []
+    assert [r.f for r in p.measure().values()] == pytest.approx([60.0] * 9, abs=1e-3)
+    assert np.isfinite(p.take_rows()).all()
 
 
 @pytest.mark.parametrize("factor", [1.6, 2.0])

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
+from gridpeers.plant.dynamics.simulation import Trip
 from gridpeers.plant.equipment.inverter_parameters import GfmParameters
 from gridpeers.plant.feeder import Plant
+from gridpeers.plant.feeder.islands import trip_event
 from gridpeers.plant.feeder.protection import ATTEMPTS, Recovery, Relays, Tripped
 from gridpeers.plant.known_names import DEFAULTS
 from gridpeers.plant.network import Network
@@ -57,6 +60,27 @@ def test_each_function_trips_after_its_clearing_time_and_not_a_step_before(categ
     assert steps_until_trip(relays, **beyond(name, threshold), most=round(400.0 / h)) == round(time / h)
 
 
+def test_a_setting_of_a_scenario_in_hertz_is_taken_as_it_stands() -> None:
+    """At 50 Hz the standard's defaults are in proportion; what somebody writes is meant in Hz."""
+    relays = Relays(Protection(trips={"OF2": (51.5, 0.1)}), 1, H, 50.0)
+    at = dict(zip(relays.names, relays.thresholds.tolist(), strict=True))
+
+    assert at["OF2"] == 51.5
+    assert at["OF1"] == pytest.approx(51.0)
+    assert at["UV1"] == 0.88
+
+
+@pytest.mark.parametrize(("category", "name"), SETTINGS)
+def test_at_its_threshold_no_function_trips(category: str, name: str) -> None:
+    """The threshold itself is not beyond it, however long it lasts; the other functions are out of the way."""
+    threshold, time = DEFAULTS[category][name]
+    away = {other: (1e3 if other[0] == "O" else -1.0, 1e3) for other in DEFAULTS[category] if other != name}
+    relays = Relays(replace(chosen(category), trips=away), 1, 0.1, 60.0)
+    at = dict.fromkeys(beyond(name, threshold), threshold)
+
+    assert steps_until_trip(relays, **at, most=round(time / 0.1) + 2) == 0
+
+
 def test_a_step_back_within_the_threshold_starts_the_clearing_time_anew() -> None:
     """A sag of 79 steps, one step of normal voltage and 79 steps of sag do not trip a function of 80 steps."""
     relays = Relays(Protection(category="II"), 1, H, 60.0)
@@ -90,6 +114,13 @@ def test_many_steps_at_once_are_the_same_as_one_by_one() -> None:
     assert found == one_by_one
 
 
+def test_an_inverter_that_is_off_does_not_trip() -> None:
+    """An inverter that delivers nothing, or stands in a dead island, is not tripped."""
+    relays = Relays(Protection(), 1, H, 60.0)
+
+    assert not any(relays.watch(row(60.0), row(0.0), row(0.0), np.array([False])) for _ in range(2000))
+
+
 def test_settings_of_a_scenario_go_before_the_defaults_and_off_is_off() -> None:
     """UV2 at 0.8 pu for 0.1 s trips where the default does not; category "off" never trips."""
     own = Relays(Protection(trips={"UV2": (0.8, 0.1)}), 1, H, 60.0)
@@ -97,6 +128,14 @@ def test_settings_of_a_scenario_go_before_the_defaults_and_off_is_off() -> None:
 
     assert steps_until_trip(own, low=0.75, most=100) == 50
     assert steps_until_trip(off, f=20.0, low=0.0, most=100) == 0
+
+
+def test_frequency_settings_follow_the_nominal_frequency() -> None:
+    """At 50 Hz UF2 is at 47.08 Hz, as 56.5 Hz is at 60 Hz."""
+    relays = Relays(Protection(), 1, H, 50.0)
+
+    assert steps_until_trip(relays, f=47.10, most=200) == 0
+    assert steps_until_trip(relays, f=47.07, most=200) == 80
 
 
 def wait(
@@ -133,6 +172,32 @@ def test_an_inverter_enters_service_after_the_delay_with_normal_voltage_and_freq
     assert recovery.passed(0) == enters
 
 
+def test_a_disturbance_while_waiting_starts_the_delay_anew() -> None:
+    """A step of low voltage after 1.9 s of a delay of 2 s costs another 2 s."""
+    recovery = Recovery(2.0, 1, H, 60.0)
+    recovery.trip(0)
+
+    wait(recovery, 950)
+    wait(recovery, 1, low=0.5)
+    wait(recovery, 999)
+    assert not recovery.passed(0)
+    wait(recovery, 1)
+
+    assert recovery.passed(0)
+
+
+def test_in_a_dead_island_the_delay_counts_from_the_trip() -> None:
+    """Where there is nothing to measure the delay passes all the same; when voltage comes it begins anew."""
+    recovery = Recovery(2.0, 1, H, 60.0)
+    recovery.trip(0)
+
+    wait(recovery, 1000, f=0.0, low=0.0, high=0.0, dead=True)
+    assert recovery.passed(0)
+    wait(recovery, 10)
+
+    assert not recovery.passed(0)
+
+
 def test_who_trips_again_and_again_stays_off() -> None:
     """The third trip without a minute in service between locks out; an agent that joins anew unlocks."""
     recovery = Recovery(2.0, 1, H, 60.0)
@@ -147,6 +212,17 @@ def test_who_trips_again_and_again_stays_off() -> None:
     recovery.unlock(0)
 
     assert not recovery.locked[0]
+
+
+def test_trips_far_apart_are_not_counted_together() -> None:
+    """After a minute in service an inverter may trip and come back as often as at first."""
+    recovery = Recovery(2.0, 1, 0.1, 60.0)
+
+    for _ in range(3 * ATTEMPTS):
+        assert not recovery.trip(0)
+        wait(recovery, 20)
+        recovery.enter(0)
+        wait(recovery, 600)
 
 
 UNLIMITED = GfmParameters(I_max=1000.0)
@@ -198,6 +274,33 @@ def test_underfrequency_trips_before_the_frequency_is_nonsense(category: str) ->
     assert np.isfinite(f).all()
 
 
+def test_a_trip_acts_at_its_very_step() -> None:
+    """The clearing time ends within a control period: the row of that step has power, the next one has none."""
+    p = plant(Protection(), *opened(1.0, "13-152"), limits=CLOUDS)
+
+    run(p, 3.0)
+
+    t, _, P, _ = history(p)
+    first = trips(p.take_events())[0]
+    k = int(np.argmin(np.abs(t - first.t)))
+    assert round(first.t / 0.002) % round(T_C / 0.002) != 0
+    assert np.all(P[k] != 0.0)
+    assert np.all(P[k + 1] == 0.0)
+
+
+def test_a_dead_island_has_no_frequency_and_its_inverters_no_island() -> None:
+    """After a blackout every inverter reads 0 V, 0 W, 0 Hz, and is told that it is out of service; the run goes on."""
+    p = plant(Protection(), *opened(1.0, "13-152"))
+    run(p, 2.0)
+
+    p.connect("inv1", False)
+    p.connect("inv4", False)
+    run(p, 4.0)
+
+    assert {(r.f, r.P, r.Q, r.V, r.island) for r in p.measure().values()} == {(0.0, 0.0, 0.0, 0.0, OFF)}
+    assert [event.kind for event in p.take_events() if event.kind in ("trip", "dead")] == ["trip", "dead"]
+
+
 def test_an_inverter_that_tripped_alone_comes_back_at_no_load_after_the_delay() -> None:
     """inv2 takes vars until its own voltage is below a narrow setting; the island goes on, and 1 s later it is back."""
     p = plant(Protection(trips={"UV1": (0.9416, 0.5)}, enter_service=1.0), *opened(1.0, "13-152"))
@@ -247,6 +350,38 @@ def test_leaders_that_return_start_a_dead_island_with_all_that_tripped_there() -
     assert all(59.5 < r.f < 60.1 for r in p.measure().values())
 
 
+def test_an_island_that_cannot_carry_its_load_is_not_started_for_ever() -> None:
+    """The remaining inverters try twice more; then they stay off until another joins."""
+    p = plant(Protection(enter_service=0.2), *opened(1.0, "13-152"))
+    run(p, 2.0)
+    p.connect("inv1", False)
+    p.connect("inv4", False)
+
+    run(p, 6.0)
+
+    told = [event.text for event in trips(p.take_events())]
+    assert sum(text.startswith("black start") for text in told) == 2
+    assert sum("3 times" in text for text in told) == 1
+    assert {r.V for r in p.measure().values()} == {0.0}
+
+
+def test_who_left_does_not_come_back_by_itself() -> None:
+    """An inverter whose agent left after a trip waits for nobody; the others start without it."""
+    p = plant(Protection(enter_service=1.0), *opened(1.0, "13-152"), *opened(2.2, "60-160"))
+    run(p, 2.0)
+    p.connect("inv1", False)
+    p.connect("inv4", False)
+    run(p, 2.1)
+    p.connect("inv2", False)
+    p.connect("inv1", True)
+    p.connect("inv4", True)
+
+    run(p, 5.0)
+
+    on = {name for name, reading in p.measure().items() if reading.P != 0.0}
+    assert on == {f"inv{k}" for k in (1, 3, 4, 5, 6, 7, 8, 9)}
+
+
 def test_an_island_without_solution_takes_no_other_with_it(network: Network) -> None:
     """Where a closing lets one of two live islands collapse, only its own inverters trip."""
     actions = ((1.0, "13-152", "open"), (1.5, "60-160", "open"), (1.62, "sw1_2", "open"), (1.88, "60-160", "close"))
@@ -258,3 +393,15 @@ def test_an_island_without_solution_takes_no_other_with_it(network: Network) -> 
     tripped = [event.text for event in trips(p.take_events())]
     assert len(tripped) == 1
     assert tripped[0].startswith("inv1, inv2, inv3 tripped, as the island has no solution")
+
+
+def test_generation_beyond_the_load_is_no_collapse_under_load() -> None:
+    """Where nothing takes what is generated, the trip says so, without a voltage that no network has."""
+    feeder = read_feeder("microgrid123")
+    loads = tuple(replace(load, S=(-load.S[0], -load.S[1], -load.S[2])) for load in feeder.loads)
+    network = Network(replace(feeder, loads=loads, source=None))
+    trip = Trip(step=0, inverters=(0,), substation=False, V_min=8e8)
+
+    text = trip_event(1.0, trip, network, frozenset(row.name for row in feeder.switches), ()).text
+
+    assert text.endswith("no solution: constant generation of 4192 kW more than the load")

@@ -5,10 +5,16 @@ from __future__ import annotations
 from math import degrees, pi
 
 import pytest
+from msgspec.structs import replace
 
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings, SwitchEvent, SyncCheck
+from gridpeers.plant.realtime.realtime_plant import RealtimePlant
+from gridpeers.wire.codec import decode, encode
+from gridpeers.wire.messages import Answer, Command
+from gridpeers.wire.node import Publish
+from tests.toy.toy_configs import toy_configs
 
 T_C = 0.02
 ISLANDING = SwitchEvent(t=0.1, switch="13-152", action="open")
@@ -101,6 +107,25 @@ def test_a_switch_that_is_never_in_step_gives_up(network: Network) -> None:
     assert not p.measure()["inv1"].grid_connected
 
 
+def test_opening_a_switch_ends_its_wait(network: Network) -> None:
+    """Opening a switch that waits to close ends its wait."""
+    p = plant(network, close(2.5, synchronised=True), SwitchEvent(t=3.0, switch="13-152", action="open"), f=1.0)
+    told = run(p, 12.0)
+
+    assert told[2] == "3.00 switch 13-152 was open already"
+    assert len(told) == 3
+
+
+def test_closing_by_hand_out_of_step_is_refused(network: Network) -> None:
+    """After a refusal nothing is operated; without the check it is."""
+    p = plant(network)
+    run(p, 2.5)
+
+    assert apart(p)[0] > 90.0
+    assert run(p, 2.6) == []
+    assert not p.switch("13-152", "close")
+
+
 def test_one_island_or_a_dead_side_needs_no_synchronism(network: Network) -> None:
     """A loop within one island, and a side without voltage, close at once and without a warning."""
     zone = (SwitchEvent(t=0.5, switch="60-160", action="open"), SwitchEvent(t=0.5, switch="61-61s", action="open"))
@@ -124,3 +149,23 @@ def test_islands_that_meet_across_a_dead_zone_are_told(network: Network) -> None
     told = run(p, 2.1)
 
     assert sum("joins two live islands: its sides are " in line for line in told) == 2
+
+
+def test_the_command_to_close_in_step_is_answered_with_the_differences(network: Network) -> None:
+    """`gridpeers event close --synchronised` is refused with the plant's reason, and the run goes on."""
+    p = plant(network)
+    run(p, 2.5)
+    config = replace(toy_configs(9, end=60.0)[0], clock="wall")
+    side = RealtimePlant(config, p)
+    side.start(0.0)
+    command = Command(sender="visitor", epoch=0, seq=0, t=0.0, verb="synchronise", argument="13-152", reply_to="v")
+    side.received(side.keys.command, encode(command), 0.1)
+
+    (answer,) = [
+        message
+        for action in side.take_actions()
+        if isinstance(action, Publish) and isinstance(message := decode(action.payload), Answer)
+    ]
+    assert not answer.ok
+    assert "switch 13-152 not closed: its sides are " in answer.text
+    assert run(p, 2.6) == []

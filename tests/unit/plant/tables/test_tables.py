@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.tables import FeederError, feeders, read_feeder
 from gridpeers.plant.tables.read import DATA
 
@@ -35,6 +36,15 @@ def problems(folder: Path, load_set: str = "main") -> tuple[str, ...]:
     return caught.value.problems
 
 
+def zone_powers(feeder: Feeder) -> dict[str, complex]:
+    """Sum of the loads of each zone (VA)."""
+    zone = {bus.name: bus.zone for bus in feeder.buses}
+    powers: dict[str, complex] = {}
+    for load in feeder.loads:
+        powers[zone[load.bus]] = powers.get(zone[load.bus], 0j) + sum(load.S)
+    return powers
+
+
 def test_tables_are_read_again_when_a_file_has_other_bytes(folder: Path) -> None:
     """A feeder that did not change is the one read before; an edit is seen, and its problems are told each time."""
     first = read_feeder(str(folder))
@@ -54,6 +64,36 @@ def test_standard_feeder_has_the_published_load() -> None:
     assert (len(feeder.buses), len(feeder.lines), len(feeder.loads), len(feeder.inverters)) == (130, 118, 85, 0)
 
 
+def test_zones_of_the_microgrids_carry_their_loads() -> None:
+    """Load set main has 760, 1252, 985 and 1195 kW in its four zones; MG1 has only inverters of its own."""
+    assert zone_powers(read_feeder("microgrid123", "main")) == {
+        "rest": 760e3 + 380e3j,
+        "passive": 1252e3 + 660e3j,
+        "MG2": 985e3 + 550e3j,
+        "MG3": 1195e3 + 690e3j,
+    }
+
+
+def test_event2_load_set_drops_more() -> None:
+    """Load set event2 has 1360 kW in the zone that event 2 drops, and 0.95 of the load in MG2 and MG3."""
+    main, event2 = (zone_powers(read_feeder("microgrid123", load_set)) for load_set in ("main", "event2"))
+
+    assert event2["passive"].real == 1360e3
+    assert event2["MG2"] == pytest.approx(0.95 * main["MG2"])
+    assert event2["MG3"] == pytest.approx(0.95 * main["MG3"])
+
+
+def test_inverters_are_those_of_the_paper() -> None:
+    """Three GFM of 600 kW and six GFL of 350 kW, 1 % and 5 % droop, three in each microgrid."""
+    inverters = read_feeder("microgrid123").inverters
+
+    assert [inverter.name for inverter in inverters] == [f"inv{i}" for i in range(1, 10)]
+    assert {inverter.name for inverter in inverters if inverter.kind == "GFM"} == {"inv1", "inv4", "inv7"}
+    assert {(inverter.kind, inverter.P_rated) for inverter in inverters} == {("GFM", 600e3), ("GFL", 350e3)}
+    assert {(inverter.m_p, inverter.m_q) for inverter in inverters} == {(0.01, 0.05)}
+    assert [inverter.microgrid for inverter in inverters] == ["MG1"] * 3 + ["MG2"] * 3 + ["MG3"] * 3
+
+
 def test_quantities_are_in_si_units() -> None:
     """Tables give kV, kW, m; the feeder has V (line-to-neutral), W, km."""
     feeder = read_feeder("microgrid123")
@@ -64,6 +104,14 @@ def test_quantities_are_in_si_units() -> None:
     assert config.Z[0][1] == pytest.approx((0.1560 + 0.5017j) / 1.609344)
     assert config.Z[1][0] == config.Z[0][1]
     assert config.B[0][0] == pytest.approx(5.6765e-6 / 1.609344)
+
+
+def test_folder_can_be_read_by_its_path(folder: Path) -> None:
+    """A feeder outside of the package is read from the path of its folder."""
+    feeder = read_feeder(str(folder), "event2")
+
+    assert (feeder.name, feeder.load_set) == ("mine", "event2")
+    assert feeder.loads == read_feeder("microgrid123", "event2").loads
 
 
 FLOATING = 'bus "610" stands behind a delta winding without ground'
@@ -239,6 +287,14 @@ def test_incomplete_matrix_is_told(folder: Path) -> None:
 def test_unknown_load_set_is_told_with_the_choice(folder: Path) -> None:
     """An unknown load set is told with those that exist."""
     assert problems(folder, "man") == ('load set "man": no such set; there are event2, main',)
+
+
+def test_feeder_without_load_sets_is_told(folder: Path) -> None:
+    """A feeder without any load table is told which file it needs."""
+    for path in folder.glob("loads_*.csv"):
+        path.unlink()
+
+    assert problems(folder)[0].startswith("loads_main.csv: no such file; a feeder needs it, with the columns bus,")
 
 
 def test_unknown_feeder_is_told_with_the_choice() -> None:
