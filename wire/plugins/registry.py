@@ -11,7 +11,7 @@ import importlib
 import sys
 from collections.abc import Callable, Collection
 from functools import cache
-from importlib.machinery import PathFinder
+from importlib.machinery import PathFinder, SourceFileLoader
 from importlib.util import find_spec
 from traceback import walk_tb
 from types import ModuleType
@@ -20,6 +20,9 @@ from typing import Any, Generic, TypeVar
 from gridpeers.wire.wording import is_no_path, printable, suggestion
 
 T = TypeVar("T")
+
+_changed: dict[str, float] = {}
+"""When the file of each module in a scenario's folder was last changed, at its import."""
 
 NOTEBOOK = "__main__"
 """Module of what is defined in a notebook or in the script that runs: no other process can import it."""
@@ -182,16 +185,28 @@ def _module(name: str, reference: str, folder: str) -> ModuleType:
             )
         module = importlib.import_module(name)
         found = getattr(sys.modules[top], "__spec__", None)
+        if meant is not None and found is not None and meant.origin != found.origin:
+            raise PluginError(
+                f"{reference}: Python has another module {top}, from {found.origin}, than that in {folder}; give one "
+                "of them another name"
+            )
+        return module if meant is None else _as_it_is_now(module)
     except PluginError:
         raise
     except ANYTHING as error:  # whatever a user's module does while it is imported
         raise PluginError(f"{reference}: importing {name} failed: {named(error)}") from error
-    if meant is not None and found is not None and meant.origin != found.origin:
-        raise PluginError(
-            f"{reference}: Python has another module {top}, from {found.origin}, than that in {folder}; give one of "
-            "them another name"
-        )
-    return module
+
+
+def _as_it_is_now(module: ModuleType) -> ModuleType:
+    """Return a module of the user's, imported again if its file was edited since, as between two runs of a notebook."""
+    spec = module.__spec__
+    if spec is None or not isinstance(spec.loader, SourceFileLoader):
+        return module
+    changed = spec.loader.path_stats(spec.loader.path)["mtime"]
+    if _changed.setdefault(module.__name__, changed) == changed:
+        return module
+    _changed[module.__name__] = changed
+    return importlib.reload(module)
 
 
 def _home(it: Any) -> tuple[str, str]:

@@ -221,6 +221,19 @@ def test_a_module_that_ends_python_while_it_is_imported_is_refused(tmp_path: Pat
         written({"use": "leaving_law:Mine", "folder": str(tmp_path)})
 
 
+def test_a_module_that_was_edited_is_read_again(tmp_path: Path) -> None:
+    """A law that is changed between two runs of a notebook takes effect, in process as with processes."""
+    text = "import gridpeers as gp\nclass Hold(gp.Law):\n    def step(self, own, neighbours, T):\n        return "
+    module = tmp_path / "edited_law.py"
+    law = {"use": "edited_law:Hold", "folder": str(tmp_path)}
+    module.write_text(text + "gp.SetPoints(own.P_set, own.V_set)\n")
+    first = written(law)
+    module.write_text(text + "gp.SetPoints(0.9 * own.P_set, own.V_set)\n")
+    os.utime(module, ns=(0, 10**18))
+
+    assert written(law).sha256 != first.sha256
+
+
 class Wanders(gp.Law):
     """Holds its set-points, somewhere else."""
 
