@@ -174,8 +174,12 @@ def _values_of(table: Mapping[str, Any], where: str, problems: Problems) -> dict
 
 def _twice(items: Sequence[Any]) -> Any:
     """Return the first item that comes again, or None; lists among them are compared as written."""
-    written = list(map(repr, items))
-    return next((item for i, item in enumerate(items) if written[i] in written[:i]), None)
+    seen: set[str] = set()
+    for item in items:
+        if (written := repr(item)) in seen:
+            return item
+        seen.add(written)
+    return None
 
 
 def is_number(value: Any) -> bool:
