@@ -74,7 +74,8 @@ def request(
     number = secrets.randbelow(MOST_COUNT)
     command = Command(sender="visitor", epoch=0, seq=number, t=0.0, reply_to=client.id, verb=verb, **command_fields)
     answer: Answer | None = None
-    came: dict[object, dict[str, LinkAcknowledgement]] = defaultdict(dict)
+    came: dict[int, dict[str, LinkAcknowledgement]] = defaultdict(dict)
+    acknowledged: dict[str, LinkAcknowledgement] = {}
     now = ask_at = monotonic()
     end = now + wait
     while now < end:
@@ -89,14 +90,16 @@ def request(
                 if not message.ok:
                     raise RefusedError(message.text)
                 answer, end, ask_at = message, monotonic() + ACKNOWLEDGED, inf
-        if answer is not None and came[answer.data.get("number")].keys() >= receivers(answer):
+                named = message.data.get("number")
+                acknowledged = came[named] if isinstance(named, int) else {}  # anybody may have sent the answer
+        if answer is not None and acknowledged.keys() >= receivers(answer):
             break
         now = monotonic()
     if answer is None:
         raise NobodyError(
             f"the plant of {client.where} is there but has not answered within {wait:.3g} s; is it frozen?"
         )
-    return answer, came[answer.data.get("number")]
+    return answer, acknowledged
 
 
 def plant_status(client: RunClient, wait: float = ANSWER) -> PlantStatus:

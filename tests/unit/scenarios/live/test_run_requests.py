@@ -176,6 +176,8 @@ def test_an_answer_of_another_form_is_told_in_one_line() -> None:
         plant_status(Client())  # type: ignore[arg-type]
     with pytest.raises(NobodyError, match=r"Expected `int`, got `bool` - at `\$.number`; is it of another version"):
         link_states(Client(number=True))  # type: ignore[arg-type]
+    with pytest.raises(NobodyError, match=r"Expected `int`, got `array` - at `\$.number`; is it of another version"):
+        link_states(Client(number=[3]))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
