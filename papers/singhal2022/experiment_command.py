@@ -1,12 +1,11 @@
-"""`gridpeers experiment`: from a name to a figure and a table."""
+"""`gridpeers experiment`: from a name to a figure and a table. The experiments are imported when one is run."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import pandas as pd
 import typer
 
 import gridpeers as gp
@@ -23,9 +22,10 @@ from gridpeers.cli.usage import (
     terminal,
 )
 from gridpeers.output_folders import RUNS, refusal, shown
-from gridpeers.papers.singhal2022.experiments import EXPERIMENTS, FromScenario, FromSweep
-from gridpeers.papers.singhal2022.experiments.experiment_data import CaseData, SweepData
-from gridpeers.papers.singhal2022.experiments.experiment_output import ExperimentResult
+
+if TYPE_CHECKING:
+    from gridpeers.papers.singhal2022.experiments import FromScenario, FromSweep
+    from gridpeers.papers.singhal2022.experiments.experiment_output import ExperimentResult
 
 
 def experiment(
@@ -50,6 +50,8 @@ def experiment(
 
     Example:  gridpeers experiment delay
     """
+    from gridpeers.papers.singhal2022.experiments import EXPERIMENTS, FromSweep
+
     if name == "list":
         for known, source in EXPERIMENTS.items():
             if isinstance(source, FromSweep):
@@ -77,6 +79,10 @@ def experiment(
 
 def _from_sweep(source: FromSweep, folder: Path, jobs: int | None, dask: str, again: Sequence[str]) -> ExperimentResult:
     """Do the runs of the sweep that are not done yet, and draw."""
+    import pandas as pd
+
+    from gridpeers.papers.singhal2022.experiments.experiment_data import SweepData
+
     plan = read(source.sweep, dask)
     summary = finish(source.sweep, plan, folder, jobs, dask, again)
     if summary.law_failed:
@@ -88,6 +94,8 @@ def _from_sweep(source: FromSweep, folder: Path, jobs: int | None, dask: str, ag
 
 def _from_scenario(source: FromScenario, folder: Path) -> ExperimentResult:
     """Run every case of the scenario in this process, and draw."""
+    from gridpeers.papers.singhal2022.experiments.experiment_data import CaseData
+
     scenario, left = gp.load(source.scenario), f"what came until then is in {shown(folder)}/"
     try:
         with ended_by_signals(left), progress(terminal(), tuple(scenario.cases)) as tell:

@@ -15,15 +15,12 @@ import typer
 from gridpeers.cli.usage import BAD_INPUT, check_choice, fail, load, refuse
 from gridpeers.feeder import Feeder, reader_of
 from gridpeers.output_folders import FolderError, refusal, shown, whole_folder, write_whole
-from gridpeers.plant.dynamics import PlantError
 from gridpeers.plant.equipment.connectivity import Connectivity
 from gridpeers.plant.equipment.derived_feeders import copy_name, joined_copies
 from gridpeers.plant.equipment.imported_equipment import is_behind
 from gridpeers.plant.equipment.neutrals import returns_in_words
-from gridpeers.plant.plant_config import PlantSettings
 from gridpeers.plant.tables import FeederError, feeders
 from gridpeers.rooms import ROOMS
-from gridpeers.scenarios.schema.configs import configs
 from gridpeers.wire.wording import counted, suggestion
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Import, check, solve, draw and export feeders.")
@@ -202,6 +199,10 @@ def glm(
 
     Example:  gridpeers feeder glm microgrid123 --scenario islanding --out islanding.glm
     """
+    from gridpeers.plant.dynamics import PlantError
+    from gridpeers.plant.plant_config import PlantSettings
+    from gridpeers.scenarios.schema.configs import configs
+
     if reader_of(feeder):
         fail([f"{feeder}: no feeder of our own tables; only those can be written for GridLAB-D"], BAD_INPUT)
     if scenario:

@@ -1,4 +1,7 @@
-"""Commands that start the plant of a live run: alone, or with all its agents."""
+"""Commands that start the plant of a live run: alone, or with all its agents.
+
+What the run itself needs is imported after the checks of the options: a wrong one is told at once.
+"""
 
 from __future__ import annotations
 
@@ -18,17 +21,6 @@ from gridpeers.cli.commands.options import (
     opened,
 )
 from gridpeers.cli.usage import ScenarioName, chosen, load
-from gridpeers.scenarios.live.live_files import LinkLog, check_new, folders, live_record
-from gridpeers.scenarios.live.live_options import (
-    LiveOptions,
-    check_alone,
-    chosen_case,
-    configure,
-    endpoint_for_run,
-    manual_node_faults,
-)
-from gridpeers.scenarios.live.live_processes import all_here, plant_here, say
-from gridpeers.scenarios.live.live_report import conclude
 from gridpeers.scenarios.live.run_address import (
     ENDPOINT,
     RUN,
@@ -38,12 +30,6 @@ from gridpeers.scenarios.live.run_address import (
     check_name,
     with_protocol,
 )
-from gridpeers.scenarios.record.record_info import LIVE
-from gridpeers.scenarios.results.file_sizes import HOUR, file_sizes, require_room
-from gridpeers.scenarios.results.metrics_file import RunMetrics
-from gridpeers.scenarios.results.recorded_events import ended_by_a_law, first_of, law_failures
-from gridpeers.scenarios.schema.configs import secured
-from gridpeers.scenarios.schema.plugin_keys import judges_laws
 from gridpeers.wire.driver.command_line import command_line
 from gridpeers.wire.driver.ending import watch_readers
 
@@ -92,6 +78,15 @@ class Start:
 
 def _start(start: Start, *, agents: bool) -> None:
     """Run the plant, with its agents or without, until it ends; end with its exit code."""
+    from gridpeers.scenarios.live.live_options import (
+        LiveOptions,
+        check_alone,
+        chosen_case,
+        configure,
+        endpoint_for_run,
+        manual_node_faults,
+    )
+
     # first: reading a scenario takes seconds, and a forgotten run is reported at once
     run = check_name("--run", start.run)
     credentials = opened(access := Access(keys=start.keys, insecure=start.insecure), ("plant",))
@@ -101,6 +96,16 @@ def _start(start: Start, *, agents: bool) -> None:
         check_open(option, text, access)
     endpoint = endpoint_for_run(listen, credentials, access)
     check_alone(run, beyond, credentials, access)
+
+    from gridpeers.scenarios.live.live_files import LinkLog, check_new, folders, live_record
+    from gridpeers.scenarios.live.live_processes import all_here, plant_here, say
+    from gridpeers.scenarios.live.live_report import conclude
+    from gridpeers.scenarios.record.record_info import LIVE
+    from gridpeers.scenarios.results.file_sizes import HOUR, file_sizes, require_room
+    from gridpeers.scenarios.results.metrics_file import RunMetrics
+    from gridpeers.scenarios.results.recorded_events import ended_by_a_law, first_of, law_failures
+    from gridpeers.scenarios.schema.configs import secured
+    from gridpeers.scenarios.schema.plugin_keys import judges_laws
 
     spec, feeder = load(start.scenario)
     check_new(start.record)

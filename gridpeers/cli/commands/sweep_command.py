@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -24,10 +24,12 @@ from gridpeers.cli.usage import (
 )
 from gridpeers.scenarios.results.run_files import FolderError, refusal, shown
 from gridpeers.scenarios.schema import ScenarioError
-from gridpeers.scenarios.sweep.study import Summary, SweepFolder, folder_of, study
 from gridpeers.scenarios.sweep.sweep_reading import Plan, read_sweep
 from gridpeers.scenarios.sweep.workers import WorkersError, cores
 from gridpeers.wire.driver.command_line import command_line
+
+if TYPE_CHECKING:
+    from gridpeers.scenarios.sweep.study import Summary
 
 
 def sweep(
@@ -55,6 +57,8 @@ def sweep(
     if dry_run:
         typer.echo(_size(file, plan))
         return
+    from gridpeers.scenarios.sweep.study import folder_of
+
     again = ["sweep", file, *(["--out", str(out)] if out else [])]
     summary = finish(file, plan, folder_of(out, plan.name), jobs, dask, again)
     for line in failure_lines(summary):
@@ -92,6 +96,8 @@ def finish(file: str, plan: Plan, path: Path, jobs: int | None, dask: str, again
 
     `again` has the words of the command that goes on with what was interrupted.
     """
+    from gridpeers.scenarios.sweep.study import SweepFolder, study
+
     console = terminal()
     try:
         with interruptible(), SweepFolder(path, plan) as folder:

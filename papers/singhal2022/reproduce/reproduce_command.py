@@ -1,4 +1,4 @@
-"""The command `gridpeers reproduce`."""
+"""The command `gridpeers reproduce`. The experiments and the report are imported when it runs."""
 
 from __future__ import annotations
 
@@ -25,9 +25,6 @@ from gridpeers.cli.usage import (
     terminal,
 )
 from gridpeers.output_folders import FolderError, OutputLostError, new_folder, refusal, set_broken, shown
-from gridpeers.papers.singhal2022.paper_benchmarks import headline
-from gridpeers.papers.singhal2022.reproduce.report import Reproduction, write
-from gridpeers.papers.singhal2022.reproduce.work import CHOICES, Work, chosen
 
 
 def reproduce(
@@ -62,6 +59,10 @@ def reproduce(
 
     Example:  gridpeers reproduce --driver inprocess
     """
+    from gridpeers.papers.singhal2022.paper_benchmarks import headline
+    from gridpeers.papers.singhal2022.reproduce.report import Reproduction, write
+    from gridpeers.papers.singhal2022.reproduce.work import CHOICES, Work, chosen
+
     if only is not None:
         check_choice("--only: ", "part", only, CHOICES)
     if dask:
