@@ -111,6 +111,7 @@ _OF_ROOMS = ("Counterfactual", "Prediction", "counterfactual", "predict", "repla
 """Public names that rooms above the face bring (`gridpeers.rooms`)."""
 
 if not TYPE_CHECKING:
+    __all__ = [*_HOME, *_OF_ROOMS]
 
     def __getattr__(name: str) -> Any:
         """Import a public name on its first use."""

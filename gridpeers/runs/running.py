@@ -57,14 +57,14 @@ def run(
         raise ScenarioError(wrong)
     sizes = file_sizes(spec, scenario.feeder, clock=pace.get("clock", "simulated"))
     require_room(Path(tempfile.gettempdir()) if folder is None else as_folder(folder), sizes)
-    try:
-        home = RunFolder(
-            Path(tempfile.mkdtemp(prefix="gridpeers-")) if folder is None else new_home(folder),
-            temporary=folder is None,
-        )
-    except OSError as error:
-        text = f"there is nowhere for temporary files: {error.strerror}; say folder=..., or set TMPDIR"
-        raise FolderError(text) from error
+    if folder is not None:
+        home = RunFolder(new_home(folder))
+    else:
+        try:
+            home = RunFolder(Path(tempfile.mkdtemp(prefix="gridpeers-")), temporary=True)
+        except OSError as error:
+            text = f"there is nowhere for temporary files: {error.strerror}; say folder=..., or set TMPDIR"
+            raise FolderError(text) from error
     lasting = folder is not None
     request = Request(scenario=spec, feeder=scenario.feeder, driver=driver, folder=home.path, lasting=lasting, **pace)
     try:

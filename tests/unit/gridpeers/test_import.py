@@ -21,7 +21,10 @@ def test_importing_gridpeers_loads_nothing_heavy() -> None:
 
 
 def test_every_public_name_is_there_and_an_unknown_one_is_told_with_the_nearest() -> None:
-    """Every name that `dir` lists can be imported."""
+    """Every name that `dir` lists can be imported, and `*` imports them."""
     assert all(getattr(gp, name) is not None for name in dir(gp))
+    starred: dict[str, object] = {}
+    exec("from gridpeers import *", starred)
+    assert starred.keys() - {"__builtins__"} == {*dir(gp)} - {"__version__"}
     with pytest.raises(AttributeError, match='did you mean "load"'):
         _ = gp.lod  # type: ignore[attr-defined]
