@@ -51,7 +51,8 @@ def circuit_of(request: ImportRequest) -> DssCircuit:
         process, folder = _processes[os.getpid()]
         try:
             process.send(request._asdict())
-            import gridpeers.plant.network  # noqa: F401  takes longer to load than the engine to read a small script
+            # meanwhile: loading it takes longer than the engine takes to read a small script
+            import gridpeers.plant.network  # noqa: F401
 
             answer = process.answer(monotonic() + LONGEST)
             if answer is None:
@@ -125,7 +126,7 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         try:
             Path(CIRCUIT).write_bytes(pickle.dumps(circuit, pickle.HIGHEST_PROTOCOL))
         except OSError as error:
-            Path(CIRCUIT).unlink()
+            Path(CIRCUIT).unlink(missing_ok=True)
             problem = no_room("what the OpenDSS engine reads", str(error))
             return {"problems": [f"{Path(request['path']).name}: {problem}"]}
     except FeederError as error:
