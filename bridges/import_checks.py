@@ -1,4 +1,4 @@
-"""What all imports of feeders share: problems with their places, what nothing feeds, names that tables can hold."""
+"""Steps of every import of a feeder: give problems their places, leave out what nothing feeds, make names plain."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ BEYOND = 100.0  # voltage (pu) that only a singular matrix gives
 MATCH = 1e-6  # largest difference (pu of nominal voltage) of voltages that count as equal
 TOLERANCE = 1e-11  # largest change of any voltage (pu) in the last iteration of our power flow
 SHOWN_NAMES, SHOWN_BUSES = 5, 8
-"""So many buses of a section, or loads, a sentence names; so many buses a note of other names."""
+"""A sentence names at most so many loads, or buses of a section; a note on renamed buses names at most so many."""
 
 MOST_UNFED = 0.5
 """Part of a feeder's load that may be without a path to the source; more of it is a mistake in the file."""
@@ -80,7 +80,9 @@ def refuse_if(path: Path, problems: Collection[str], places: Mapping[str, str] |
 
 
 def placed(problem: str, places: Mapping[str, str]) -> str:
-    """Return a problem behind the file and line of what it begins with, the first of several, if they are known.
+    """Return a problem after the file and line of the element that it begins with, if they are known.
+
+    Where it begins with several elements, the place is that of the first.
 
     >>> places = {"load.a": "x.dss:7", "bus n 1": "x.dss:3"}
     >>> placed("load.a, load.b: constant power to ground", places), placed("buses n 1, n2 (first n 1.A): apart", places)
@@ -97,7 +99,7 @@ def placed(problem: str, places: Mapping[str, str]) -> str:
 
 
 def of_script(problem: str, folder: Path, script: str, places: Mapping[str, str]) -> str:
-    """Return a problem of an imported feeder's tables ("buses.csv row 3: ...") as one of the script, with its place.
+    """Return a problem of an imported feeder's tables ("buses.csv row 3: ...") with its place in the script instead.
 
     `folder` has the tables; `places` are those of the feeder.
     """

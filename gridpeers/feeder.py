@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 Names = Sequence[str]
-"""Several names; a text is one."""
+"""Several names; a text counts as one name."""
 
 
 class Feeder(Tables, frozen=True, kw_only=True):

@@ -73,7 +73,7 @@ class Scenario:
 
     @classmethod
     def _of(cls, tree: Tree, path: Path, text: str, changed: frozenset[str], problems: Problems) -> Scenario:
-        """Make one of the tables of a file; `changed` keys have no line in it."""
+        """Make a scenario of the tables of a file; `changed` keys have no line in it."""
         self = cls.__new__(cls)
         self._set(tree, path, text, changed, problems)
         return self
@@ -251,10 +251,12 @@ def plain(value: Any, depth: int = 0) -> Any:
     if isinstance(value, Enum):
         return plain(value.value, depth)
     if isinstance(value, str | PurePath):
+        text = str(value)
         try:
-            return str(value).encode().decode()
+            text.encode()
         except UnicodeEncodeError:
             raise ValueError("has half a character in it, which no file can hold") from None
+        return text
     if isinstance(value, bool) or value is None:
         return value
     if isinstance(value, int):

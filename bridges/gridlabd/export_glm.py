@@ -27,7 +27,7 @@ module powerflow {{
 	line_limits false;
 	default_maximum_voltage_error 1e-11;
 }}"""
-"""Of a feeder without inverters: its power flow is solved once."""
+"""Head of the model of a feeder without inverters, whose power flow is solved once."""
 
 
 def export_glm(feeder: Feeder, settings: PlantSettings, seconds: int, voltages: str) -> str:

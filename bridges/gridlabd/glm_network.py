@@ -17,7 +17,7 @@ FOOT, MILE, FEET_PER_MILE = 0.3048e-3, 1.609344, 5280.0
 """Lengths (km): GridLAB-D takes lines in feet and impedances per mile."""
 
 NOMINAL_ANGLE = {"A": 0.0, "B": -2 * pi / 3, "C": 2 * pi / 3, "AB": pi / 6, "BC": -pi / 2, "CA": 5 * pi / 6}
-"""Of a load branch (rad): phase to ground, or phase to phase."""
+"""Nominal angle (rad) of the voltage across a load, from a phase to ground or between two phases."""
 
 Z_SWITCH, R_REGULATOR = complex(2**-10, 2**-10), 2**-10
 """Impedance of each phase of a closed switch and of a regulator (ohm): powers of two, so that it cancels to the bit."""

@@ -165,7 +165,8 @@ def unrepresentable(feeder: Feeder) -> list[str]:
 def beyond_gridlabd(own: InverterParameters) -> dict[str, str]:
     """Return, by their keys in a file, the values that no inverter of GridLAB-D has.
 
-    Every other parameter is written by `glm_inverters`, or bounds set-points, which is done before GridLAB-D gets them.
+    `glm.inverter_blocks` writes every other parameter, but for bounds of set-points, which are applied before GridLAB-D
+    gets these.
     """
     found: dict[str, str] = {}
     if isinstance(own, GfmParameters):

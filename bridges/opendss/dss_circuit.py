@@ -43,7 +43,7 @@ class ImportRequest(NamedTuple):
 
 
 class DssCircuit(NamedTuple):
-    """What the engine made of a script: a feeder, not yet checked as a network."""
+    """A circuit that the engine has read: the feeder, not yet checked as a network, and the engine's voltages."""
 
     feeder: Feeder
     problems: list[str]  # what cannot be represented

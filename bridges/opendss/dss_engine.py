@@ -36,9 +36,9 @@ WHOLE = frozenset({"set", "help", "sel", "select", "reset"})
 ABOUT_AN_ELEMENT = frozenset({"new", "edit", "~", "m", "more"})
 METERS = frozenset({"energymeter", "monitor", "sensor"})  # classes that measure: they have no part in the network
 ASIDE = METERS | {"loadshape", "tshape", "priceshape", "spectrum", "tcc_curve"}
-"""Classes that a snapshot does without: one that fails is a note."""
+"""Classes that a snapshot does without: a mistake in one is a note and no problem."""
 
-FREQUENCY = "the circuit's frequency"  # Begins a problem with what `set frequency` or `set defaultbasefrequency` says
+FREQUENCY = "the circuit's frequency"  # begins a problem with what `set frequency` or `set defaultbasefrequency` gives
 HUNTING = "Max Control Iterations Exceeded"  # in the engine's warning on controls that move on and on
 FILE = re.compile(r"""(\b\w*file\s*=\s*)("[^"]+"|'[^']+'|\([^()]+\)|\[[^\[\]]+\]|[^\s,"'()\[\]]+)""", re.IGNORECASE)
 """A file that a property names."""

@@ -36,7 +36,7 @@ SWING = 0.02  # swing of a frequency (Hz) that is at rest
 
 
 class Unrest(NamedTuple):
-    """What keeps a plant from coming to rest."""
+    """The reason why a plant does not come to rest."""
 
     text: str
     """"its frequencies swing by 0.35 Hz, and do not calm down", or what tripped, after which limit of a current."""

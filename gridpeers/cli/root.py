@@ -69,7 +69,7 @@ COMMANDS: Registry[Callable[..., None]] = Registry(
 
 
 class LazyCommands(Commands):
-    """All commands by their names; the help has the line of each of ours without its module."""
+    """All commands by name; the help shows the summaries of our own without importing their modules."""
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names: gridpeers' own first."""
@@ -129,7 +129,7 @@ app = typer.Typer(
 
 def _version(asked: bool) -> None:
     if asked:
-        from importlib.metadata import version  # it brings a mail reader; starts need none of this
+        from importlib.metadata import version  # it loads the package email, which few commands need
 
         typer.echo(f"gridpeers {version('gridpeers')}")
         raise typer.Exit

@@ -91,9 +91,9 @@ def chosen(spec: ScenarioModel, case: str | None, seed: int | None) -> ScenarioM
 
 
 def require(modules: Mapping[str, str], install: str = "") -> None:
-    """End with advice if a package of an extra is missing, given with its use.
+    """End with advice if a package of an extra is missing; `modules` says what each package is needed for.
 
-    A missing package of the core ends any command with its name (`gridpeers.cli.app`), and needs no such check.
+    Packages of the core need no such check: `gridpeers.cli.app` ends any command with the name of a missing one.
     """
     lacking = [name for name in modules if util.find_spec(name) is None]
     if lacking:
@@ -105,7 +105,7 @@ def require(modules: Mapping[str, str], install: str = "") -> None:
 
 
 def require_loadable(module: str, user: str) -> None:
-    """End with a clear line if a package with a library of its own, an extra by its name, is missing or damaged."""
+    """End with a clear line if a package with a library of its own is missing or damaged; its extra has its name."""
     require({module: user}, f"install it: pip install 'gridpeers[{module}]'")
     done = subprocess.run([sys.executable, "-P", "-c", f"import {module}"], capture_output=True, text=True, check=False)
     if done.returncode:
@@ -126,7 +126,7 @@ def interruptible() -> Iterator[None]:
 
     Signals within a second are one request, those of Ctrl-C too, which `timeout` passes on twice.
     """
-    from gridpeers.scenarios.results.run_files import TerminatedError  # with msgspec, which the help starts without
+    from gridpeers.scenarios.results.run_files import TerminatedError  # imports msgspec, which the help does without
 
     terminate, numbers = StopSignal(TerminatedError), [signal.SIGTERM]
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else a shell has it ignored, or another has it

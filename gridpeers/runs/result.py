@@ -195,9 +195,9 @@ class Result(_FromFolder):
         """Events of the plant and the agents: time t (s), kind, subject, text."""
         return self._folder.read(f"{self.case}/events.csv", frames.events_frame)
 
-    @property
+    @cached_property
     def plant_events(self) -> list[PlantEvent]:
-        """The same as the plant sent them."""
+        """The events as the plant sent them."""
         rows = self.events.itertuples(index=False)
         return [PlantEvent(t=row.t, kind=row.kind, subject=row.subject, text=row.text) for row in rows]
 
@@ -265,7 +265,7 @@ class Result(_FromFolder):
 
     @cached_property
     def check_verdicts(self) -> tuple[CheckVerdict, ...]:
-        """Verdicts of the checks, each with its violations (docs/checks.md); of now if the run has none."""
+        """Verdicts of the checks, each with its violations (docs/checks.md); judged now if the run saved none."""
         saved = self._run.saved_verdicts
         return saved[self.case] if self.case in saved else judge_case(self.checked_case)
 

@@ -26,7 +26,7 @@ class PaperTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A table of the paper, as tables.toml has it."""
 
     experiment: str
-    """Key `paper` of the scenario of ours that has its numbers."""
+    """Key `paper` of our scenario that reproduces the table."""
     title: str
     events: tuple[str, ...]
     quantities: tuple[Quantity, ...]
@@ -72,11 +72,12 @@ def tables_of(experiment: str) -> tuple[PaperTable, ...]:
 
 
 V_RELATIVE = 0.25
-"""Of the paper's number, which is what printing hides of the 0.002 that it prints most often, or half of its last
-digit: a zero passes a bound of 0.003 pu, and not this one."""
+"""Part of the paper's V_error by which ours may differ, if half of the last digit is not more. Rounding to three
+decimals hides as much of 0.002, the value that is printed most often. A zero passes the table's bound of 0.003 pu, and
+does not pass this one."""
 MQSI_FACTOR = 2.0
-"""How many times an MQSI may be the paper's, or the paper's it, to count as near: it depends on where loads, inverters
-and capacitors stand, which the paper does not print."""
+"""An MQSI counts as near the paper's if neither is more than so many times the other: it depends on where loads,
+inverters and capacitors stand, which the paper does not print."""
 
 WITHIN = 1.0  # s; the paper: "in less than 1 s"
 F_NONE = 0.01  # Hz; half of the smallest residual that is not 0 in Table I is far above it

@@ -48,7 +48,7 @@ SHOWN = 12
 
 @contextmanager
 def _problems_told(feeder: str, file: Path | str) -> Iterator[None]:
-    """End with every problem of a feeder, or with why it or the file that is written cannot be used."""
+    """End the command with every problem of a feeder, or with the reason why a file cannot be written."""
     try:
         yield
     except FeederError as error:

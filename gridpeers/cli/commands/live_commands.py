@@ -1,6 +1,6 @@
-"""Commands to a live run, look at it, change it, end it, and the command that joins it: an agent.
+"""Commands that look at a live run, change it or end it, and the command `agent`, which joins one.
 
-What one of them needs alone is imported in it: people wait for them.
+People wait for them: what only one of them needs is imported when it is called.
 """
 
 from __future__ import annotations

@@ -68,17 +68,13 @@ class LiveRun:
 
     @contextmanager
     def client(self, *, meet_agents: bool = False, acts: bool = False) -> Iterator[RunClient]:
-        """Yield a client to the run, whose plant is there; one that `acts` changes something, which a viewer may not.
-
-        An error that a user can make ends the command with one line.
-        """
-        with usage_errors():
-            check_wait(self.wait)
-            roles: tuple[Role, ...] = COMMANDING if acts else ("operator", "viewer")
-            where = address(self.run, self.connect, Access(self.keys, self.member, self.insecure), roles)
-            with RunClient(where, meet_agents=meet_agents) as client:
-                client.find_plant(self.wait)
-                yield client
+        """Yield a client to the run once its plant is there; one that `acts` changes something, which no viewer may."""
+        check_wait(self.wait)
+        roles: tuple[Role, ...] = COMMANDING if acts else ("operator", "viewer")
+        where = address(self.run, self.connect, Access(self.keys, self.member, self.insecure), roles)
+        with RunClient(where, meet_agents=meet_agents) as client:
+            client.find_plant(self.wait)
+            yield client
 
 
 def of_live_run(command: Callable[..., None]) -> Callable[..., None]:
@@ -147,7 +143,7 @@ def usage_errors() -> Iterator[None]:
 
 
 def finish(outcome: ProcessOutcome, *, law_failed: bool = False) -> None:
-    """End with the exit code of a live run; `law_failed` takes the place of one that broke, or ended well."""
+    """End with the exit code of a live run; `law_failed` gives that of a failed law, however the run itself ended."""
     if outcome.interrupted:
         code = TERMINATED if outcome.interrupted == "SIGTERM" else INTERRUPTED
         fail([f"{outcome.interrupted}: everything that was started here has ended"], code)

@@ -75,7 +75,7 @@ class Page:
     names: Mapping[int, str]
     """Meaning of the styles, for the legend."""
     looks: Mapping[Look, str] | None = None
-    """Meaning of the looks, for the legend; by default measured and predicted are told."""
+    """Meaning of the looks, for the legend; by default those of measured and predicted."""
     share_y: bool = False
     height: float = 3.0
     """Height of a row of panels (inch)."""
@@ -102,7 +102,7 @@ class ExperimentTable:
     digits: int = 3
     """Significant digits in Markdown; CSV has all."""
     apart: int = 0
-    """Number of first columns whose values part it into tables of their own in Markdown."""
+    """So many first columns split the table in Markdown: one table for each of their values."""
 
     def as_csv(self) -> str:
         text = io.StringIO()

@@ -246,8 +246,8 @@ SWINGS = (
     ("f_swing_Hz", 0.005, "f, V_set left alone", "swing of f (Hz)", ALONE),
     ("V_swing_pu", 0.002, "V, whole law", "swing of V (pu)", WHOLE),
 )
-"""Swings, the least that counts (an oscillation that stays is ten times as large), title, label, and k_q of the runs:
-frequency where the voltage is left alone, and voltage where nothing is."""
+"""Rows of the figure: a swing, the least that counts (an oscillation that stays is ten times as large), title, label of
+the axis, and k_q of the runs. The voltage is left alone in the first, and controlled in the second."""
 
 LEAST = 1e-5
 """Swings below this (Hz, pu) are drawn as this: the rest of a transient, or rounding."""

@@ -45,7 +45,7 @@ class Reproduction:
 
     @property
     def failed(self) -> bool:
-        """Whether a claim failed that is no known miss. A number out of its tolerance fails the claim on its column."""
+        """True if a claim failed that is no known miss. A number out of its tolerance fails the claim on its column."""
         return self.counts()["FAIL"] > 0
 
     def counts(self) -> dict[str, int]:

@@ -47,9 +47,9 @@ class Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The course of events, in a sentence or two."""
     picture: tuple[Picture, ...]
     experiment: str = ""
-    """Whose tables and claims; "" for one that is ours."""
+    """Key `paper` of the scenario, by which the paper's tables and claims are found; empty if the part is ours."""
     tables: bool = False
-    """Whether the paper has a table of it."""
+    """True if the paper prints a table of the experiment."""
 
 
 class Setting(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -60,7 +60,7 @@ class Setting(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Its value with the unit: a format of the tables of the first scenario."""
     why: str
     case: str = ""
-    """Case whose gains are meant, of the part reduced-communication; without that part it is not shown."""
+    """Case of the part reduced-communication whose gains are shown; without that part the setting is left out."""
 
 
 class _Parts(msgspec.Struct, forbid_unknown_fields=True):
