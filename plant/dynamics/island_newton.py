@@ -7,14 +7,14 @@ from no load on, and the solutions of low voltage the other. So None means that 
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from gridpeers.plant.dynamics.circuit import LoadLaw
+from gridpeers.plant.dynamics.kept_network import WEAK, BlockPattern
 from gridpeers.plant.dynamics.kernel.compiled import Complex, Real
+from gridpeers.plant.dynamics.kernel.network_arrays import factorise_blocks, solve_blocks
 from gridpeers.plant.dynamics.threads import one_thread
 
 ITERATIONS = 40  # of Newton's method; it takes 4 to 10
@@ -25,21 +25,40 @@ ROUNDING, STALL = 1e-8, 4
 NOISE = 1e-12  # residual (pu) below which it need not shrink: it is rounding
 
 
-class IslandEquations(Protocol):
-    """The equations of one island, F(V) = 0."""
+class SparseIsland:
+    """An island by its node voltages, F(V) = Y V + C I_b(C^T V + c) - J; `from_sources`: c (V); `right`: J (A)."""
 
-    without_load: Complex  # voltages (V) without load, where the continuation begins
-    V_nom: Real  # nominal magnitudes (V)
+    def __init__(self, Y: sp.csc_array, C: sp.csc_array, loads: LoadLaw, from_sources: Complex, right: Complex) -> None:
+        self._Y, self._C, self._loads, self._c, self._right = Y, C, loads, from_sources, right
+        self.without_load: Complex = splu(sp.csc_matrix(Y)).solve(right) if right.size else right
+        self.V_nom: Real = np.maximum(np.abs(self.without_load), 1.0)
+        own, most = np.abs(Y.diagonal()), abs(Y).max(axis=1).toarray().ravel() if right.size else 0.0
+        self._scale = np.where(own <= WEAK * most, most, own) * self.V_nom
+        self._pattern = BlockPattern(Y, C)
 
     def residual(self, V: Complex, part: float) -> tuple[Complex, float]:
-        """Return F and its size (pu) with this part of the load."""
+        """Return F (A) and its size (pu of what the nodes' admittances draw) with this part of the load."""
+        drawn = self._loads.currents(self._C.T @ V + self._c)
+        F = self._Y @ V + part * (self._C @ drawn) - self._right
+        return F, float(np.max(np.abs(F) / self._scale, initial=0.0))
 
     def step(self, V: Complex, F: Complex, part: float) -> tuple[Complex, bool] | None:
         """Return Newton's step (V), and whether V is on the branch of high voltage; None if there is none."""
+        A, B = self._loads.tangent(self._C.T @ V + self._c)
+        matrix = self._pattern.matrix(part * A, part * B)
+        # without load the determinant is that of a complex matrix, squared in magnitude: positive
+        positive = factorise_blocks(matrix)
+        step = (-F).view(float)
+        solve_blocks(matrix, step)
+        dV = step.view(complex)
+        if not np.isfinite(dV).all():  # it is singular
+            return None
+        small = float(np.max(np.abs(dV) / self.V_nom, initial=0.0)) <= ROUNDING
+        return dV, not small or positive
 
 
 @one_thread()
-def solve_island(island: IslandEquations, guess: Complex) -> Complex | None:
+def solve_island(island: SparseIsland, guess: Complex) -> Complex | None:
     """Return the voltages (V) of an island, from a guess (V); None if there are none."""
     if not np.isfinite(island.without_load).all():
         return None
@@ -48,7 +67,7 @@ def solve_island(island: IslandEquations, guess: Complex) -> Complex | None:
         return _raise_load(island) if solution is None else solution
 
 
-def _raise_load(island: IslandEquations) -> Complex | None:
+def _raise_load(island: SparseIsland) -> Complex | None:
     V, part, step = island.without_load, 0.0, 0.25
     while part < 1.0:
         solution = _newton(island, V, min(1.0, part + step))
@@ -62,7 +81,7 @@ def _raise_load(island: IslandEquations) -> Complex | None:
     return V
 
 
-def _newton(island: IslandEquations, guess: Complex, part: float) -> Complex | None:
+def _newton(island: SparseIsland, guess: Complex, part: float) -> Complex | None:
     """Return the solution with this part of the load, on the branch of high voltage; None if none is found."""
     V, former, stalled = guess, np.inf, 0
     F, size = island.residual(V, part)

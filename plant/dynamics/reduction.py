@@ -17,11 +17,11 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import SuperLU, splu
 
-from gridpeers.plant.dynamics.circuit import Circuit, LoadLaw
-from gridpeers.plant.dynamics.island_newton import ROUNDING, solve_island
-from gridpeers.plant.dynamics.kept_network import WEAK, BlockPattern, kept_network
+from gridpeers.plant.dynamics.circuit import Circuit
+from gridpeers.plant.dynamics.island_newton import SparseIsland, solve_island
+from gridpeers.plant.dynamics.kept_network import kept_network
 from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Integers, Real
-from gridpeers.plant.dynamics.kernel.network_arrays import COPY, Reduced, SparseMaps, factorise_blocks, solve_blocks
+from gridpeers.plant.dynamics.kernel.network_arrays import COPY, Reduced, SparseMaps, factorise_blocks
 
 FLOATING = 1e-12
 """Admittance to ground, relative to all of a node's, in an island that single-phase inverters alone feed: else phases
@@ -171,7 +171,7 @@ class Reduction:
             theta_lin=np.array([theta[k] if k >= 0 else 0.0 for k in self.leader]),
             sparse=SparseMaps(
                 factored=matrix,
-                constant=_interleaved(constant),
+                constant=np.ascontiguousarray(constant, complex).view(float),
                 ends=pattern.ends,
                 ratios=pattern.ratios,
                 from_sources=from_sources,
@@ -237,37 +237,3 @@ class Reduction:
         V = np.zeros(self.circuit.Y.shape[0], complex)
         V[self.circuit.sources] = source_voltage
         return np.asarray(V[self.circuit.terminals].reshape(-1, 3))
-
-
-class SparseIsland:
-    """An island by its node voltages, F(V) = Y V + C I_b(C^T V + c) - J; `from_sources`: c (V); `right`: J (A)."""
-
-    def __init__(self, Y: sp.csc_array, C: sp.csc_array, loads: LoadLaw, from_sources: Complex, right: Complex) -> None:
-        self._Y, self._C, self._loads, self._c, self._right = Y, C, loads, from_sources, right
-        self.without_load: Complex = splu(sp.csc_matrix(Y)).solve(right) if right.size else right
-        self.V_nom: Real = np.maximum(np.abs(self.without_load), 1.0)
-        own, most = np.abs(Y.diagonal()), abs(Y).max(axis=1).toarray().ravel() if right.size else 0.0
-        self._scale = np.where(own <= WEAK * most, most, own) * self.V_nom
-        self._pattern = BlockPattern(Y, C)
-
-    def residual(self, V: Complex, part: float) -> tuple[Complex, float]:
-        drawn = self._loads.currents(self._C.T @ V + self._c)
-        F = self._Y @ V + part * (self._C @ drawn) - self._right
-        return F, float(np.max(np.abs(F) / self._scale, initial=0.0))
-
-    def step(self, V: Complex, F: Complex, part: float) -> tuple[Complex, bool] | None:
-        A, B = self._loads.tangent(self._C.T @ V + self._c)
-        matrix = self._pattern.matrix(part * A, part * B)
-        # without load the determinant is that of a complex matrix, squared in magnitude: positive
-        positive = factorise_blocks(matrix)
-        step = _interleaved(-F)
-        solve_blocks(matrix, step)
-        dV = step.view(complex)
-        if not np.isfinite(dV).all():  # it is singular
-            return None
-        small = float(np.max(np.abs(dV) / self.V_nom, initial=0.0)) <= ROUNDING
-        return dV, not small or positive
-
-
-def _interleaved(V: Complex) -> Real:
-    return np.ascontiguousarray(V, complex).view(float)

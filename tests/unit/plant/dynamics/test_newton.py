@@ -11,10 +11,10 @@ from msgspec.structs import replace
 
 from gridpeers.plant.dynamics import Circuit, Dynamics, PlantError
 from gridpeers.plant.dynamics.circuit import LoadLaw
-from gridpeers.plant.dynamics.island_newton import solve_island
+from gridpeers.plant.dynamics.island_newton import SparseIsland, solve_island
 from gridpeers.plant.dynamics.kernel.compiled import Complex
 from gridpeers.plant.dynamics.live_network import unsettled_island
-from gridpeers.plant.dynamics.reduction import Reduction, SparseIsland
+from gridpeers.plant.dynamics.reduction import Reduction
 from gridpeers.plant.equipment.inverter_parameters import GfmParameters
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.feeder.circuits import Circuits
