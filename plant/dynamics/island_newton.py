@@ -25,27 +25,36 @@ ROUNDING, STALL = 1e-8, 4
 NOISE = 1e-12  # residual (pu) below which it need not shrink: it is rounding
 
 
-class SparseIsland:
-    """An island by its node voltages, F(V) = Y V + C I_b(C^T V + c) - J; `from_sources`: c (V); `right`: J (A)."""
+class Island:
+    """The admittances (S) between an island's nodes, and its load branches, prepared for Newton's method."""
 
-    def __init__(self, Y: sp.csc_array, C: sp.csc_array, loads: LoadLaw, from_sources: Complex, right: Complex) -> None:
-        self._Y, self._C, self._loads, self._c, self._right = Y, C, loads, from_sources, right
-        self.without_load: Complex = splu(sp.csc_matrix(Y)).solve(right) if right.size else right
+    def __init__(self, Y: sp.csc_array, C: sp.csc_array, loads: LoadLaw) -> None:
+        self.Y, self.C, self.loads = Y, C, loads
+        self.factors = splu(sp.csc_matrix(Y))
+        own, most = np.abs(Y.diagonal()), abs(Y).max(axis=1).toarray().ravel()
+        self.scale = np.where(own <= WEAK * most, most, own)  # admittances (S) by which residuals are judged
+        self.pattern = BlockPattern(Y, C)
+
+
+class _Equations:
+    """F(V) = Y V + C I_b(C^T V + c) - J of an island; `from_sources`: c (V); `right`: J (A)."""
+
+    def __init__(self, island: Island, from_sources: Complex, right: Complex) -> None:
+        self._island, self._c, self._right = island, from_sources, right
+        self.without_load: Complex = island.factors.solve(right)
         self.V_nom: Real = np.maximum(np.abs(self.without_load), 1.0)
-        own, most = np.abs(Y.diagonal()), abs(Y).max(axis=1).toarray().ravel() if right.size else 0.0
-        self._scale = np.where(own <= WEAK * most, most, own) * self.V_nom
-        self._pattern = BlockPattern(Y, C)
+        self._scale = island.scale * self.V_nom
 
     def residual(self, V: Complex, part: float) -> tuple[Complex, float]:
         """Return F (A) and its size (pu of what the nodes' admittances draw) with this part of the load."""
-        drawn = self._loads.currents(self._C.T @ V + self._c)
-        F = self._Y @ V + part * (self._C @ drawn) - self._right
+        it = self._island
+        F = it.Y @ V + part * (it.C @ it.loads.currents(it.C.T @ V + self._c)) - self._right
         return F, float(np.max(np.abs(F) / self._scale, initial=0.0))
 
     def step(self, V: Complex, F: Complex, part: float) -> tuple[Complex, bool] | None:
         """Return Newton's step (V), and whether V is on the branch of high voltage; None if there is none."""
-        A, B = self._loads.tangent(self._C.T @ V + self._c)
-        matrix = self._pattern.matrix(part * A, part * B)
+        A, B = self._island.loads.tangent(self._island.C.T @ V + self._c)
+        matrix = self._island.pattern.matrix(part * A, part * B)
         # without load the determinant is that of a complex matrix, squared in magnitude: positive
         positive = factorise_blocks(matrix)
         step = (-F).view(float)
@@ -58,19 +67,23 @@ class SparseIsland:
 
 
 @one_thread()
-def solve_island(island: SparseIsland, guess: Complex) -> Complex | None:
-    """Return the voltages (V) of an island, from a guess (V); None if there are none."""
-    if not np.isfinite(island.without_load).all():
+def solve_island(island: Island, from_sources: Complex, right: Complex, guess: Complex) -> Complex | None:
+    """Return the voltages (V) of an island, from a guess (V); None if there are none.
+
+    `from_sources`: what ideal sources contribute to the branches' voltages (V); `right`: currents into the nodes (A).
+    """
+    equations = _Equations(island, from_sources, right)
+    if not np.isfinite(equations.without_load).all():
         return None
     with np.errstate(all="ignore"):  # a trial beyond all bounds is not finite, and is not taken
-        solution = _newton(island, guess, 1.0)
-        return _raise_load(island) if solution is None else solution
+        solution = _newton(equations, guess, 1.0)
+        return _raise_load(equations) if solution is None else solution
 
 
-def _raise_load(island: SparseIsland) -> Complex | None:
-    V, part, step = island.without_load, 0.0, 0.25
+def _raise_load(equations: _Equations) -> Complex | None:
+    V, part, step = equations.without_load, 0.0, 0.25
     while part < 1.0:
-        solution = _newton(island, V, min(1.0, part + step))
+        solution = _newton(equations, V, min(1.0, part + step))
         if solution is None:
             step /= 2.0
             if step < SHORTEST_STEP:
@@ -81,29 +94,29 @@ def _raise_load(island: SparseIsland) -> Complex | None:
     return V
 
 
-def _newton(island: SparseIsland, guess: Complex, part: float) -> Complex | None:
+def _newton(equations: _Equations, guess: Complex, part: float) -> Complex | None:
     """Return the solution with this part of the load, on the branch of high voltage; None if none is found."""
     V, former, stalled = guess, np.inf, 0
-    F, size = island.residual(V, part)
+    F, size = equations.residual(V, part)
     for _ in range(ITERATIONS):
         if not np.isfinite(size):
             return None
-        taken = island.step(V, F, part)
+        taken = equations.step(V, F, part)
         if taken is None:
             return None
         dV, high = taken
-        largest = float(np.max(np.abs(dV) / island.V_nom, initial=0.0))
+        largest = float(np.max(np.abs(dV) / equations.V_nom, initial=0.0))
         stalled = stalled + 1 if size <= NOISE and 0.5 * former <= largest <= ROUNDING else 0
         if largest <= TOLERANCE or stalled == STALL:
             return V + dV if high else None
         former = largest
         length = 1.0
-        F_next, size_next = island.residual(V + dV, part)
+        F_next, size_next = equations.residual(V + dV, part)
         while not size_next < (1.0 - 1e-4 * length) * size and size > NOISE:
             length /= 2.0
             if length < SHORTEST_STEP:
                 return None
-            F_next, size_next = island.residual(V + length * dV, part)
+            F_next, size_next = equations.residual(V + length * dV, part)
         V, F, size = V + length * dV, F_next, size_next
     return None
 

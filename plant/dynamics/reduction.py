@@ -12,13 +12,14 @@ each such island is solved in a frame that rotates with its first GFM, and the t
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import SuperLU, splu
 
 from gridpeers.plant.dynamics.circuit import Circuit
-from gridpeers.plant.dynamics.island_newton import SparseIsland, solve_island
+from gridpeers.plant.dynamics.island_newton import Island, solve_island
 from gridpeers.plant.dynamics.kept_network import kept_network
 from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Integers, Real
 from gridpeers.plant.dynamics.kernel.network_arrays import COPY, Reduced, SparseMaps, factorise_blocks
@@ -102,7 +103,6 @@ class Reduction:
         np.add.at(self._filters, self._at[joined], np.broadcast_to(np.asarray(y_f)[:, None], joined.shape)[joined])
         self._Y = (kept.Y + sp.diags_array(self._filters)).tocsc()
         self.node_island = self.label[kept.nodes]
-        self._lu: SuperLU | None = None
 
     def __deepcopy__(self, memo: object) -> Reduction:
         """Nothing in it is ever written: copies of a plant share it, as they share its circuit."""
@@ -189,25 +189,29 @@ class Reduction:
         return self.all_voltages(J, self.loads.currents(V_b), source_voltage)
 
     def solve_islands(self, J: Complex, source_voltage: Complex, guess: Complex) -> tuple[Complex, tuple[int, ...]]:
-        V_b, failed, C = guess.copy(), [], self._kept.C
+        """Return branch voltages (V) by Newton's method, and the islands without solution, which keep the guess."""
         from_sources = self._kept.C_S.T @ source_voltage
         right = self._injected(J, self._at, self._Y.shape[0]) - self._kept.Y_S @ source_voltage
         beginning = self._node_guess(guess, from_sources, right)
-        for k in np.flatnonzero(self.live).tolist():
-            nodes, own = np.flatnonzero(self.node_island == k), np.flatnonzero(self.branch_island == k)
-            island = SparseIsland(
-                self._Y[nodes][:, nodes].tocsc(),
-                C[nodes][:, own].tocsc(),
-                self.loads.of(own),
-                from_sources[own],
-                right[nodes],
-            )
-            solution = solve_island(island, beginning[nodes]) if nodes.size else np.zeros(0, complex)
-            if solution is None:
+        V_b, failed = from_sources.copy(), []
+        for k, nodes, own, island in self._islands:
+            V = solve_island(island, from_sources[own], right[nodes], beginning[nodes])
+            if V is None:
                 failed.append(k)
+                V_b[own] = guess[own]
             else:
-                V_b[own] = C[nodes][:, own].T @ solution + from_sources[own]
+                V_b[own] += island.C.T @ V
         return V_b, tuple(failed)
+
+    @cached_property
+    def _islands(self) -> list[tuple[int, Integers, Integers, Island]]:
+        """Each live island with unknown nodes: its number, its nodes, its branches, and what Newton's method needs."""
+        islands = []
+        for k in np.unique(self.node_island).tolist():
+            nodes, own = np.flatnonzero(self.node_island == k), np.flatnonzero(self.branch_island == k)
+            Y, C = self._Y[nodes][:, nodes].tocsc(), self._kept.C[nodes][:, own].tocsc()
+            islands.append((k, nodes, own, Island(Y, C, self.loads.of(own))))
+        return islands
 
     def _node_guess(self, V_b: Complex, from_sources: Complex, right: Complex) -> Complex:
         """Return node voltages (V) that go with the loads' currents at these branch voltages (V)."""
@@ -220,12 +224,16 @@ class Reduction:
     def all_voltages(self, J: Complex, I_b: Complex, source_voltage: Complex) -> Complex:
         V = np.zeros(self.circuit.Y.shape[0], complex)
         if self.unknown.size:
-            if self._lu is None:
-                self._lu = splu(sp.csc_matrix(self.Y[self.unknown][:, self.unknown]))
             right = self._injected(J, self._whole_at, self.unknown.size)
-            V[self.unknown] = self._lu.solve(right - self._kept.Y_S_whole @ source_voltage - self._kept.C_whole @ I_b)
+            V[self.unknown] = self._factors.solve(
+                right - self._kept.Y_S_whole @ source_voltage - self._kept.C_whole @ I_b
+            )
         V[self.circuit.sources] = source_voltage
         return V
+
+    @cached_property
+    def _factors(self) -> SuperLU:
+        return splu(sp.csc_matrix(self.Y[self.unknown][:, self.unknown]))
 
     def _injected(self, J: Complex, at: Integers, size: int) -> Complex:
         right = np.zeros(size, complex)

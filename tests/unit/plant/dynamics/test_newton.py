@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from gridpeers.plant.dynamics import Circuit, Dynamics, PlantError
 from gridpeers.plant.dynamics.circuit import LoadLaw
-from gridpeers.plant.dynamics.island_newton import SparseIsland, solve_island
+from gridpeers.plant.dynamics.island_newton import Island, solve_island
 from gridpeers.plant.dynamics.kernel.compiled import Complex
 from gridpeers.plant.dynamics.live_network import unsettled_island
 from gridpeers.plant.dynamics.reduction import Reduction
@@ -30,8 +30,8 @@ def voltage_of(P: float, E_0: complex, guess: complex) -> Complex | None:
     """Voltage (V) of one load of constant power P (W) behind a reactance X (ohm) and a source E_0 (V)."""
     load = LoadLaw(S=np.array([P + 0j]), I0=np.zeros(1, complex))
     y = 1.0 / (1j * X)
-    island = SparseIsland(sp.csc_array([[y]]), sp.csc_array([[1.0]]), load, np.zeros(1, complex), np.array([E_0 * y]))
-    return solve_island(island, np.array([guess]))
+    island = Island(sp.csc_array([[y]]), sp.csc_array([[1.0]]), load)
+    return solve_island(island, np.zeros(1, complex), np.array([E_0 * y]), np.array([guess]))
 
 
 @pytest.mark.parametrize("part", [0.1, 0.9, 0.999])
@@ -59,8 +59,9 @@ def test_a_load_behind_next_to_no_impedance_has_the_textbook_voltage(B: float) -
     load = LoadLaw(S=np.array([P + 0j]), I0=np.zeros(1, complex))
     Y = sp.csc_array(np.array([[y + 1.0 / (1j * X), -y], [-y, y]]))
     right = np.array([E / (1j * X), 0.0])
+    island = Island(Y, sp.csc_array([[0.0], [1.0]]), load)
 
-    V = solve_island(SparseIsland(Y, sp.csc_array([[0.0], [1.0]]), load, np.zeros(1, complex), right), right)
+    V = solve_island(island, np.zeros(1, complex), right, right)
 
     assert V is not None
     assert abs(V[1]) ** 2 == pytest.approx(E**2 / 2.0 + np.sqrt(E**4 / 4.0 - (X_all * P) ** 2), rel=1e-7)
