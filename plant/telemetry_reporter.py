@@ -138,21 +138,22 @@ BLOCK = 1 << 20
 class KeptTelemetry:
     """Messages on the key of telemetry, in their order.
 
-    Each has the number of the next or same Telemetry: messages between two of them count to the later one.
+    Each has the number of a Telemetry: its own, or that of the next one for a message between two of them.
     """
 
     def __init__(self) -> None:
         self._kept: deque[tuple[int, memoryview]] = deque()
-        self._block, self._filled = memoryview(bytearray()), 0
+        self._room = memoryview(bytearray())  # what is left of the last block
         self.bytes = 0
 
     def keep(self, number: int, payload: bytes) -> None:
-        start, end = self._filled, self._filled + len(payload)
-        if end > len(self._block):
-            self._block, start, end = memoryview(bytearray(max(BLOCK, len(payload)))), 0, len(payload)
-        self._block[start:end], self._filled = payload, end
-        self._kept.append((number, self._block[start:end]))
-        self.bytes += len(payload)
+        size = len(payload)
+        if size > len(self._room):
+            self._room = memoryview(bytearray(max(BLOCK, size)))
+        self._room[:size] = payload
+        self._kept.append((number, self._room[:size]))
+        self._room = self._room[size:]
+        self.bytes += size
 
     def drop_before(self, number: int) -> None:
         while self._kept and self._kept[0][0] < number:
