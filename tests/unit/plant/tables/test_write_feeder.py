@@ -81,6 +81,8 @@ def test_an_inverter_added_to_a_feeder_of_ours_is_saved(tmp_path: Path) -> None:
             {"P_rated": "much", "m_p": None},
             'P_rated_kW must be a number, got "much"; .*m_p_pu must be a number, got "None"',
         ),
+        ({"name": None, "microgrid": None}, "name is empty; .*microgrid is empty; give a name"),
+        ({"P_rated": 10**400}, "P_rated_kW must be a number, got"),
         ({"name": 1, "kind": 2}, 'inverter "1": kind "2": no such kind'),
         ({"params": {1: 2}}, "1: unknown key; the keys are"),
         ({"bus": "610", "phases": "A"}, 'bus "610" stands behind a delta winding without ground'),
