@@ -79,14 +79,12 @@ class Inverters:
         self.positive_sequence = _spread(n, self.gfm_at, self.gfm["positive_sequence"], False)
         self.direct = _spread(n, self.gfm_at, ~self.gfm["voltage_control"], False)
         self.S_max = _spread(n, self.gfl_at, self.gfl["S_max"], np.inf)
-        self.Q_min, self.Q_max = (
-            _spread(n, self.gfl_at, self.gfl[name], other) for name, other in (("Q_min", -np.inf), ("Q_max", np.inf))
-        )
+        self.Q_min = _spread(n, self.gfl_at, self.gfl["Q_min"], -np.inf)
+        self.Q_max = _spread(n, self.gfl_at, self.gfl["Q_max"], np.inf)
         self.from_edge = _spread(n, self.gfl_at, self.gfl["from_edge"], False)
-        self.db_UV, self.db_OV = (
-            _spread(n, self.gfl_at, np.where(self.gfl["volt_var"], self.gfl[name], np.inf), 0.0)
-            for name in ("db_UV", "db_OV")
-        )
+        volt_var = self.gfl["volt_var"]
+        self.db_UV = _spread(n, self.gfl_at, np.where(volt_var, self.gfl["db_UV"], np.inf), 0.0)
+        self.db_OV = _spread(n, self.gfl_at, np.where(volt_var, self.gfl["db_OV"], np.inf), 0.0)
         self.P_set_lim = np.array([unit.parameters.P_set_lim for unit in units])
         self.V_set_min = np.array([unit.parameters.V_set_min for unit in units])
         self.V_set_max = np.array([unit.parameters.V_set_max for unit in units])

@@ -91,7 +91,7 @@ class BlockPattern:
         self._Y = self._blocks(Y)
         self.ends, self.ratios = _ends(C)
         pairs = list(combinations(self.ends.T, 2))
-        self._across = np.full((self.ends.shape[0], max(len(pairs), 1)), -1, np.int64)
+        self._across = np.full((self.ends.shape[0], len(pairs)), -1, np.int64)
         for k, (first, second) in enumerate(pairs):
             both = (first >= 0) & (second >= 0)
             self._across[both, k] = self._entry(first[both], second[both])

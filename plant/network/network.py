@@ -130,7 +130,7 @@ class Network:
         other = copy(self)
         other.feeder = feeder
         other.Y_loads = other._impedance_loads()  # noqa: SLF001  its own class
-        other._Y = other.Y_branches + other.Y_capacitors + other.Y_loads  # noqa: SLF001
+        other._Y = other.Y_branches + other.Y_capacitors + other.Y_loads  # noqa: SLF001  its own class
         return other
 
     def islands(self, closed: frozenset[str]) -> tuple[frozenset[str], ...]:

@@ -113,7 +113,5 @@ class SilenceDetector:
         if back:
             yield name, f"{name} hears {', '.join(back)} again"
         if news:
-            yield (
-                name,
-                f"{name} does not hear {', '.join(news)}: no state for {self._max_age:g} s, though one came here",
-            )
+            others = ", ".join(news)
+            yield name, f"{name} does not hear {others}: no state for {self._max_age:g} s, though one came here"

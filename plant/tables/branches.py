@@ -124,9 +124,10 @@ def read_line_configs(buses: BusTable) -> dict[str, LineConfig] | None:
         missing = [f"{a}-{b}" for a in phases for b in phases if a <= b and (a, b) not in matrix]
         if missing and name not in spoiled:
             last_row[name].problem(f'config "{name}" lacks element {", ".join(missing)}; give the whole upper triangle')
-        blank = (0j, 0.0)
-        Z, B = (tuple(tuple(matrix.get((a, b), blank)[k] for b in phases) for a in phases) for k in (0, 1))
-        configs[name] = LineConfig(name=name, phases=phases, Z=Z, B=B)  # type: ignore[arg-type]
+        rows = [[matrix.get((a, b), (0j, 0.0)) for b in phases] for a in phases]
+        Z = tuple(tuple(z for z, _ in row) for row in rows)
+        B = tuple(tuple(susceptance for _, susceptance in row) for row in rows)
+        configs[name] = LineConfig(name=name, phases=phases, Z=Z, B=B)
         if missing or name in spoiled | mistaken:
             continue
         for what, part in (("an R", lambda z: z.real), ("an X", lambda z: z.imag)):
