@@ -115,7 +115,7 @@ class RequestProcess:
             self._requests.flush()
 
     def answer(self, until: float) -> dict[str, Any] | None:
-        """Return the next answer, None without one by a time of `monotonic` (s); ProcessEndedError says how it ends."""
+        """Return the next answer, None without one by a time of `monotonic` (s); ProcessEndedError if it has ended."""
         while b"\n" not in self._unread:
             if not self._selector.select(max(0.0, until - monotonic())):
                 return None

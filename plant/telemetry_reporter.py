@@ -127,8 +127,8 @@ class Reporter:
 
 
 WINDOW = 1_000_000
-"""Bytes without acknowledgement beyond which the plant goes on with no further tick: so many does a loopback link take
-without its reader."""
+"""Bytes without acknowledgement beyond which the plant waits before its next tick: a loopback link holds as many when
+nobody reads it, so Zenoh does not close it before."""
 
 
 BLOCK = 1 << 20

@@ -25,7 +25,7 @@ class OperatingPoint:
     I: Complex  # noqa: E741  # the paper's symbol for current
     V_branch: Complex  # voltages of the live load branches (V)
     on_droop: Flags  # inverters whose voltage is V_set - m_q q, not in a dead band or at the limit of Q
-    on_edge: Flags  # inverters on the edge of a dead band, around whose Q of this point Q will hunt
+    on_edge: Flags  # inverters on the edge of a dead band: their Q will hunt around that of this point
 
 
 def equilibrium(

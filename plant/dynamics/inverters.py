@@ -131,8 +131,8 @@ class Inverters:
     def hold(self, i: int, P_set: float, V_set: float) -> tuple[float, float]:
         """Take set-points (pu) from the next step on, within the inverter's bounds; return the held ones.
 
-        A GFL's P_set is clipped before the droop (7) is added, as in GridLAB-D (4.4): it cannot hide a later
-        over-frequency.
+        A GFL's P_set is clipped before the droop (7) is added, as in GridLAB-D (4.4): so a set-point beyond the rating
+        does not cancel the droop of a later over-frequency.
         """
         limit = self.P_set_lim.item(i)
         P_set = float(min(max(P_set, -limit), limit))

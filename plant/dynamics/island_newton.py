@@ -1,8 +1,8 @@
 """Voltages of one island by Newton's method, for where the frozen tangent of the inner loop does not lead.
 
 A fresh tangent is taken each iteration, and steps are shortened until the residual shrinks. Where that fails the load
-is raised from nothing to all of it, which follows the solution of high voltage: its Jacobian's determinant has one sign
-from no load on, and the solutions of low voltage the other. So None means that the island has no solution.
+is raised from nothing to all of it, which follows the solution of high voltage: there the Jacobian's determinant keeps
+the sign that it has without load, and at solutions of low voltage it has the other. So None means: no solution exists.
 """
 
 from __future__ import annotations
@@ -124,8 +124,8 @@ def _newton(equations: _Equations, guess: Complex, part: float) -> Complex | Non
 def weak_branches(Y: sp.csc_array, C: sp.csc_array, loads: LoadLaw, V_nom: Real) -> dict[int, float]:
     """Return branches of constant power that are too much even alone, and the short-circuit powers there (VA).
 
-    A power S behind an impedance Z has a solution where V^2 >= 2 (|Z S| + Re(Z S^*)). It is the one that no load leads
-    to where V^2 / S is greater than Z, too. `Y`, `C`: at the nodes of unknown voltage.
+    A power S behind an impedance Z has a solution where V^2 >= 2 (|Z S| + Re(Z S^*)). A load that grows from nothing
+    comes to this solution only if V^2 / |S| is at least |Z|, too. `Y`, `C`: at the nodes of unknown voltage.
     """
     S, rows = loads.S.astype(complex), loads.law
     S[loads.limited_at] = np.where((rows[:, 3] == 0.0) & (rows[:, 4] == 0.0), rows[:, 0] + 1j * rows[:, 1], 0.0)

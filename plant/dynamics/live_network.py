@@ -175,8 +175,7 @@ class LiveNetwork:
 def unsettled_island(net: Reduced, units: Units, x: Real, tolerance: float) -> int:
     """Return the island whose voltages still change most after as many iterations as the inner loop takes.
 
-    `net`: linearised at the present angles; `units`: of which a solution within the current limits failed, begun at
-    `x`.
+    `net`: linearised at the present angles; `units`, `x`: where a solution within the current limits began, and failed.
     """
     x, J, V, limiting = x.copy(), units.J.copy(), units.V.copy(), units.limiting.copy()
     I_b = np.empty(x.size // 2, complex)

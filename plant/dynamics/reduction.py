@@ -38,8 +38,8 @@ class Reduction:
 
     `y_f`: filter admittance of each inverter (S per phase); `online`: the connected ones; the others are open.
 
-    `unknown`: nodes in live islands, of any admittance, not held by a source; `place`: position of each node among
-    them, or -1; `earthing`: inverters that earth their neutral, because nothing else does in an island of theirs (IEC
+    `unknown`: nodes in live islands that have an admittance and that no source holds; `place`: position of each node
+    among them, or -1; `earthing`: inverters that earth the neutral of their island, because nothing else does (IEC
     60364-5-551).
     """
 

@@ -67,7 +67,7 @@ class SetPointLimits:
         return [PlantEvent(t=t, kind="limit", subject=name, text=text)]
 
 
-LIMITS = "limits its phase currents"  # words of these events alone; their kind, `limit`, has others
+LIMITS = "limits its phase currents"  # words that tell these events from others of the kind `limit`
 PAUSE = 0.1  # time (s) without limiting after which the next limiting is a spell of its own
 
 

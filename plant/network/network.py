@@ -87,7 +87,7 @@ class Network:
         return text if text in self.switches else switch_name(self.feeder, text)
 
     def merge(self, closed: frozenset[str]) -> Merge:
-        """Return the nodes merged by these switches and the regulators; sources and inverters represent theirs."""
+        """Return the nodes merged by these switches and the regulators; a source's or inverter's node represents."""
         return merge_nodes(self._node_names(), self._ties(closed), self._wanted)
 
     def admittance(self, closed: frozenset[str]) -> sp.csc_array:

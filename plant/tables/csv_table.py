@@ -47,7 +47,7 @@ class CsvRow(Generic[C]):
         return name not in known
 
     def require(self, column: str, plausible: Plausible) -> None:
-        """Note a number that is not plausible, beside what its column asks of it."""
+        """Note a number that its column allows, but that is not plausible here."""
         value = getattr(self.columns, column)
         if not math.isnan(value) and (text := plausible.objection(value, named(self._table, column).unit)):
             self.wrong.add(column)

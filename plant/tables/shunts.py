@@ -127,7 +127,7 @@ def _require_bank_voltage(row: CsvRow[Any], V_rated: float, bus: Bus) -> None:
 
 
 class InverterPlaces(NamedTuple):
-    """What an inverter's place is held against."""
+    """What the place and rating of an inverter are checked against."""
 
     load: float  # the feeder's load (W): a rating of more than `TIMES_THE_LOAD` of it is in another unit
     taken: dict[tuple[str, str], str]  # the inverter at each node
@@ -179,7 +179,7 @@ def read_inverters(
 
 
 def problems_of(inverter: InverterRow, bus: Bus, feeder: Feeder) -> list[str]:
-    """Return what the tables would refuse of a further inverter of a feeder, at a bus of it."""
+    """Return what is wrong with a further inverter at a bus of a feeder, as its tables would say."""
     problems: list[str] = []
     others = (*feeder.inverters, *feeder.spares)
     row = CsvRow(columns.InverterColumns, f'inverter "{inverter.name}"', inverter_cells(inverter), problems)

@@ -47,7 +47,7 @@ class Units(NamedTuple):
     J: Complex  # injections (A), n_inv x 3: in, those of the network solution; out, the new ones
     J_0: Complex  # injections (A) at the start of the step
     V: Complex  # terminal voltages (V), n_inv x 3, of the last network solution
-    I: Complex  # noqa: E741  # the paper's symbol  # currents out of the inverters (A)
+    I: Complex  # noqa: E741  # the paper's symbol; currents out of the inverters (A)
     limiting: Flags  # inverters whose phase currents were limited in the last network solution
 
 

@@ -67,7 +67,7 @@ STATE = np.dtype(
 
 
 def own_feedback(par: GflParameters) -> complex:
-    """Return the part of a current before a pass that the current after it gains, at the same voltage (dq, 4.6)."""
+    """Return d i_after / d i_before of the current over one pass, at the same voltage (dq, section 4.6)."""
     return (1j * par.X_f * par.F_current - par.k_pc) / complex(par.R_f, par.X_f)
 
 
@@ -148,7 +148,7 @@ def power_reference(g: Any, P_set: float, f_m: float) -> float:
 
 @compiled
 def var_reference(g: Any, V_set: float, Q_set: float, V_m: float, P_d: float) -> float:
-    """Volt-var characteristic (8) with dead band and the limits, of which P leaves one, section 4.4 (pu)."""
+    """Volt-var characteristic (8) with dead band, within its limits and what P leaves of S_max, section 4.4 (pu)."""
     Q_d = Q_set
     if g.volt_var and not (V_set - g.db_UV < V_m < V_set + g.db_OV):
         edge = 0.0

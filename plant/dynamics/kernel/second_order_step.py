@@ -39,7 +39,7 @@ class FeedForward(NamedTuple):
     y: Complex
     """Admittance (S) between the internal voltage that a pass gives and the terminal; 0: a pass gives the current
     itself, or its internal voltage is a state and the admittance is part of the network."""
-    gain: Complex  # 1 / (1 - a), a: part of a current before a pass that the current after it gains
+    gain: Complex  # 1 / (1 - a), where a is d i_after / d i_before of the current over a pass
     I_b: Real  # rated currents (A)
     V_b: float  # highest nominal voltage (V)
 

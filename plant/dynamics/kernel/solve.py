@@ -83,8 +83,8 @@ def limited_tangents(at: Integers, law: Real, V: Complex, A: Complex, B: Complex
 
 
 MAX_ITERATIONS = 60
-CAUTION = 0.1  # part of the tolerance that what is left of an iteration may have by its rate so far
-NOISE = 100.0  # change, over the tolerance, from which on the next one tells its rate, not rounding
+CAUTION = 0.1  # part of the tolerance that all later changes together may have, by the rate so far
+NOISE = 100.0  # change (tolerances) above which the next change shows the rate of convergence, not rounding
 
 
 @compiled
