@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import re
 import tempfile
-import traceback
+from collections.abc import Iterator
 
 _ERRORS = (
     *(errno.ENOMEM, errno.EAGAIN, errno.EMFILE, errno.ENFILE),
@@ -33,7 +33,7 @@ class MachineError(Exception):
 
 
 def machine_error(*told: BaseException | str) -> MachineError | None:
-    r"""Return the error of the machine in errors of a run, or in what it tells of its processes, laws and checks.
+    r"""Return the lack that errors of a run, or texts on its processes, laws and checks, name; None if they name none.
 
     Examples
     --------
@@ -41,8 +41,14 @@ def machine_error(*told: BaseException | str) -> MachineError | None:
     'the machine lacks what a run needs (OSError: [Errno 24] Too many open files)'
     >>> machine_error(FileNotFoundError(errno.ENOENT, "No such file", "mine.csv"))
     """
-    for it in told:  # an error brings along those that have led to it
-        text = it if isinstance(it, str) else "".join(traceback.format_exception(it))
+    for text in (text for it in told for text in ([it] if isinstance(it, str) else _texts(it))):
         if lines := [line for line in text.splitlines() if _WORDS.search(line)]:
             return MachineError(lines[-1].strip())  # an error ends its traceback
     return None
+
+
+def _texts(error: BaseException | None) -> Iterator[str]:
+    """Yield the text of an error, and of those that led to it, also where `raise ... from None` hides them."""
+    while error is not None:
+        yield f"{type(error).__name__}: {error}".rstrip(": ")
+        error = error.__cause__ or error.__context__

@@ -64,6 +64,23 @@ def test_a_lack_is_known_by_its_words(told: BaseException | str) -> None:
     assert str(machine_error(told)).startswith(f"{LACKS} (")
 
 
+def test_a_lack_is_known_behind_the_error_that_hides_it() -> None:
+    """Readers raise their own error `from None`, without the number of the system's error."""
+    hiding = RuntimeError("run.mcap: cannot be read: Too many open files")
+    hiding.__context__ = OSError(errno.EMFILE, "Too many open files")
+    hiding.__suppress_context__ = True
+
+    assert str(machine_error(hiding)).startswith(f"{LACKS} (OSError: [Errno {errno.EMFILE}]")
+
+
+def test_words_in_the_source_of_a_program_are_no_lack() -> None:
+    """A traceback quotes the lines of the program: they may name a lack that did not happen."""
+    with pytest.raises(ValueError, match="too long") as raised:
+        raise ValueError("too long: " + "MemoryError"[:0])
+
+    assert machine_error(raised.value) is None
+
+
 def test_another_end_of_a_process_is_a_violation(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """An error of the program is none of the machine: the check `ends` tells it."""
 
