@@ -27,7 +27,7 @@ from gridpeers.wire.messages import LinkReport, LinkRequest
 class LinkFaults:
     def __init__(self, record: RunRecord) -> None:
         self._index = record.index
-        self._config = _config_of(record)
+        self._config = record.info.emulation
         self._parts, self._changes = -1, list[Change]()
         """Parts whose commands the schedules have, and what these changed."""
         self._into: dict[str, dict[str, FaultSchedule]] = {}
@@ -92,15 +92,6 @@ class LinkFaults:
                 sent += trace.t
                 dropped += [t for t, outcome in zip(trace.t, trace.outcome, strict=True) if isinstance(outcome, str)]
         return {link: (sorted(sent), sorted(dropped)) for link, (sent, dropped) in found.items()}
-
-
-def _config_of(record: RunRecord) -> EmulationConfig | None:
-    trees = (record.info.plant.links, *(config.links for config in record.info.agents))
-    tree = next((tree for tree in trees if tree), None)
-    try:
-        return None if tree is None else EmulationConfig.of_tree(tree)
-    except msgspec.ValidationError:  # of a later version
-        return None
 
 
 def _between(times: list[float], since: float, until: float) -> int:

@@ -10,7 +10,6 @@ from typing import Annotated
 from gridpeers.agents.agent_config import MAX_AGE
 from gridpeers.lab.communication.accounts import Missing
 from gridpeers.lab.communication.communication_summary import CommunicationSummary
-from gridpeers.lab.communication.heals import planned_faults
 from gridpeers.lab.communication.sent_states import Link
 from gridpeers.scenarios.checks.check_verdict import (
     Check,
@@ -169,7 +168,7 @@ class LastWords(Check):
         if not any(sent.epochs for sent in found.sent.values()):
             raise NotJudgedError("the record has no states of agents")
         joining = {name for event in case.scenario.events for name in event.join}
-        setup = planned_faults(found.info)
+        setup = found.info.emulation
         nodes = setup.netem.nodes if setup else ()
         ended = [(node.name, node.from_s, self.silent_s + 2.0 * case.T_c) for node in nodes if node.kill]
         ended += [

@@ -7,13 +7,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from math import inf
 
-import msgspec
-
 from gridpeers.lab.communication.sent_states import Link, SentState, SentStates, StateWindow, Uses
 from gridpeers.netem.ledger import LinkTrace
 from gridpeers.netem.schema.fault import Span
 from gridpeers.netem.schema.pattern import Link as LinkEnds
-from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.record.record_info import RecordInfo
 
 CUTS = ("cut", "partition")  # Faults with an end, and reasons of dropped messages, that part two agents
@@ -22,17 +19,6 @@ LOSSES = (*CUTS, "loss", "flap")  # Faults during which a link that was cut does
 STANDSTILL, PERIODS = 0.5, 5.0
 """Real time: an agent that decides nothing for so long (s of run time), and for so many control periods, stood
 still. Its numbers have no gap then. Shorter pauses are those of a busy host, and count as work."""
-
-
-def planned_faults(info: RecordInfo) -> EmulationConfig | None:
-    """Return the emulation that the scenario plans, from the first configuration that can be read."""
-    for tree in (info.plant.links, *(config.links for config in info.agents)):
-        if tree:
-            try:
-                return EmulationConfig.of_tree(tree)
-            except msgspec.ValidationError:
-                continue
-    return None
 
 
 @dataclass
@@ -68,7 +54,7 @@ class Heals:
         self._listens: set[Link] = set()
         self._losses: dict[Link, list[Span]] = {}
         """Planned cuts and losses of each link."""
-        setup, names = planned_faults(info), info.agent_names
+        setup, names = info.emulation, info.agent_names
         for link in ((src, dst) for src in names for dst in names if src != dst):
             if setup is None:
                 break

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from functools import lru_cache
 from typing import Any, Literal, NamedTuple
 
@@ -9,6 +10,7 @@ import msgspec
 
 from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.wire.journal import ENTRIES, RecordLevel
 from gridpeers.wire.messages import AnyMessage, Journal, LinkReport, LinkRequest, Measurement, State, Telemetry
 
@@ -69,6 +71,14 @@ class RecordInfo(msgspec.Struct, frozen=True, kw_only=True):
     @property
     def T_c(self) -> float:
         return self.plant.T_c
+
+    @property
+    def emulation(self) -> EmulationConfig | None:
+        """The planned faults of links and nodes, from the first configuration that can be read; None without any."""
+        for tree in filter(None, (self.plant.links, *(config.links for config in self.agents))):
+            with suppress(msgspec.ValidationError):  # of a later version
+                return EmulationConfig.of_tree(tree)
+        return None
 
     def agent(self, name: str) -> AgentConfig | None:
         return next((config for config in self.agents if config.name == name), None)

@@ -30,7 +30,7 @@ def healed(receiver: list[SentState], sender: list[SentState], *, used_at_last: 
     for name, said in zip(LINK, (sender, receiver), strict=True):
         for state in said:
             sent[name].put(state)
-    info: Any = SimpleNamespace(simulated=False, T_c=T_C, agent_names=LINK, agents=(), plant=SimpleNamespace(links={}))
+    info: Any = SimpleNamespace(simulated=False, T_c=T_C, agent_names=LINK, emulation=None)
     heals = Heals(info, 30.0, sent)
     heals.trace(LinkTrace(*LINK, seq=(1, 2), t=(9.0, 10.0), outcome=("cut", 0.0)))
     for state in receiver:
