@@ -33,11 +33,6 @@ WINDOW = 1.0
 
 AGE_STEP = 0.001
 
-_UNSEEN = {"phase": "running", "waits_for": "", "lateness": 0.0} | dict.fromkeys(
-    ("epoch", "seq", "received", "rejected", "lost", "ticks", "missed"), 0
-)
-"""Fields of a status that a record does not have."""
-
 _STILL = Pacing(steps=0, late=0, p50=0.0, p95=0.0, p99=0.0, worst=0.0, slipped=0.0)
 
 
@@ -75,13 +70,17 @@ class RecordView:
 
     @property
     def events(self) -> list[EventView]:
+        self._read_events()
+        return self._events
+
+    def _read_events(self) -> None:
+        """Read the events of the parts that the record has got since the last time."""
         index = self.record.index
         for message in index.of_type("telemetry", Telemetry, range(self._parts, index.parts)):
             self._plant_events += message.events
             for event in message.events:
                 self._events.append(EventView(len(self._events) + 1, event.t, event.kind, event.subject, event.text))
         self._parts = index.parts
-        return self._events
 
     def frame(self, t: float, since: float = -1.0) -> Frame:
         agents = self._moments.at(t)
@@ -120,7 +119,7 @@ class RecordView:
         )
 
     def decision(self, agent: str, t: float) -> str:
-        self.events  # noqa: B018  reads them, if there are more
+        self._read_events()
         return str(ROOMS.resolve("explain")(self.record, agent, t, tuple(self._plant_events)))
 
     def _present(self, t: float, agents: Mapping[str, AgentMoment]) -> list[str]:
@@ -156,7 +155,7 @@ class RecordView:
         return {name: power for name, power in powers.items() if power != self._tables.get(name)}
 
     def _until(self, t: float) -> Iterator[PlantEvent]:
-        self.events  # noqa: B018  reads them, if there are more
+        self._read_events()
         return takewhile(lambda event: event.t <= t + 1e-9, self._plant_events)
 
     def _feed_row(self, view: RunView, t: float) -> float | None:
@@ -164,8 +163,18 @@ class RecordView:
         if last is None:
             return None
         inverters, row = last
-        head = {"sender": "plant", "epoch": 1, "seq": 0, "t": row[0], "events": (), "outcome": ""}
-        message = Telemetry(**head, inverters=inverters, rows=(row,), final=False, reproducible=False)  # type: ignore[arg-type]  # its fields
+        message = Telemetry(
+            sender=PLANT,
+            epoch=1,
+            seq=0,
+            t=row[0],
+            inverters=inverters,
+            rows=(row,),
+            events=(),
+            final=False,
+            outcome="",
+            reproducible=False,
+        )
         # a row holds until the next one: what the page takes for silence is a time of the wall clock
         view.telemetry(message, t if t - row[0] <= self._rows.longest_gap else row[0])
         return row[0]
@@ -176,16 +185,7 @@ class RecordView:
         T_c = self.record.info.T_c
         span = min(WINDOW, T_c * (int(t / T_c + 1e-6) + 1))  # in the first second: the periods that have begun
         span = max(T_c, span - self._moments.lost(t - span, t))
-        statuses = []
-        for name, agent in agents.items():
-            seen = {"island": agent.island, "neighbours": agent.neighbours, "ages": agent.ages, "used": agent.used}
-            about = {
-                "sender": name,
-                "t": max(0.0, agent.t),
-                "sent": sent[name],
-                "impaired": tuple(faults.get(name, ())),
-            }
-            statuses.append(AgentStatus(**_UNSEEN | seen | about))  # type: ignore[arg-type]  # its fields
+        statuses = [_status(agent, sent[name], tuple(faults.get(name, ()))) for name, agent in agents.items()]
         view.statuses(statuses, {name: sent[name] / span for name in agents}, t)
         for name in agents:
             if impaired := faults.get(name):
@@ -193,7 +193,7 @@ class RecordView:
                 view.accounts(name, impaired)
 
     def _noted(self, one: InverterStatus, agents: Mapping[str, AgentMoment]) -> InverterStatus:
-        """Return the status of an inverter without what a record does not have."""
+        """Return the status of an inverter without the fields that a record does not have."""
         agent = agents.get(one.name)
         note = one.note
         if agent is not None and agent.idle:
@@ -204,6 +204,30 @@ class RecordView:
             note = ""
         hears = one.hears if agent is None or agent.known else None
         return dataclasses.replace(one, received=None, sent=None, lost=None, hears=hears, note=note)
+
+
+def _status(agent: AgentMoment, sent: int, impaired: tuple[str, ...]) -> AgentStatus:
+    """Return a status with 0 in the counts that a record does not have."""
+    return AgentStatus(
+        sender=agent.name,
+        epoch=0,
+        seq=0,
+        t=max(0.0, agent.t),
+        phase="running",
+        waits_for="",
+        island=agent.island,
+        neighbours=agent.neighbours,
+        ages=agent.ages,
+        used=agent.used,
+        received=0,
+        sent=sent,
+        rejected=0,
+        lost=0,
+        ticks=0,
+        missed=0,
+        lateness=0.0,
+        impaired=impaired,
+    )
 
 
 def _missing(record: RunRecord, *, has_feeder: bool) -> Iterator[str]:
