@@ -108,6 +108,11 @@ def why(
     show(explanation, terminal(), trails)  # type: ignore[arg-type]  # the names are those of a trail
 
 
+def _tell_notes(notes: Iterable[str]) -> None:
+    for note in notes:
+        typer.echo(f"NOTE  {note}")
+
+
 # -------------------------------------------------------------------- gridpeers trace
 
 
@@ -178,8 +183,7 @@ def trace(
         fail([str(error)], BAD_INPUT)
     except OSError as error:
         fail([refusal(target, error)], BAD_INPUT)
-    for damage in record.damage:
-        typer.echo(f"NOTE  {damage}")
+    _tell_notes(record.damage)
     typer.echo(f"{shown(target)}: {text}")
 
 
@@ -315,17 +319,12 @@ def _replay(record: RunRecord, since: float, out: Path | None) -> bool:
         fail(["the record ends before anything that a replay could be compared with"], BAD_INPUT)
     if done.difference is None:
         same = "The replay gives what was recorded, within 1e-9"
-        partly = bool(done.notes or record.damage)  # its damage is told behind the notes
+        partly = bool(done.notes or record.damage)  # the command prints the damage after these notes
         typer.echo(f"{same}, as far as it was compared:" if partly else f"{same}.")
     _tell_notes(done.notes)
     if done.difference is not None:
         typer.echo(f"The first difference: {done.difference}")
     return done.difference is not None
-
-
-def _tell_notes(notes: Iterable[str]) -> None:
-    for note in notes:
-        typer.echo(f"NOTE  {note}")
 
 
 def _counterfactual(record: RunRecord, changes: Changes, out: Path | None) -> bool:
@@ -341,7 +340,7 @@ def _counterfactual(record: RunRecord, changes: Changes, out: Path | None) -> bo
     from gridpeers.scenarios.results.run_files import broken_if_ended, new_folder, shown, write_whole
     from gridpeers.scenarios.schema.plugin_keys import judges_laws
 
-    rule = changed_rule(record, changes)  # whatever is wrong is told before a folder is made
+    rule = changed_rule(record, changes)  # it refuses wrong changes before a folder is made
 
     typer.echo(f"{_about(record)}: {changes}")
     folder = new_folder(out, f"{record.info.scenario}-replay", datetime.now().astimezone())

@@ -170,7 +170,7 @@ class ClosedLoop:
         while self._due:
             due, _, _, process, message = heappop(self._due)
             if message is not None:
-                if process.again is not None and process.hears(message.key):
+                if process.again is not None and process.again.hears(message.key):
                     self._publish(process, (), process.again.hear(message, due), due)
                 continue
             step = process.head
