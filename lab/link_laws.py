@@ -49,7 +49,7 @@ _COLUMNS = [("seq", "i8"), ("t", "f8"), ("reason", "U16"), ("delay", "f8"), ("co
 
 Finding = tuple[Any, ...]  # of a LinkTest, without the link
 Blocks = tuple[tuple[tuple[int, int], ...], ...]
-"""For each start of the chain, messages without a gap: where the first is behind the start, and their number."""
+"""For each start of the chain, its runs of messages without a gap: distance of the first from the start, and length."""
 
 
 class LinkTest(NamedTuple):
@@ -229,7 +229,7 @@ def _delay_tests(met: _Sent, model: Constant | Trace | RandomDelay, stream: Stre
 
 
 def _own_test(met: _Sent, span: Span, beside: Sequence[Span], stream: Stream, link: Link) -> Finding:
-    """Compare which messages a fault dropped, and where it is alone their delays, with its judge now."""
+    """Compare the messages that a fault dropped with the answers of its judge now; if it acts alone, delays too."""
     told = "as its judge says"
     if others := [o.kind for o in beside if isinstance(o.model, Plugin)]:
         return (span.kind, told, f"not tested: {' and '.join(others)} on it")

@@ -25,11 +25,11 @@ class AgentMoment(NamedTuple):
     """Age (s of run time) of the last state of each; -1 if none was heard."""
     used: tuple[str, ...]
     idle: bool
-    """Whether it was paused, without a measurement, or its law had failed."""
+    """It was paused, it had no measurement, or its law had failed."""
     known: bool = True
-    """Whether the record says how it decided: not where a part of its journal is missing."""
+    """The record says how it decided; False where a part of its journal is missing."""
     damaged: bool = False
-    """Whether that part is lost, as the file is damaged there."""
+    """That part is lost because the file is damaged there."""
 
 
 class AgentMoments:

@@ -27,7 +27,7 @@ class LinkView(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     age: float
     """Age (s) of the sender's last state at the receiver, in steps; -1 if none was heard."""
     ageing: bool = False
-    """Whether it is used though it is older than `AGEING`."""
+    """It is used though it is older than `AGEING`."""
     rate: float = 0.0
     """Messages per s of wall time that come over it: what the sender sends, less what an emulated link drops."""
     holds: tuple[str, ...] = ()

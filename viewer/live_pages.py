@@ -87,7 +87,7 @@ class LivePages:
             await send(socket, as_json({"done": await loop.run_in_executor(self._worker, self._do, text)}))
 
     def _do(self, text: str) -> dict[str, Any]:
-        """Carry out an action; return what the page says of it."""
+        """Carry out an action; return the answer to its page."""
         try:
             action = decode_foreign(msgspec.json.Decoder(PageAction).decode, text)
         except msgspec.DecodeError as error:

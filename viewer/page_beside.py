@@ -18,7 +18,7 @@ import typer
 from gridpeers.cli.usage import BAD_INPUT, fail, interruptible, require
 
 HERE, PORT = "127.0.0.1", 8123
-"""Where a page is opened if nothing else is said: on this host alone."""
+"""Address and port of a page by default: on this host alone."""
 
 LEAVING = 5.0
 

@@ -180,7 +180,7 @@ def _stop(number: int, frame: FrameType | None) -> NoReturn:
 
 
 def _hashed(token: str) -> str:
-    """Return what the cookie has of a token: a header takes few letters, a token may have any."""
+    """Return a token as its cookie has it: a header takes few letters, a token may have any."""
     return hashlib.sha256(token.encode()).hexdigest()
 
 

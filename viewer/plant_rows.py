@@ -26,7 +26,7 @@ class PlantRows:
         self._record, self._index, self._configs = record, record.index, configs
         plant = record.info.plant
         self.longest_gap = max(FROZEN * max(1.0, plant.speed), 1.5 * plant.record_step)
-        """Run time (s) after a row behind which the next one is missing; of a frozen plant, in real time."""
+        """Longest run time (s) between two rows. After it a row is missing, or in real time the plant is frozen."""
         self._rows_in = lru_cache(maxsize=8)(self._read_rows)
         self._points_in = lru_cache(maxsize=KEPT)(self._read_points)
 

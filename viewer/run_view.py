@@ -49,7 +49,7 @@ class Frame(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     speed: float = 1.0
     inverters: tuple[InverterStatus, ...]
     reset: bool = False
-    """Whether all that the page has is of another run."""
+    """All that the page has so far is of another run."""
     names: tuple[str, ...] = ()
     """Inverters in the order of the points; with the points of the first frame, or when they change."""
     f_nom: float = 0.0
@@ -68,7 +68,7 @@ class RunView:
         self._monitor = RunMonitor(run)
         self.feeder_map: FeederMap | None = None
         self.wants_status = True
-        """Whether to ask the plant for its status: at first, after a change of switches or loads, after a restart."""
+        """The plant is to be asked for its status: at first, after a change of switches or loads, after a restart."""
         self._liveness, self._strips, self._links = Liveness(), Strips(), LinkStates(age_step)
         self._configs: dict[str, AgentConfig] = {}
         self._names: tuple[str, ...] = ()

@@ -30,7 +30,7 @@ from gridpeers.scenarios.sweep.workers import on_workers
 from gridpeers.wire.wording import counted
 
 REPEATED = 20
-"""Every run of which the number is a multiple of this one is done twice, by whatever worker is free."""
+"""Each run whose number is a multiple of this one is done twice, by any worker that is free."""
 
 Stage = Callable[[float], AbstractContextManager[Callable[[str, float], None]]]
 """Begins a stage of so many parts: its function takes the present work, and how many parts are done."""

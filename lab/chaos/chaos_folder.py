@@ -69,7 +69,7 @@ class ChaosFolder:
     def add(self, row: ChaosRow) -> None:
         with (self.path / JOURNAL).open("ab") as file:
             file.write(journal_line(row))
-        self.rows[row.number] = row  # once it is kept: an error tells how many are
+        self.rows[row.number] = row  # only now that it is kept: after an error the command counts these rows
 
     def write_table(self) -> None:
         text = StringIO()

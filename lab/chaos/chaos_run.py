@@ -1,6 +1,6 @@
-"""One run of a campaign: from its schedule to its verdict, less what a collapse that no control prevents excuses.
+"""One run of a campaign: from its schedule to its verdict.
 
-Nothing that a run can do ends the campaign.
+A collapse that no control can prevent excuses violations of its inverters. Nothing that a run can do ends the campaign.
 """
 
 from __future__ import annotations
@@ -266,7 +266,7 @@ def collapses_at_changes(scenario: ScenarioModel, feeder: Feeder, events: Iterab
 
 
 def unexcused(verdicts: Iterable[CheckVerdict], excused: frozenset[str]) -> dict[str, str]:
-    """Return the failed checks of what control restores, with the sentence of what inverters violate that count.
+    """Return the failed checks of `RESTORED`, each with a sentence on its violations by inverters that are not excused.
 
     A sentence is empty if only excused inverters violate the check. A violation that names no inverter counts.
     """

@@ -1,4 +1,4 @@
-"""Accounts of what was sent over links, kept while a pass over a record goes on: what is missing."""
+"""Accounts of links, kept while a pass over a record goes on: which of the sent states are missing."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MOST_WAITING = 6000
 """Numbers of one link that are kept while they wait for their counterpart, or for the end of their process."""
 
 WAIT = 1000
-"""Ticks of which it is kept who told its neighbours something."""
+"""Number of ticks for which it is kept which agents sent their neighbours a state."""
 
 
 @dataclass
@@ -129,21 +129,21 @@ class ArrivalAccounts:
         place = there.index(before)
         after = there[place + 1 : place + 2]
         if before.until == t and after and after[0].epoch == before.epoch:
-            return  # it is told twice
+            return  # a journal may come twice
         latest = takewhile(lambda state: state.t > t, reversed(self._states[agent]))
         later = [state.t for state in latest if state.epoch == before.epoch]
         there.insert(place + 1, Presence(before.epoch, min(later, default=nextafter(t, inf)), before.until))
         before.until = t
 
     def listens(self, link: Link) -> None:
-        """Note that the receiver of a link has its sender for a neighbour, whether anything comes or not."""
+        """Note that the receiver of a link has its sender for a neighbour, even if nothing comes."""
         if link not in self._arrived:
             self._arrived[link], self.accounts[link] = {}, []
             self._links_of[link[0]].append(link)
 
     def heard(self, link: Link, epoch: int, number: int) -> None:
         self.listens(link)
-        for account in self.accounts[link][-3:]:  # what comes later than others did is still missing there
+        for account in self.accounts[link][-3:]:  # one that others have overtaken is missing there
             if account.missing.pop((epoch, number), None) is not None:
                 return
         arrived = self._arrived[link]

@@ -1,8 +1,8 @@
-"""What the checks of communication need of a record: counters, found in one pass over its file.
+"""Counters for the checks of communication, found in one pass over the file of a record.
 
 The memory of the pass does not grow with the length of the run: of each agent it keeps its last states and decisions,
 of each link counters, and the numbers of messages that are still on their way. Journals of different nodes come into a
-record with a delay; so a decision is looked at a while after its run time, once all that it came of is there.
+record with a delay; so a decision is looked at a while after its run time, once all its inputs are there.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ LINKED_WITHIN = 2.0 * PATIENCE
 
 @dataclass
 class OldUse:
-    """A value of a neighbour that an agent used, older than all that it used of it later."""
+    """Use of a neighbour's value that is older than all values of this neighbour that the agent used later."""
 
     age: float
     t: float
@@ -68,7 +68,7 @@ class CommunicationSummary:
     dropped: Mapping[Link, int]
     """Real time: how many states their receivers dropped unread."""
     oldest: Mapping[Link, list[OldUse]]
-    """The oldest value that was used of each link, then the oldest of what was used later, and so on: ages fall."""
+    """By link, the oldest value that was used, then the oldest one that was used later, and so on: ages fall."""
     heals: list[Heal]
 
 
@@ -106,8 +106,8 @@ class SummaryPass(RecordSink):
         self._dropped: defaultdict[Link, int] = defaultdict(int)
         self._oldest: defaultdict[Link, list[OldUse]] = defaultdict(list)
         self._alike: dict[str, tuple[Uses, list[OldUse]]] = {}
-        """What each agent's decision in force uses, and the last entries in `oldest` of these links; not where quiet
-        states change the ages from tick to tick."""
+        """By agent, the neighbours that its decision in force uses, and the last entries in `oldest` of their links. An
+        agent for which quiet states change the ages from tick to tick is left out."""
         self._t = self._flushed = 0.0
 
     def take_state(self, agent: str, state: SentState) -> None:

@@ -116,7 +116,7 @@ class Heals:
             heal.waited = max(heal.waited, min(state.t, heal.lost_again) - heal.at_work_since)
 
     def _is_lossy(self, link: Link, t: float) -> bool:
-        """Return whether a link is planned to lose messages at a time (s): a cut may hold one and give it later."""
+        """Return whether a link is to be cut or lossy at a time (s): a cut may hold a message and give it later."""
         return any(span.from_s - 1e-9 <= t < span.to_s - 1e-9 for span in self._losses.get(link, ()))
 
     def found(self) -> list[Heal]:

@@ -1,4 +1,4 @@
-"""All that a record has of messages and decisions, for checks of one's own: in memory, so of a record of some size.
+"""All messages and decisions of a record in memory, up to `MOST_BYTES`, for checks of a user's own.
 
 The checks that judge every run go through the record once instead (`communication_summary`), whatever its size.
 """

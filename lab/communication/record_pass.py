@@ -45,11 +45,11 @@ _STATE_KEYS = ("state", "set_points")
 _NOT_SOUND = ("corrupt", "garbled")  # Kinds of rejected messages whose numbers are not those that were sent
 
 _OF_SENDER = ("excess", "stale")
-"""Kinds of rejection that a sender's own sound states may have, and of which a journal may have the number alone."""
+"""Kinds of rejection that may meet sound states of a sender. A journal may have only the number of such states."""
 
 
 class RecordSink:
-    """Takes what a record has, in the order of its file: of each node as it was, of several within a second or so."""
+    """Takes what a record holds in the order of its file: by time for one node, within a second or so for several."""
 
     def take_state(self, agent: str, state: SentState) -> None:
         """Take a state that an agent sent; it may come twice."""

@@ -157,7 +157,7 @@ class Uses(NamedTuple):
 
 
 Used = tuple[SentState, Uses, bool]
-"""A state of an agent that was not idle, what the decision behind it used, and True if that decision is a new one."""
+"""A state of an agent that was not idle; the uses of the decision behind it; True if that decision is a new one."""
 
 
 def uses_of(agent: str, decision: Decision, T_c: float, *, simulated: bool) -> Uses:

@@ -73,8 +73,9 @@ def missed(
 ) -> str:
     """Return in words what became of a neighbour's states after the last one that was heard.
 
-    Examples of the result: "48 states since: 48 cut off by a partition"; "no state since". Of a rejected message
-    without a number nobody knows the sender: as many as there are states whose fate nothing else tells may be these.
+    Examples of the result: "48 states since: 48 cut off by a partition"; "no state since". Nobody
+    knows the sender of a rejected message without a number. It counts as one of the states whose fate nothing else
+    tells, as long as there are any.
     """
     since = 0.0 if each.state is None else each.state.t
     last = -1 if each.number is None else each.number

@@ -61,7 +61,7 @@ class InverterGroup:
 
     @property
     def T_p(self) -> float:
-        """Time constant (s) of what the GFM's filtered powers add up to: the mean of theirs by their weights."""
+        """Time constant (s) of the sum of the GFM's filtered powers: the mean of their own ones by weight."""
         T_p = np.array([it.T_p for it in self.parameters if isinstance(it, GfmParameters)])
         own = self.weight[self.GFM]
         return float(T_p[0] if (T_p == T_p[0]).all() else T_p @ own / own.sum())

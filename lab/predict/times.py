@@ -33,7 +33,7 @@ class LoadStep:
     """At the start all stand at it, at nominal frequency. The paper's start."""
     load_pu: float = 0.880
     islanding: bool = True
-    """Whether the event makes the island, as islanding does; then late states of before are left out at first."""
+    """The event makes the island, as islanding does. Then agents leave out states that were sent before it."""
     joining: tuple[str, ...] = ()
 
 

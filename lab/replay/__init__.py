@@ -1,1 +1,1 @@
-"""Replay: the cores of a recorded run get again what they got; counterfactual: under another rule from a time on."""
+"""A replay gives the cores of a recorded run their inputs again; a counterfactual changes the rule from a time on."""

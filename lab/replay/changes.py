@@ -212,7 +212,7 @@ def without_loss(netem: Netem) -> Netem:
 
 
 def spliced(before: Netem, after: Netem, since: float) -> Netem:
-    """Return faults that are those of one configuration up to a time (s), and those of another one from then on."""
+    """Return the faults of one configuration up to a time (s), and those of another one from then on."""
     if before == after or since <= 0.0:
         return after
     return replace(

@@ -122,7 +122,7 @@ class ClosedLoop:
         self._laws: list[Law] = []
         self._processes: dict[tuple[str, int], LoopProcess] = {}
         self._due: list[tuple[float, int, int, LoopProcess, Message | None]] = []
-        """Next calls: when (s, monotonic), calls first; of whom; the message, if the record has none of it."""
+        """What comes next: time (s, monotonic), calls first; process; the message if the record does not have it."""
         self._order = count()
         self._sent: dict[tuple[str, int, int], tuple[float, Message]] = {}
         """Messages that were sent in the replay, by stream, epoch and number, and when."""

@@ -89,7 +89,7 @@ def counterfactual(
 def counterfactual_in(
     record: RunRecord, rule: ChangedRule, folder: Path | None, tell: Progress | None = None
 ) -> Counterfactual:
-    """Run a counterfactual into an empty folder, or into one that goes with it; see `counterfactual`."""
+    """Run a counterfactual into an empty folder, or into a temporary one that lives as long as the result."""
     would_be = RunFolder(folder or _temporary(), temporary=folder is None)
     was = RunFolder(_temporary(), temporary=True)
     with broken_if_ended(would_be.path):
@@ -129,8 +129,8 @@ class Counterfactual:
         if changes and effect.difference is None:
             notes = [*notes, f"the change made no difference: every row up to {effect.t:.2f} s is as recorded"]
         self.difference, self.compared, self.notes = rows.difference, rows.count, tuple(notes)
-        """First row of the plant before the change that is not as in the record, None if all are, as they should be;
-        rows compared; sentences on effects that are left out, or that there was none."""
+        """The first row of the plant before the change that differs from the record (there should be none); the number
+        of rows compared; sentences on effects that are left out, or that the change had none."""
         _write(record, rule, rule.scenario, would_be.path, recorded, would_be=True)
         before = _as_recorded(record, was.path / rule.case, recorded.ended)
         _write(record, rule, rule.recorded, was.path, before, would_be=False)
