@@ -146,13 +146,13 @@ def open_credentials(
 
 def _end_of(own: x509.Certificate, path: Path, folder: Path, member: Member, now: datetime) -> datetime:
     """Return the end of a member's certificate, or of the authority's if that is earlier, if both are valid."""
-    from cryptography.exceptions import InvalidSignature
+    from cryptography.exceptions import InvalidSignature, UnsupportedAlgorithm
     from cryptography.x509.oid import NameOID
 
     ca = read_certificate(folder / CA)
     try:
         own.verify_directly_issued_by(ca)
-    except (InvalidSignature, ValueError, TypeError):
+    except (InvalidSignature, UnsupportedAlgorithm, ValueError, TypeError):
         raise KeysError(
             f"{path}: is not signed by {folder / CA}: it is of another site; copy both from the same one"
         ) from None
