@@ -42,6 +42,8 @@ AHEAD = 5.0
 _STATE_KEYS = ("state", "set_points")
 """First parts of the keys of states; one that is not for the neighbours has a key of its own."""
 
+_VALUES = ("seq", "t", "epoch", "sender", "idle", "quiet")  # Fields of a state that a pass looks at
+
 _NOT_SOUND = ("corrupt", "garbled")  # Kinds of rejected messages whose numbers are not those that were sent
 
 _OF_SENDER = ("excess", "stale")
@@ -109,7 +111,9 @@ class _Pass:
         self._coverage: dict[str, JournalCoverage] = {}
         self._spoke: dict[str, float] = {}
         """Real time: run time (s) of the last own state in each agent's journal."""
-        self._fields = info.fields.get(State.__name__, ())
+        fields = info.fields.get(State.__name__, ())
+        self._length = len(fields)
+        self._places = {name: fields.index(name) for name in _VALUES if name in fields}
 
     def read(self) -> PassEnd:
         for record in self._file.messages(("journal", "link_reports")):
@@ -175,8 +179,8 @@ class _Pass:
         values: dict[str, Any] = {}
         if isinstance(raw, bytes):
             values = values_of(raw)
-        elif isinstance(raw, list) and len(raw) == len(self._fields):
-            values = dict(zip(self._fields, raw, strict=True))
+        elif isinstance(raw, list) and len(raw) == self._length:
+            values = {name: raw[place] for name, place in self._places.items()}
         try:
             state = SentState(
                 int(values["seq"]), float(values["t"]), int(values["epoch"]),
