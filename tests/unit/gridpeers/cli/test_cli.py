@@ -48,6 +48,19 @@ def test_help_and_list_do_not_wait_for_heavy_modules() -> None:
     assert imported == "[]"
 
 
+def test_help_of_no_command_compiles_or_draws() -> None:
+    """None imports numba, pandas or matplotlib: whoever reads what a command takes does not wait for them."""
+    import subprocess
+
+    names = ["feeder", "sweep", "reproduce", "experiment", "up", "plant", "run", "link", "check"]
+    code = "import sys\nfrom gridpeers.cli.root import app\n"
+    code += f"for name in {names}: app([name, '--help'], standalone_mode=False)\n"
+    code += "print(sorted({'numba', 'pandas', 'matplotlib'} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
 def test_list_shows_the_catalogue() -> None:
     """Each scenario with its title and cases."""
     code, text = invoke("list")
