@@ -171,7 +171,7 @@ def trace(
     try:
         record = RunRecord.open(run, case)
         if svg is None:
-            from gridpeers.lab.trace.perfetto_trace import write_perfetto_trace
+            from gridpeers.lab.trace import write_perfetto_trace
 
             target = out or record.path.with_name("trace.pftrace")
             arrows = write_perfetto_trace(record, target)
@@ -188,8 +188,8 @@ def trace(
 
 
 def _draw(record: RunRecord, file: Path, since: float, until: float, agents: str) -> str:
-    from gridpeers.lab.trace.flows import flows
-    from gridpeers.lab.trace.space_time_diagram import space_time_diagram
+    from gridpeers.lab.space_time_diagram import space_time_diagram
+    from gridpeers.lab.trace import flows
     from gridpeers.scenarios.results.plots.style import save
     from gridpeers.scenarios.short_texts import in_order, short
 

@@ -93,8 +93,7 @@ def chaos(
     from datetime import datetime
 
     from gridpeers.cli.progress import remaining
-    from gridpeers.lab.chaos.campaign import Campaign, run_campaign
-    from gridpeers.lab.chaos.chaos_folder import RUNS, ChaosFolder, asked_of, kept_rows
+    from gridpeers.lab.chaos.campaign import RUNS, Campaign, ChaosFolder, asked_of, kept_rows, run_campaign
     from gridpeers.lab.chaos.disturbed_scenario import ChaosBase
     from gridpeers.scenarios.results.run_files import (
         FolderError,
@@ -161,7 +160,7 @@ def _refuse_unless_possible(scenario: str, spec: ScenarioModel, case: str | None
 
 def _try_undisturbed(console: Console, campaign: Campaign) -> None:
     from gridpeers.cli.progress import TRYING, explained
-    from gridpeers.lab.chaos.chaos_folder import seed_of
+    from gridpeers.lab.chaos.campaign import seed_of
     from gridpeers.lab.chaos.chaos_run import run_schedule
     from gridpeers.scenarios.checks.check_registry import ALWAYS
     from gridpeers.wire.wording import counted
@@ -191,7 +190,7 @@ class _Kept:
     @contextmanager
     def told_if_ended(self) -> Iterator[None]:
         from gridpeers.cli.usage import exit_code, interruptible
-        from gridpeers.lab.chaos.machine_error import MachineError, machine_error
+        from gridpeers.lab.chaos.chaos_run import MachineError, machine_error
         from gridpeers.scenarios.results.run_files import refusal, shown
         from gridpeers.scenarios.sweep.workers import WorkersError
         from gridpeers.wire.driver.command_line import command_line

@@ -14,8 +14,7 @@ from math import inf
 from pathlib import Path
 from types import MappingProxyType
 
-from gridpeers.lab.communication.accounts import ArrivalAccount, ArrivalAccounts, Missing, TickAccounts
-from gridpeers.lab.communication.heals import Heal, Heals
+from gridpeers.lab.communication.accounts import ArrivalAccount, ArrivalAccounts, Heal, Heals, Missing, TickAccounts
 from gridpeers.lab.communication.record_pass import RecordSink, end_of, opened, read_into
 from gridpeers.lab.communication.sent_states import (
     DecidedStates,

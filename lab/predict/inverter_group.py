@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import expm
 
 from gridpeers.agents.agent_config import Control, Gains
 from gridpeers.agents.graphs import in_neighbours
@@ -141,3 +143,105 @@ def inverter_group_of(
         parameters=tuple(feeder.parameters_of(row, scenario.plant.gfm, scenario.plant.gfl) for row in rows.values()),
     )
     return inverters if island is None else inverters.part(np.array([name in island for name in rows], bool))
+
+
+# -------------------------------------------------------------------- the plant as the secondary law feels it
+
+
+PlantModel = Literal["lagged", "quasi-steady"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Response:
+    """Plant between two ticks: x(k+1) = A x(k) + B u(k) + E l, and at tick k e = C x + D u + F l with u of before.
+
+    Powers: pi = C_p x + D_p u + F_p l in the same way. With N inverters and n states, A is n x n, B n x N, C_p N x n.
+    """
+
+    A: Floats
+    B: Floats
+    E: Floats
+    C: Floats
+    D: Floats
+    F: float
+    C_p: Floats
+    D_p: Floats
+    F_p: Floats
+
+    def rest(self, u: Floats, load: float) -> Floats:
+        """Return the state in which the plant stands still under set-points u and a load (both pu frequency)."""
+        return np.asarray(np.linalg.solve(np.eye(len(self.A)) - self.A, self.B @ u + self.E * load))
+
+
+def response(inverters: InverterGroup, plant: PlantModel = "lagged") -> Response:
+    if not inverters.GFM.any():
+        raise ValueError(f"no GFM among {', '.join(inverters.names)}: their island has no voltage; give it one")
+    return _quasi_steady(inverters) if plant == "quasi-steady" else _lagged(inverters)
+
+
+def _quasi_steady(inverters: InverterGroup) -> Response:
+    n, w = inverters.n, inverters.weight
+    droops = [isinstance(it, GfmParameters) or it.frequency_watt for it in inverters.parameters]
+    follows = np.array(droops, float)
+    stiffness = float(w @ follows)
+    D, F = w / stiffness, -1.0 / stiffness
+    return Response(
+        A=np.zeros((0, 0)),
+        B=np.zeros((0, n)),
+        E=np.zeros(0),
+        C=np.zeros(0),
+        D=D,
+        F=F,
+        C_p=np.zeros((n, 0)),
+        D_p=np.eye(n) - np.outer(follows, D),
+        F_p=-follows * F,
+    )
+
+
+def _lagged(inverters: InverterGroup) -> Response:
+    n, w, gfl = inverters.n, inverters.weight, inverters.gfl
+    forming, following = np.flatnonzero(inverters.GFM), np.flatnonzero(~inverters.GFM)
+    w_F = float(w[forming].sum())
+    locks = dict.fromkeys((it.k_pPLL, it.k_iPLL, it.T_ff) for it in gfl)  # GFL with equal ones see the same
+    phi_of = {lock: 3 + 3 * k for k, lock in enumerate(locks)}
+    u, first = 0, 1 + 3 * len(locks)
+    size = first + following.size
+    powers = first + np.arange(following.size)
+
+    C, D = np.zeros(size), np.zeros(n)
+    C[u], D[forming] = -1.0 / w_F, w[forming] / w_F
+
+    A, B, E = np.zeros((size, size)), np.zeros((size, n)), np.zeros(size)
+    A[u, u], A[u, powers], E[u] = -1.0, -w[following], 1.0
+    A[u], E[u] = A[u] / inverters.T_p, E[u] / inverters.T_p
+    for (k_p, k_i, T_ff), phi in phi_of.items():
+        delta, zeta = phi - 2, phi - 1
+        A[delta], B[delta] = C, D
+        A[delta, delta] -= k_p
+        A[delta, zeta] -= 1.0
+        A[zeta, delta] = k_i
+        A[phi, [delta, zeta, phi]] = k_p / T_ff, 1.0 / T_ff, -1.0 / T_ff
+    for power, unit, it in zip(powers, following, gfl, strict=True):
+        A[power, phi_of[it.k_pPLL, it.k_iPLL, it.T_ff]] = -1.0 / it.T_pf if it.frequency_watt else 0.0
+        A[power, power] = -1.0 / it.T_pf
+        B[power, unit] = 1.0 / it.T_pf
+
+    whole = np.zeros((size + n + 1, size + n + 1))
+    whole[:size] = np.hstack([A, B, E[:, None]])
+    held = expm(whole * inverters.T_c)[:size]
+
+    C_p, D_p = np.zeros((n, size)), np.zeros((n, n))
+    C_p[forming], D_p[forming] = -C, -D
+    D_p[forming, forming] += 1.0
+    C_p[following, powers] = 1.0
+    return Response(
+        A=held[:, :size],
+        B=held[:, size:-1],
+        E=held[:, -1],
+        C=C,
+        D=D,
+        F=0.0,
+        C_p=C_p,
+        D_p=D_p,
+        F_p=np.zeros(n),
+    )

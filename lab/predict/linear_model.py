@@ -27,8 +27,7 @@ import scipy.sparse as sp
 
 from gridpeers.agents.laws.consensus import towards
 from gridpeers.lab.predict.closed_form import DelayKind
-from gridpeers.lab.predict.inverter_group import InverterGroup
-from gridpeers.lab.predict.response import PlantModel, response
+from gridpeers.lab.predict.inverter_group import InverterGroup, PlantModel, response
 from gridpeers.scenarios.results.history import Floats
 
 LinkEnds = tuple[str, str]

@@ -19,6 +19,7 @@ from gridpeers.lab.predict.closed_form import (
     equivalent_delay,
     groups,
     modes,
+    robustness,
     settling,
     settling_in_ticks,
 )
@@ -33,7 +34,6 @@ from gridpeers.lab.predict.droop_runs import (
 )
 from gridpeers.lab.predict.inverter_group import InverterGroup, inverter_group_of
 from gridpeers.lab.predict.linear_model import Loop, delay_limit
-from gridpeers.lab.predict.robustness import robustness
 from gridpeers.lab.predict.times import Times, predicted_times
 from gridpeers.plant.equipment import Feeder
 from gridpeers.runs.choices import with_cases

@@ -16,9 +16,8 @@ from typing import Any, TypeVar
 import numpy as np
 
 from gridpeers.lab.predict.closed_form import groups
-from gridpeers.lab.predict.inverter_group import InverterGroup
+from gridpeers.lab.predict.inverter_group import InverterGroup, PlantModel
 from gridpeers.lab.predict.linear_model import LinkEnds, Loop, Path, Ticks
-from gridpeers.lab.predict.response import PlantModel
 from gridpeers.scenarios.results.history import Flags, Floats
 from gridpeers.scenarios.results.metrics import F_BAND, MPSI_BAND
 

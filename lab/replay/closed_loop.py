@@ -25,22 +25,20 @@ from gridpeers.agents.laws.law import Law
 from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.lab.replay.changes import ChangedRule
 from gridpeers.lab.replay.recorded_process import (
+    MakePlant,
     Message,
     RecordedProcess,
     RecordedStep,
-    ReplayError,
-    processes_of,
-    tick_message,
-)
-from gridpeers.lab.replay.replayed_process import (
-    MakePlant,
     ReplayedProcess,
+    ReplayError,
     agent_again,
     agent_as_run,
     law_again,
     plant_again,
+    processes_of,
     recorded_links,
     start_plant_of,
+    tick_message,
 )
 from gridpeers.netem.fault_schedule import Heal
 from gridpeers.netem.schema.fault import Fault

@@ -14,9 +14,8 @@ import pandas as pd
 
 from gridpeers.lab.replay.changes import ChangedRule, Changes, changed_rule
 from gridpeers.lab.replay.closed_loop import ClosedLoop
-from gridpeers.lab.replay.recorded_process import ReplayError
+from gridpeers.lab.replay.recorded_process import ReplayError, start_plant_of
 from gridpeers.lab.replay.replay import ComparedRows, record_of
-from gridpeers.lab.replay.replayed_process import start_plant_of
 from gridpeers.plant.build import start_plant
 from gridpeers.runs.comparison import Comparison
 from gridpeers.runs.result import Result, shown_in_notebooks

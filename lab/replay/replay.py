@@ -22,21 +22,19 @@ from gridpeers.agents.carriers.law_registry import close_laws
 from gridpeers.agents.laws.law import Law
 from gridpeers.lab.replay.recomputation import recomputed
 from gridpeers.lab.replay.recorded_process import (
+    MakePlant,
     Message,
     RecordedProcess,
     RecordedStep,
-    ReplayError,
-    processes_of,
-    require_arrivals,
-    tick_message,
-)
-from gridpeers.lab.replay.replayed_process import (
-    MakePlant,
     ReplayedProcess,
+    ReplayError,
     agent_again,
     plant_again,
+    processes_of,
     recorded_links,
+    require_arrivals,
     start_plant_of,
+    tick_message,
 )
 from gridpeers.plant.build import start_plant
 from gridpeers.scenarios.drivers.inprocess import run_inprocess

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gridpeers.lab.trace.flows import Flow, flows
-from gridpeers.lab.trace.space_time_diagram import space_time_diagram
+from gridpeers.lab.space_time_diagram import space_time_diagram
+from gridpeers.lab.trace import Flow, flows
 from gridpeers.scenarios.record.record_reader import RunRecord
 from tests.command_line import invoke
 from tests.record.recorded_runs import recorded_run

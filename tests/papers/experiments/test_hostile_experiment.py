@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 from msgspec.structs import replace
 
-from gridpeers.lab.predict.robustness import robustness
+from gridpeers.lab.predict.closed_form import robustness
 from gridpeers.papers.singhal2022.experiments.experiment_data import SweepData
 from gridpeers.papers.singhal2022.experiments.hostile_experiment import GRAPHS, attack_words, defence_words, hostile
 from gridpeers.scenarios.schema import load_scenario

@@ -16,7 +16,7 @@ from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.lab.explanation.explanation import explained
 from gridpeers.lab.explanation.law_step import law_step
 from gridpeers.lab.replay.recomputation import recomputed
-from gridpeers.lab.trace.flows import flows
+from gridpeers.lab.trace import flows
 from gridpeers.netem.models.delay import Normal
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem, NodeFault

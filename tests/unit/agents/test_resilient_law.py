@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from gridpeers.agents.laws.consensus import Consensus
 from gridpeers.agents.laws.law import Neighbour, Own
 from gridpeers.agents.laws.resilient import Resilient
-from gridpeers.lab.predict.robustness import robustness
+from gridpeers.lab.predict.closed_form import robustness
 
 T = 0.02
 

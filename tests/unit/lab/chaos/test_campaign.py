@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 
 from gridpeers.lab.chaos import schedules as schedules_of_chaos
-from gridpeers.lab.chaos.campaign import Campaign, run_campaign
-from gridpeers.lab.chaos.chaos_folder import ChaosFolder
+from gridpeers.lab.chaos.campaign import Campaign, ChaosFolder, run_campaign
 from gridpeers.lab.chaos.chaos_run import ChaosRow, run_scenario
 from gridpeers.plant.tables.read import DATA
 from gridpeers.scenarios.catalogue_files import CATALOGUE

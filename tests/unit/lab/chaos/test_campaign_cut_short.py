@@ -12,10 +12,8 @@ from msgspec.structs import replace
 
 from gridpeers.lab.chaos import campaign as campaigns
 from gridpeers.lab.chaos import chaos_run
-from gridpeers.lab.chaos.campaign import shrink_number
-from gridpeers.lab.chaos.chaos_folder import ChaosFolder
-from gridpeers.lab.chaos.chaos_run import run_scenario
-from gridpeers.lab.chaos.machine_error import MachineError
+from gridpeers.lab.chaos.campaign import ChaosFolder, shrink_number
+from gridpeers.lab.chaos.chaos_run import MachineError, run_scenario
 from gridpeers.scenarios.run import run_case
 from tests.command_line import invoke
 from tests.unit.lab.chaos.bases import base_in

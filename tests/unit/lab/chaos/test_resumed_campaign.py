@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from gridpeers.lab.chaos import campaign as campaigns
-from gridpeers.lab.chaos.chaos_folder import ChaosFolder, kept_rows
+from gridpeers.lab.chaos.campaign import ChaosFolder, kept_rows
 from gridpeers.lab.chaos.chaos_run import ChaosRow
 from gridpeers.lab.chaos.disturbed_scenario import Disturbance
 from gridpeers.scenarios.results.run_files import LOCK, locked

@@ -10,8 +10,7 @@ from hypothesis import given, settings
 from msgspec import json
 
 from gridpeers.lab.chaos import schedules as schedules_of_chaos
-from gridpeers.lab.chaos.campaign import Campaign, Summary
-from gridpeers.lab.chaos.chaos_folder import ChaosFolder
+from gridpeers.lab.chaos.campaign import Campaign, ChaosFolder, Summary
 from gridpeers.lab.chaos.chaos_run import ChaosRow, run_schedule
 from gridpeers.lab.chaos.disturbed_scenario import (
     JUDGED_S,

@@ -8,7 +8,7 @@ import pytest
 from msgspec.structs import replace
 
 from gridpeers.lab.chaos import chaos_run
-from gridpeers.lab.chaos.chaos_folder import ChaosFolder
+from gridpeers.lab.chaos.campaign import ChaosFolder
 from gridpeers.lab.chaos.chaos_run import (
     ChaosRow,
     Collapse,

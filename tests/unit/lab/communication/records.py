@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import msgspec
 
-from gridpeers.lab.communication.record_content import RecordContent
+from gridpeers.lab.communication.record_pass import RecordContent
 from gridpeers.scenarios.checks.checked_case import CheckedCase
 
 LOSSY = (("case.IV.link", repr([{"on": "* <-> *", "loss": 0.2, "delay": 0.03}])),)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import msgspec
 import pytest
 
-from gridpeers.lab.communication import record_content
+from gridpeers.lab.communication import record_pass
 from gridpeers.lab.communication.communication_summary import SummaryPass
 from gridpeers.lab.communication.sent_states import SentState
 from gridpeers.scenarios.checks.check_verdict import NotJudgedError
@@ -75,7 +75,7 @@ def test_journals_that_come_late_change_no_verdict(check: str, changes: Changes)
 
 def test_a_record_of_any_size_is_judged(sound: CheckedCase, monkeypatch: pytest.MonkeyPatch) -> None:
     """Shipped checks read a record in parts; only its whole content, for a check of one's own, has a limit."""
-    monkeypatch.setattr(record_content, "MOST_BYTES", 1000)
+    monkeypatch.setattr(record_pass, "MOST_BYTES", 1000)
     large = replace(sound)
 
     assert verdict(large, "message_account").status == "passed"

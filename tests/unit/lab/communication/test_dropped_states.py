@@ -14,7 +14,7 @@ import pytest
 
 from gridpeers.lab.communication.communication_checks import MessageAccount
 from gridpeers.lab.communication.communication_summary import summarise
-from gridpeers.lab.communication.record_content import read_content
+from gridpeers.lab.communication.record_pass import read_content
 from gridpeers.scenarios.checks.check_verdict import NotJudgedError
 from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.record.record_info import FILE

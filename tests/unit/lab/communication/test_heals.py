@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from gridpeers.lab.communication.heals import Heal, Heals
+from gridpeers.lab.communication.accounts import Heal, Heals
 from gridpeers.lab.communication.sent_states import NeighbourUse, SentState, SentStates, Uses
 from gridpeers.netem.ledger import LinkTrace
 

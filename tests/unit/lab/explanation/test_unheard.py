@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from gridpeers.lab.explanation.unheard import WORDS, missed, reason, verdicts
+from gridpeers.lab.explanation.explanation import WORDS, missed, reason, verdicts
 from gridpeers.netem.ledger import LinkTrace, Outcome
 from gridpeers.scenarios.record.message_index import MessageOnWire, on_wire
 from gridpeers.wire.codec import encode

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import gridpeers as gp
-from gridpeers.lab.predict.robustness import robustness, robustness_notes
+from gridpeers.lab.predict.closed_form import robustness, robustness_notes
 from tests.unit.lab.predict.predicted_graphs import inverters
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 import gridpeers as gp
 from gridpeers.lab.communication.communication_summary import SummaryPass
-from gridpeers.lab.communication.record_content import RecordContent
+from gridpeers.lab.communication.record_pass import RecordContent
 from gridpeers.scenarios.checks.check_registry import chosen_checks
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict
 from gridpeers.scenarios.checks.checked_case import CheckedCase

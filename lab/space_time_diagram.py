@@ -8,7 +8,7 @@ import matplotlib as mpl
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from gridpeers.lab.trace.flows import Flow
+from gridpeers.lab.trace import Flow
 from gridpeers.scenarios.results.plots.style import PAGE
 
 SENT, LOST, REJECTED = "#0072b2", "#d55e00", "#cc79a7"

@@ -8,7 +8,7 @@ from typing import Any, cast
 
 import pytest
 
-from gridpeers.lab.trace.flows import Flow, flows
+from gridpeers.lab.trace import Flow, flows
 from gridpeers.netem.ledger import LinkTrace, Outcome
 from gridpeers.scenarios.record.message_index import on_wire
 from gridpeers.scenarios.record.record_reader import RunRecord

@@ -1,1 +1,0 @@
-"""The messages of a run on one time axis: a Perfetto trace, and flows for a space-time diagram (docs/trace.md)."""
