@@ -70,13 +70,11 @@ class AgentNode(PlantFollower):
     """One agent as a participant of a run.
 
     `instance` is the id of this process, unique in the run, and part of the agent's token. Without `links` none are
-    emulated; without a law it is the paper's. `rate` is that of `gridpeers.wire.membership.Admission`.
+    emulated; without a law it is the paper's.
     """
 
-    def __init__(
-        self, config: AgentConfig, instance: str, links: Links | None, law: Law | None, rate: float = inf
-    ) -> None:
-        super().__init__(config.name, config.run, rate)
+    def __init__(self, config: AgentConfig, instance: str, links: Links | None, law: Law | None) -> None:
+        super().__init__(config.name, config.run)
         check_nameplate(config)
         self.stopped = ""
         self.failed = ""

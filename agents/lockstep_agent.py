@@ -134,12 +134,6 @@ class LockstepAgent(AgentNode):
             tick = "" if self._tick is None else f" at tick {self._tick}"
             self.failed = f"{self._name}: the plant is gone{tick}; the run has ended"
 
-    def is_noted(self, key: str) -> bool:
-        match self.keys.parts(key):
-            case ("alive", "agent", name, instance) if self._processes.get(name) == instance:
-                return True
-        return super().is_noted(key)
-
     def vanished(self, key: str, now: float) -> None:
         match self.keys.parts(key):
             case ("alive", "agent", name, instance):

@@ -35,7 +35,6 @@ from gridpeers.wire.bounds import MOST_COUNT
 from gridpeers.wire.codec import encode
 from gridpeers.wire.journal import JournalBuffer
 from gridpeers.wire.links import REPORT_TICKS, Links
-from gridpeers.wire.membership import FASTER
 from gridpeers.wire.messages import (
     PLANT,
     AgentStatus,
@@ -87,7 +86,7 @@ class RealtimeAgent(AgentNode):
     def __init__(self, config: AgentConfig, instance: str, links: Links | None = None, law: Law | None = None) -> None:
         if config.speed <= 0.0:
             raise ValueError(f"speed: must be positive, got {config.speed:g} s/s; 1 is real time")
-        super().__init__(config, instance, links, law, rate=FASTER / config.T_c)
+        super().__init__(config, instance, links, law)
         self.routes[self.keys.control] = Route(PLANT, (Waiting, Stop), self._on_control)
         self.routes[self.keys.link_request(config.name)] = Route(PLANT, (LinkRequest,), self._on_link_command)
         self._first_routes = dict(self.routes)

@@ -7,7 +7,6 @@ emulated links, and sends telemetry to recorders. Its subclasses decide when the
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from math import inf
 from typing import Literal, NamedTuple
 
 from gridpeers.plant.plant_config import PlantConfig
@@ -56,10 +55,10 @@ IDLE = "; its agent is idle, its inverter stays on primary droop"  # end of the 
 
 
 class PlantNode(Node):
-    """The plant as a participant of a run; `rate`: most messages of one sender per s of run time."""
+    """The plant as a participant of a run."""
 
-    def __init__(self, config: PlantConfig, plant: PlantLike, links: Links | None, rate: float = inf) -> None:
-        super().__init__(PLANT, config.run, rate)
+    def __init__(self, config: PlantConfig, plant: PlantLike, links: Links | None) -> None:
+        super().__init__(PLANT, config.run)
         for name in config.agents:
             check_name("agents", name)
             if name not in plant.inverters:
@@ -123,10 +122,6 @@ class PlantNode(Node):
             case ("alive", "agent", name, instance) if self._forget_process(name, instance):
                 self._agent_gone(name, now)
         self._close_if_alone()
-
-    def is_noted(self, key: str) -> bool:
-        """Whether the holder of a token takes part, or is to be seen to go before the plant closes."""
-        return key in self._tokens or super().is_noted(key)
 
     def _has_room(self, recorder: str) -> bool:
         """Whether a recorder is needed, noted already, or one of few."""

@@ -6,8 +6,7 @@
 - An *epoch* (`epoch` in messages) identifies one process. The plant's token contains it; an agent's nameplate, asked
   of the one process that holds the token, contains it. It is learnt once. A message of any other epoch is a ghost's.
   Epochs are compared only for equality, so no host's clock decides which process is believed.
-- *Numbers* rise within an epoch. One number far ahead would mute its sender for good, so a sender that continues behind
-  it is believed again after a while.
+- *Numbers* rise within an epoch.
 
 A message is checked as it comes off the wire and, if an emulated link held it, again when the link delivers it. This is
 no protection against an attacker who listens and then sends under another's name, in its epoch and with its next
@@ -16,45 +15,28 @@ number: that needs certificates (docs/security.md).
 
 from __future__ import annotations
 
-from math import inf
-
 from gridpeers.wire.bounds import MOST_INVERTERS
 from gridpeers.wire.codec import RejectedError
 from gridpeers.wire.messages import AnyMessage, Nameplate
 
-AHEAD = 50
-"""Numbers by which a sender may be ahead of its run time."""
-
-FASTER = 2.0
-"""Highest plausible rate of a sender in wall-clock time, as a multiple of the receiver's own."""
-
-PERSISTENT = 50
-"""Rising messages in a row after which a sender is believed against a higher number: a second at 20 ms."""
-
 
 class Admission:
-    """The valid epoch of each name, and the last numbers of its messages.
+    """The valid epoch of each name, and the last numbers of its messages."""
 
-    A gap in the numbers that needs more than `rate` messages per s of run time is not counted as lost.
-    """
-
-    def __init__(self, rate: float = inf) -> None:
-        self._rate = rate
+    def __init__(self) -> None:
         self.epochs: dict[str, int] = {}
         self._numbered: dict[str, int] = {}
         """Epoch of the numbers below; it outlasts a token that vanishes and reappears."""
-        self._arrived: dict[str, tuple[int, float]] = {}
-        """Number and run time (s) of the last message off the wire."""
-        self._behind: dict[str, tuple[int, int]] = {}
-        """Number of the last message that came after a later one, and how many such have come in rising order."""
+        self._arrived: dict[str, int] = {}
+        """Number of the last message off the wire."""
         self._passed: dict[str, int] = {}
 
     def bind(self, name: str, epoch: int) -> None:
         """Set the valid epoch of a name; in a new one the numbers start anew."""
         if self._numbered.get(name) != epoch:
             self._numbered[name] = epoch
-            for numbers in (self._arrived, self._behind, self._passed):
-                numbers.pop(name, None)
+            self._arrived.pop(name, None)
+            self._passed.pop(name, None)
         self.epochs[name] = epoch
 
     def release(self, name: str) -> None:
@@ -77,28 +59,12 @@ class Admission:
 
         Raise RejectedError if a later message has arrived before.
         """
-        name, seq, t = message.sender, message.seq, message.t
-        missed = 0
-        if name in self._arrived:
-            last, at = self._arrived[name]
-            if seq > last:
-                missed = seq - last - 1
-            elif self._rises(name, seq):
-                self._passed.pop(name, None)
-            else:
-                raise RejectedError("stale", f"{type(message).__name__}({seq}) of {name} after {last}")
-            if missed > AHEAD + self._rate * (t - at):
-                missed = 0  # no sender can have sent so many
-        self._arrived[name] = seq, t
-        self._behind.pop(name, None)
-        return missed
-
-    def _rises(self, name: str, seq: int) -> bool:
-        """Whether a sender has been behind its own last number for so long that this number must be wrong."""
-        last, count = self._behind.get(name, (-1, 0))
-        count = count + 1 if seq > last else 1
-        self._behind[name] = seq, count
-        return count >= PERSISTENT
+        name, seq = message.sender, message.seq
+        last = self._arrived.get(name, seq - 1)
+        if seq <= last:
+            raise RejectedError("stale", f"{type(message).__name__}({seq}) of {name} after {last}")
+        self._arrived[name] = seq
+        return seq - last - 1
 
     def passes(self, message: AnyMessage) -> bool:
         name, seq = message.sender, message.seq
@@ -132,10 +98,6 @@ class Membership:
     def has_room(self, name: str) -> bool:
         instances = self._instances.get(name)
         return len(self._instances) < MOST_INVERTERS if instances is None else len(instances) < MOST_PROCESSES
-
-    def notes(self, name: str, instance: str) -> bool:
-        """Return whether a process is noted; any thread may ask."""
-        return instance in self._instances.get(name, ()) or self._dismissed.get(name) == instance
 
     def appeared(self, name: str, instance: str) -> bool:
         """Note a token; return whether its process counts."""

@@ -9,7 +9,7 @@ owns it in one thread and does
     node.work(now)                                          for at most one piece of work, if it is ready
     for action in node.take_actions(): ...                  to perform the actions, in this order
     node.expire(now)                                        when `node.deadline` has passed
-    node.lost(loss, now)                                    for messages and tokens that it has dropped unread
+    node.lost(loss, now)                                    for messages that it has dropped unread
     for line in node.take_rejects(): ...                    for its log
 
 until `node.finished`, the last actions included. `now` is the driver's clock (s).
@@ -23,7 +23,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from math import inf
 from typing import Any, NamedTuple, Protocol
 
 from gridpeers.wire.codec import RejectedError, RejectedMessages, decode, encode, is_marked
@@ -64,12 +63,9 @@ class Log(NamedTuple):
 
 Action = Publish | Fetch | Listen | WithdrawToken
 
-TOKENS = "alive/**"
-"""Key under which all tokens that are dropped are counted, as there are as many of their own as anybody likes."""
-
 
 class Loss(NamedTuple):
-    """Messages on one key, or tokens, that the driver has dropped unread."""
+    """Messages on one key that the driver has dropped unread."""
 
     key: str
     kind: str
@@ -79,7 +75,7 @@ class Loss(NamedTuple):
 
 
 class Core(Protocol):
-    """The part of a node that a driver uses; it asks `is_known` and `is_noted` in any thread."""
+    """The part of a node that a driver uses; it asks `is_known` in any thread."""
 
     @property
     def tokens(self) -> tuple[str, ...]: ...
@@ -108,7 +104,6 @@ class Core(Protocol):
     def vanished(self, key: str, now: float) -> None: ...
     def received(self, key: str, payload: bytes, now: float) -> None: ...
     def is_known(self, key: str, payload: bytes) -> bool: ...
-    def is_noted(self, key: str) -> bool: ...
     def lost(self, loss: Loss, now: float) -> None: ...
     def work(self, now: float) -> bool: ...
     def expire(self, now: float) -> None: ...
@@ -136,10 +131,10 @@ class Route(NamedTuple):
 
 
 class Node:
-    def __init__(self, name: str, run: str, rate: float = inf) -> None:
+    def __init__(self, name: str, run: str) -> None:
         self.keys = Keys(run)
         self.rejects = RejectedMessages(name)
-        self.admission = Admission(rate)
+        self.admission = Admission()
         self.members = Membership(self.admission)
         self._name = name
         self.routes: dict[str, Route] = {}
@@ -213,19 +208,11 @@ class Node:
         epoch = None if route is None else self.admission.epochs.get(route.sender)
         return route is not None and epoch is not None and is_marked(payload, route.sender, epoch)
 
-    def is_noted(self, key: str) -> bool:
-        """Whether the holder of a token is noted, so that its end must be known; any thread may ask."""
-        match self.keys.parts(key):
-            case ("alive", "agent", name, instance):
-                return self.members.notes(name, instance)
-        return False
-
     def lost(self, loss: Loss, now: float) -> None:
-        """Count messages and tokens that the driver has dropped unread; the journal has their number."""
-        key = self.keys.any_alive if loss.key == TOKENS else loss.key
-        self.rejects.add(loss.kind, key, loss.text, count=loss.number)
+        """Count messages that the driver has dropped unread; the journal has their number."""
+        self.rejects.add(loss.kind, loss.key, loss.text, count=loss.number)
         if self.traffic is not None:
-            self.traffic.lost(key, loss.kind, loss.number, now)
+            self.traffic.lost(loss.key, loss.kind, loss.number, now)
 
     def _process_came(self, name: str, instance: str) -> bool:
         """Note the token of an agent's process and ask for its nameplate; return False if there is no room for it."""
@@ -315,8 +302,8 @@ MOST_PLANTS = 64
 class PlantFollower(Node):
     """A node that follows the present plant that sends first, until its token is gone; an agent, or a recorder."""
 
-    def __init__(self, name: str, run: str, rate: float = inf) -> None:
-        super().__init__(name, run, rate)
+    def __init__(self, name: str, run: str) -> None:
+        super().__init__(name, run)
         self._plants: set[int] = set()
 
     def _plant_appeared(self, part: str) -> bool:
@@ -340,12 +327,6 @@ class PlantFollower(Node):
         if followed == epoch:
             self.admission.release(PLANT)
         return followed == epoch or not self._plants
-
-    def is_noted(self, key: str) -> bool:
-        match self.keys.parts(key):
-            case ("alive", "plant", part):
-                return epoch_of(part) in self._plants
-        return super().is_noted(key)
 
     def is_known(self, key: str, payload: bytes) -> bool:
         route = self.routes.get(key)

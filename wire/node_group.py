@@ -149,9 +149,6 @@ class NodeGroup:
     def is_known(self, key: str, payload: bytes) -> bool:
         return any(node.is_known(key, payload) for node in tuple(self._listeners.get(key, ())))
 
-    def is_noted(self, key: str) -> bool:
-        return any(node.is_noted(key) for node in tuple(self._active))
-
     def lost(self, loss: Loss, now: float) -> None:
         """As `Node.lost`; who waits for a lost answer asks again."""
         query = self._open.pop(loss.key, None)

@@ -29,7 +29,6 @@ from gridpeers.plant.telemetry_reporter import measurement_of
 from gridpeers.wire.codec import RejectedError, encode
 from gridpeers.wire.keys import READING
 from gridpeers.wire.links import REPORT_TICKS, Links, is_usable
-from gridpeers.wire.membership import FASTER
 from gridpeers.wire.messages import (
     PLANT,
     AgentStatus,
@@ -72,7 +71,7 @@ class RealtimePlant(PlantNode):
     def __init__(self, config: PlantConfig, plant: LivePlant, links: Links | None = None) -> None:
         if not config.speed > 0.0:
             raise ValueError(f"speed: must be positive, got {config.speed:g} s/s; 1 is real time")
-        super().__init__(config, plant, links, rate=FASTER / config.T_c)
+        super().__init__(config, plant, links)
         keys, recorded = self.keys, self.journal is not None
         self.phase: Phase = "gathering"
         self.plant = plant

@@ -47,7 +47,6 @@ class RunClient:
             meets_all=self._meet_agents,
             credentials=self.where.credentials,
         )
-        self._session.inbox.is_noted = self._tokens.is_noted
         for key in (self.keys.answer(self._session.id), *self._heard):
             self._session.subscribe(key)
         self._session.watch(self.keys.any_alive)

@@ -36,10 +36,6 @@ class RunTokens:
         runs = set(map(run_of_plant, self._others))
         return runs | {self._run} if self.epochs else runs
 
-    def is_noted(self, key: str) -> bool:
-        """Return True for a token whose end must be known; any thread may ask."""
-        return key in self._noted
-
     def appeared(self, key: str) -> None:
         """Note a token, if it is one of those and there is room for it."""
         match self._keys.parts(key):

@@ -65,7 +65,7 @@ def drive(core: Core, session: Session, log: logging.Logger) -> None:
     included. The token is declared last: whoever sees it may rely on the rest.
     """
     core.start(monotonic())
-    session.inbox.is_known, session.inbox.is_noted = core.is_known, core.is_noted
+    session.inbox.is_known = core.is_known
     for key in core.subscriptions:
         session.subscribe(key)
     session.watch(core.watched)
@@ -76,7 +76,7 @@ def drive(core: Core, session: Session, log: logging.Logger) -> None:
 
 def serve(core: Core, session: Session, log: logging.Logger) -> None:
     """Serve a started core until it has finished; raise StoppedError if another thread asks the process to stop."""
-    session.inbox.is_known, session.inbox.is_noted = core.is_known, core.is_noted
+    session.inbox.is_known = core.is_known
     take = session.take
     limit = limit_log(log)
     now = monotonic()

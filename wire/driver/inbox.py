@@ -5,8 +5,7 @@ Should the owner fall behind, or somebody send faster than it reads, then
 - up to `ROOM` short messages wait, whoever sent them. Beyond that a message waits only if it is of a known sender, up
   to `MOST_OF_ONE` on each key: a flood by others never displaces a state, a measurement or a stop request;
 - messages above `SMALL` bytes have `BYTES` together, a quarter of it for strangers;
-- up to `MOST_TOKENS` tokens of strangers wait. One of a noted holder always waits, and so does its end; the end of any
-  other is of no use.
+- tokens always wait: Zenoh keeps each in every process anyway.
 
 A known sender is recognised by its name and epoch in the first bytes; whoever copies these has the room of that one
 sender, and no more. All checks of `gridpeers.wire.node` follow.
@@ -21,9 +20,8 @@ from contextlib import suppress
 from time import monotonic
 from typing import Literal
 
-from gridpeers.wire.bounds import LONGEST_MESSAGE, MOST_INVERTERS
-from gridpeers.wire.membership import MOST_PROCESSES
-from gridpeers.wire.node import TOKENS, Loss
+from gridpeers.wire.bounds import LONGEST_MESSAGE
+from gridpeers.wire.node import Loss
 
 Kind = Literal["message", "appeared", "vanished", "word"]
 """A message or answer; a token that appeared or vanished; or a word from another thread of the own process."""
@@ -46,9 +44,6 @@ MOST_OF_ONE = 64
 BYTES = 64_000_000
 """Bytes of long messages that may wait."""
 
-MOST_TOKENS = MOST_PROCESSES * MOST_INVERTERS
-"""Strangers' tokens that may wait: as many as a process would note of all names together."""
-
 
 class Inbox:
     """Queue events from Zenoh's threads to the owner's.
@@ -63,9 +58,6 @@ class Inbox:
     def __init__(self, *, lossless: bool = False) -> None:
         self.is_known: Callable[[str, bytes], bool] = lambda key, payload: False
         """Says whether a message on a key is of a known sender; called from Zenoh's threads, when many wait."""
-        self.is_noted: Callable[[str], bool] = lambda key: True
-        """Says whether the owner has noted the holder of a token; called from Zenoh's threads. By default all count as
-        noted, and no token is lost."""
         self._lossless = lossless
         self._events: deque[Stamped] = deque()
         self._needed = 1
@@ -75,52 +67,29 @@ class Inbox:
         self._guard = allocate_lock()
         """Held while any of the following is read or changed, and while what it admits is put in."""
         self._counted = False
-        """Whether any of the next three is to be set to zero once nothing waits."""
+        """Whether any of the next two is to be set to zero once nothing waits."""
         self._beyond: Counter[str] = Counter()
         """Messages that wait beyond `ROOM`, by key."""
         self._bytes = 0
         """Bytes of the long messages that wait."""
-        self._appeared = 0
-        """Tokens that appeared and wait."""
-        self._waiting: dict[str, bool] = {}
-        """Whether each token is there, as the owner will see by what waits for it."""
-        self._taken: dict[str, bool] = {}
-        """The same by what it took last, and handles now."""
         self._losses: dict[tuple[str, str], Loss] = {}
 
     def put(self, event: Event, *, asked: bool = False) -> None:
-        """Put an event in, from any thread; drop and count a message or token for which there is no room.
+        """Put an event in, from any thread; drop and count a message for which there is no room.
 
         An answer to an own question (`asked`) has room as a known sender's message has.
         """
-        kind, key, payload = event
+        kind, _, payload = event
         if kind == "message" and len(self._events) < ROOM and len(payload) <= SMALL:
             self._events.append((*event, monotonic()))
         elif kind == "message":
             self._put_if_admitted(event, asked=asked)
         else:
-            with self._guard:
-                if kind == "word" or self._admits_token(kind, key):
-                    self._events.append((*event, monotonic()))
-                    self._urgent = True  # before the wake: `take` forgets one that comes while the owner computes
+            self._events.append((*event, monotonic()))
+            self._urgent = True  # before the wake: `take` forgets one that comes while the owner computes
         if self._urgent or len(self._events) >= self._needed:
             with suppress(RuntimeError):  # awake already
                 self._wake.release()
-
-    def _admits_token(self, kind: Kind, key: str) -> bool:
-        there = self._waiting.get(key, self._taken.get(key))
-        if kind == "vanished":
-            if not (self.is_noted(key) if there is None else there):
-                return False
-        elif self._waiting.get(key):
-            return False
-        elif self._appeared >= MOST_TOKENS and not self.is_noted(key):
-            self._lose(TOKENS, "excess", f"{self._appeared} tokens were waiting, of others")
-            return False
-        self._appeared += kind == "appeared"
-        self._waiting[key] = kind == "appeared"
-        self._counted = True
-        return True
 
     def _put_if_admitted(self, event: Event, *, asked: bool) -> None:
         _, key, payload = event
@@ -142,7 +111,7 @@ class Inbox:
             self._events.append((*event, monotonic()))
 
     def _lose(self, key: str, kind: str, text: str) -> None:
-        """Count a message or token that is dropped unread; the guard is held."""
+        """Count a message that is dropped unread; the guard is held."""
         first = self._losses.get((key, kind))
         self._losses[key, kind] = Loss(key, kind, text, 1) if first is None else first._replace(number=first.number + 1)
 
@@ -167,11 +136,10 @@ class Inbox:
         taken = []
         while events:
             taken.append(events.popleft())
-        if self._counted or self._taken:
+        if self._counted:
             with self._guard:
                 while events:  # none that is counted waits any more
                     taken.append(events.popleft())
-                self._counted, self._bytes, self._appeared = False, 0, 0
+                self._counted, self._bytes = False, 0
                 self._beyond.clear()
-                self._taken, self._waiting = self._waiting, {}
         return taken

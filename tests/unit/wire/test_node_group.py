@@ -46,9 +46,6 @@ class Node:
     def vanished(self, key: str, now: float) -> None:
         self.known.discard(key)
 
-    def is_noted(self, key: str) -> bool:
-        return key in self.known
-
     def received(self, key: str, payload: bytes, now: float) -> None:
         self.heard.append((key, payload))
 
