@@ -21,6 +21,7 @@ from gridpeers.wire.driver.drive import StoppedError, StoppedOnLeashError, drive
 from gridpeers.wire.driver.machine import schedule_as_batch
 from gridpeers.wire.driver.process import ConfigurationError, MakeLinks, new_epoch, no_links
 from gridpeers.wire.driver.session import Session, SessionError
+from gridpeers.wire.driver.sockets import end_left_links
 from gridpeers.wire.keys import check_name
 from gridpeers.wire.node_group import NodeGroup
 from gridpeers.wire.trust.credentials import Credentials
@@ -117,7 +118,9 @@ def _run(configs: Sequence[AgentConfig], laws: Sequence[Law], make_links: MakeLi
                     node.vouches = session.vouches
             take_part(core, nodes, session, logging.getLogger(first.name))
         finally:
-            session.close(replaced=core is not None and core.session_broken)
+            session.close()
+        if core.session_broken:
+            end_left_links()
     return nodes
 
 

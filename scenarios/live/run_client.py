@@ -58,7 +58,7 @@ class RunClient:
 
     def renew(self) -> None:
         """Open a new session, as the old one does not bring the messages that it should."""
-        self._session.close(replaced=True)
+        self._session.close()
         self._open()
 
     def __enter__(self) -> RunClient:

@@ -8,7 +8,7 @@ import pytest
 
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
 from gridpeers.wire.driver.session import Session, SessionError
-from gridpeers.wire.driver.sockets import tcp_sockets
+from gridpeers.wire.driver.sockets import end_left_links, tcp_sockets
 
 
 def test_a_port_in_use_is_explained() -> None:
@@ -99,23 +99,9 @@ def test_a_session_that_is_replaced_while_its_links_are_made_leaves_none() -> No
         for step in range(60):
             session = Session("e", listen=("tcp/127.0.0.1:0",), connect=(endpoint,), clock="wall")
             session.take(1, 0.001 * (step % 20))
-            session.close(replaced=True)
+            session.close()
+            end_left_links()
         left = [socket.getpeername() for socket in tcp_sockets()]
         crowd.communicate()
 
     assert left == []
-
-
-def test_a_replaced_session_leaves_the_links_of_another_one_alone() -> None:
-    """Two sessions of one process keep their link while a third is closed for a new one."""
-    endpoint = free_endpoint()
-    sender, receiver = Session("a", listen=(endpoint,)), Session("b", connect=(endpoint,))
-    try:
-        receiver.watch("gridpeers/t/alive/**")
-        Session("c", connect=(endpoint,)).close(replaced=True)
-        sender.hold_token("gridpeers/t/alive/a")
-        assert take_one(receiver) == ("appeared", "gridpeers/t/alive/a", b"")
-        assert receiver.peers() == 1
-    finally:
-        receiver.close()
-        sender.close()

@@ -14,11 +14,10 @@ import threading
 from collections.abc import Callable
 from time import monotonic
 from typing import TYPE_CHECKING, Any
-from weakref import WeakSet
 
 from gridpeers.wire.driver.inbox import Inbox, Stamped
 from gridpeers.wire.driver.machine import limit
-from gridpeers.wire.driver.sockets import LinkAddresses, address_in, do_not_linger, end_left_links, host_addresses
+from gridpeers.wire.driver.sockets import LinkAddresses, address_in, do_not_linger, host_addresses
 from gridpeers.wire.driver.zenoh_settings import (
     ONE_THREAD,
     PROFILES,
@@ -47,12 +46,6 @@ _QUERY_TIMEOUT = 600.0
 
 _stateful: set[int] = set()
 """Threads of Zenoh that keep their Python state between calls; to make it anew at each took a quarter of a tick."""
-
-_open_sessions: WeakSet[Session] = WeakSet()
-"""Sessions of this process that are not closed."""
-
-_clearing = threading.Lock()
-"""Held while the links that a closed session left are ended."""
 
 
 def load_zenoh(*, one_thread: bool = False) -> None:
@@ -125,8 +118,6 @@ class Session:
         if credentials is not None:
             link, config["access_control"] = credentials.zenoh_settings(star=star)
             config["transport"]["link"] |= link
-        with _clearing:
-            _open_sessions.add(self)
         self._session = self._open(who, config)
         self._changeable = clock == "wall" and gossip and bool(connect) and not rendezvous
         try:
@@ -293,19 +284,11 @@ class Session:
         self._certificates.note(self._session.info.links())  # one may have just come
         return self._certificates.vouches(name)
 
-    def close(self, *, replaced: bool = False) -> None:
-        """Undeclare the tokens and close.
-
-        If another session of this process replaces it, clear away what Zenoh leaves, which takes 50 ms; not while a
-        further session is open, whose links look the same.
-        """
+    def close(self) -> None:
+        """Undeclare the tokens and close."""
         # close() may raise when a peer has just gone; nothing can be done about it
         with contextlib.suppress(self._zenoh.ZError):
             self._session.close()  # type: ignore[no-untyped-call]  # as zenoh declares it
-        with _clearing:
-            _open_sessions.discard(self)
-            if replaced and not _open_sessions:
-                end_left_links()
 
     def _direct(self, callback: Callable[[Any], None]) -> Any:
         def from_zenoh(item: Any) -> None:

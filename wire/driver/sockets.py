@@ -135,7 +135,7 @@ LONGEST = 1.0
 
 
 def end_left_links() -> None:
-    """End all of Zenoh's links in this process, and those that come in the next `QUIET` seconds.
+    """End all links of Zenoh in this process, which has closed its one session, and those of the next `QUIET` seconds.
 
     Zenoh is left to close them: it reads their end, as if the other side had closed.
     """
