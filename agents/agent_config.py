@@ -10,8 +10,7 @@ from gridpeers.wire.codec import RejectedError, decode, encode
 from gridpeers.wire.journal import RecordLevel
 from gridpeers.wire.messages import Nameplate
 from gridpeers.wire.plugins.plugin import Plugin
-from gridpeers.wire.schema.plausible import Plausible, Range, Unit
-from gridpeers.wire.schema.table_schema import NO_KEY, Below, Example, Label
+from gridpeers.wire.schema.table_schema import NO_KEY, Below, Example, Label, Plausible, Range, Unit
 from gridpeers.wire.trust.credentials import Credentials
 
 MAX_AGE = 0.25

@@ -31,11 +31,11 @@ from gridpeers.agents.laws.law import Law
 from gridpeers.agents.link_command_receiver import LinkCommandReceiver
 from gridpeers.agents.session_health import SessionHealth
 from gridpeers.agents.tick_timer import TickTimer
-from gridpeers.wire.bounds import MOST_COUNT
 from gridpeers.wire.codec import encode
-from gridpeers.wire.journal import JournalBuffer
+from gridpeers.wire.journal import JournalBuffer, TimedTraffic
 from gridpeers.wire.links import REPORT_TICKS, Links
 from gridpeers.wire.messages import (
+    MOST_COUNT,
     PLANT,
     AgentStatus,
     AnyMessage,
@@ -49,7 +49,6 @@ from gridpeers.wire.messages import (
 )
 from gridpeers.wire.node import CLOCK_ALONE, Route
 from gridpeers.wire.timing import Timer
-from gridpeers.wire.traffic import TimedTraffic
 from gridpeers.wire.wording import printable
 
 Phase = Literal["seeking", "waiting", "running"]

@@ -64,9 +64,9 @@ if TYPE_CHECKING:
     from gridpeers.scenarios.schema.loading import catalogue as catalogue
     from gridpeers.scenarios.schema.scenario_errors import ScenarioError as ScenarioError
     from gridpeers.scenarios.sweep import axes, sweep_reading
-    from gridpeers.wire.schema.plausible import Plausible as Plausible
-    from gridpeers.wire.schema.plausible import Range as Range
-    from gridpeers.wire.schema.plausible import Unit as Unit
+    from gridpeers.wire.schema.table_schema import Plausible as Plausible
+    from gridpeers.wire.schema.table_schema import Range as Range
+    from gridpeers.wire.schema.table_schema import Unit as Unit
 
     claim, graph, law = CLAIMS.register, GRAPHS.register, LAWS.register  # one by one: each has a type of its own
     check, link_fault, metric = CHECKS.register, FAULTS.register, METRICS.register
@@ -90,7 +90,7 @@ _NAMES = {
     "gridpeers.scenarios.run_request": ("BrokenRunError",),
     "gridpeers.scenarios.schema.loading": ("catalogue",),
     "gridpeers.scenarios.schema.scenario_errors": ("ScenarioError",),
-    "gridpeers.wire.schema.plausible": ("Plausible", "Range", "Unit"),
+    "gridpeers.wire.schema.table_schema": ("Plausible", "Range", "Unit"),
 }
 """Public names by their module."""
 

@@ -32,7 +32,7 @@ from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.wire.plugins.plugin import Plugin
-from gridpeers.wire.schema.plausible import Range
+from gridpeers.wire.schema.table_schema import Range
 
 MASKS = ("rate", "slots")  # add to a delay, so that its law cannot be seen alone
 

@@ -9,7 +9,7 @@ from hashlib import sha256
 import msgspec
 
 from gridpeers.netem.channel import DROPPED, Fate
-from gridpeers.wire.bounds import Count, Label, Name, Time
+from gridpeers.wire.messages import Count, Label, Name, Time
 
 Outcome = float | str | tuple[tuple[float, Count | None], ...]
 """Delay (s) of one sound copy; or why it was dropped; or delay and flipped bit of each copy."""

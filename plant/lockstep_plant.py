@@ -30,6 +30,7 @@ from gridpeers.plant.plant_interface import PlantLike
 from gridpeers.plant.plant_node import CLOSING, STAYS, PlantNode, TickActions
 from gridpeers.plant.telemetry_reporter import UnacknowledgedTelemetry, measurement_of
 from gridpeers.wire.codec import RejectedError, encode
+from gridpeers.wire.journal import TickTraffic
 from gridpeers.wire.links import REPORT_TICKS, Links, is_usable
 from gridpeers.wire.messages import (
     PLANT,
@@ -47,7 +48,6 @@ from gridpeers.wire.messages import (
 )
 from gridpeers.wire.node import ANYBODY, Publish, Route
 from gridpeers.wire.timing import Awaited, TickBarrier
-from gridpeers.wire.traffic import TickTraffic
 
 Phase = Literal["gathering", "preparing", "ticking", "joining", "holding", "closing", "over"]
 

@@ -11,8 +11,7 @@ from gridpeers.plant.equipment.inverter_parameters import GfmParameters as GfmPa
 from gridpeers.plant.equipment.inverter_parameters import OwnParameters
 from gridpeers.wire.journal import RecordLevel
 from gridpeers.wire.messages import LoadSetting
-from gridpeers.wire.schema.plausible import Plausible, Unit
-from gridpeers.wire.schema.table_schema import Example
+from gridpeers.wire.schema.table_schema import Example, Plausible, Unit
 from gridpeers.wire.trust.credentials import Credentials
 
 

@@ -40,9 +40,10 @@ from gridpeers.scenarios.schema.scenario_model import (
     ScenarioModel,
     Time,
 )
-from gridpeers.wire import bounds, keys, messages
-from gridpeers.wire.bounds import LONGEST_MESSAGE
+from gridpeers.wire import keys, messages
+from gridpeers.wire import messages as bounds
 from gridpeers.wire.codec import KINDS
+from gridpeers.wire.messages import LONGEST_MESSAGE
 from gridpeers.wire.plugins.registry import PluginError, Registry
 from gridpeers.wire.schema.table_reading import in_words, kinds_of, shown
 from gridpeers.wire.schema.table_schema import INLINE, NO_KEY, Field, NamedTables, OtherKeys, fields_of

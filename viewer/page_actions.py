@@ -14,7 +14,7 @@ from gridpeers.scenarios.live.run_address import RunAddress, UsageError, check_n
 from gridpeers.scenarios.live.run_client import NobodyError, RunClient
 from gridpeers.scenarios.live.run_requests import ask, check_link_command, command_links, links_of_run, load_setting
 from gridpeers.scenarios.schema.scenario_writing import inline
-from gridpeers.wire.bounds import Text
+from gridpeers.wire.messages import Text
 
 ActionKind = Literal[
     "open", "close", "synchronise", "stop", "start", "cut", "delay", "loss", "heal", "heal all", "load"

@@ -21,9 +21,9 @@ from gridpeers.viewer.link_states import LinkView
 from gridpeers.viewer.page_server import FASTEST, HEARTBEAT, SILENT, Talk, as_json, send, texts
 from gridpeers.viewer.record_view import RecordView
 from gridpeers.viewer.run_view import EventView
-from gridpeers.wire.bounds import Text
 from gridpeers.wire.codec import decode_foreign
 from gridpeers.wire.driver.command_line import command_line
+from gridpeers.wire.messages import Text
 from gridpeers.wire.plugins.registry import ANYTHING, named
 
 if TYPE_CHECKING:

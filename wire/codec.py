@@ -2,7 +2,7 @@
 
 A payload is msgpack, by msgspec, which checks types and bounds while it decodes, and its CRC-32 in the last four bytes:
 TCP's checksum of 16 bits misses an error now and then, and a flipped bit within a number would decode as another
-number. So a message from `decode` is as it was sent, and within `gridpeers.wire.bounds`. Any other payload raises a
+number. So a message from `decode` is as it was sent, and within its bounds. Any other payload raises a
 `RejectedError` of a kind in `KINDS`: receivers count it and continue, because no message may stop an agent.
 """
 
@@ -19,8 +19,7 @@ from zlib import crc32
 
 import msgspec
 
-from gridpeers.wire.bounds import LONGEST_MESSAGE
-from gridpeers.wire.messages import AnyMessage, Message
+from gridpeers.wire.messages import LONGEST_MESSAGE, AnyMessage, Message
 from gridpeers.wire.wording import printable
 
 CRC = 4

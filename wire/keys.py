@@ -13,7 +13,7 @@ from typing import Literal, get_args
 
 import msgspec
 
-from gridpeers.wire.bounds import MOST_COUNT, is_name
+from gridpeers.wire.messages import MOST_COUNT, is_name
 
 Role = Literal["plant", "agent", "operator", "viewer"]
 """The part that a process may take in a run. A command line, a page and a recorder are operators or viewers."""

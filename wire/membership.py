@@ -15,9 +15,8 @@ number: that needs certificates (docs/security.md).
 
 from __future__ import annotations
 
-from gridpeers.wire.bounds import MOST_INVERTERS
 from gridpeers.wire.codec import RejectedError
-from gridpeers.wire.messages import AnyMessage, Nameplate
+from gridpeers.wire.messages import MOST_INVERTERS, AnyMessage, Nameplate
 
 
 class Admission:

@@ -26,12 +26,11 @@ from functools import partial
 from typing import Any, NamedTuple, Protocol
 
 from gridpeers.wire.codec import RejectedError, RejectedMessages, decode, encode, is_marked
-from gridpeers.wire.journal import JournalBuffer
+from gridpeers.wire.journal import JournalBuffer, Traffic
 from gridpeers.wire.keys import Keys, epoch_of
 from gridpeers.wire.links import Links
 from gridpeers.wire.membership import Admission, Membership
 from gridpeers.wire.messages import PLANT, AnyMessage, Journal, LinkReport, Message, Nameplate
-from gridpeers.wire.traffic import Traffic
 
 
 class Publish(NamedTuple):

@@ -8,7 +8,7 @@ from math import isfinite
 from typing import Any
 
 from gridpeers.agents.laws.law import NOTHING_SHARED, Law, Neighbour, Own, SetPoints
-from gridpeers.wire.bounds import MOST_SHARED, SHARED_LIMIT
+from gridpeers.wire.messages import MOST_SHARED, SHARED_LIMIT
 from gridpeers.wire.plugins.registry import ANYTHING, line_of, named
 from gridpeers.wire.wording import printable
 

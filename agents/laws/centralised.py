@@ -22,7 +22,7 @@ from collections.abc import Sequence
 from typing import Annotated, Any
 
 from gridpeers.agents.laws.law import Law, Neighbour, Own, SetPoints, Term, Terms
-from gridpeers.wire.schema.plausible import Range, Unit
+from gridpeers.wire.schema.table_schema import Range, Unit
 
 
 class Centralised(Law):

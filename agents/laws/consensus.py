@@ -35,7 +35,7 @@ from typing import Annotated, Any
 
 from gridpeers.agents.agent_config import Gains
 from gridpeers.agents.laws.law import Law, Neighbour, Own, SetPoints, Term, Terms
-from gridpeers.wire.schema.plausible import Range, Unit
+from gridpeers.wire.schema.table_schema import Range, Unit
 
 
 def towards(rate: float, d: float, T: float) -> float:

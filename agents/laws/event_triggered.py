@@ -23,7 +23,7 @@ from typing import Annotated, Any
 
 from gridpeers.agents.laws.consensus import Consensus
 from gridpeers.agents.laws.law import Neighbour, Own, SetPoints, Term, Terms
-from gridpeers.wire.schema.plausible import Range, Unit
+from gridpeers.wire.schema.table_schema import Range, Unit
 
 
 class EventTriggered(Consensus):

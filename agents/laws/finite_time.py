@@ -27,7 +27,7 @@ from math import copysign
 from typing import Annotated
 
 from gridpeers.agents.laws.law import Law, Neighbour, Own, SetPoints, Term, Terms
-from gridpeers.wire.schema.plausible import Range, Unit
+from gridpeers.wire.schema.table_schema import Range, Unit
 
 
 class FiniteTime(Law):

@@ -14,9 +14,8 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, NamedTuple
 
-from gridpeers.wire.schema.plausible import Range, Unit
 from gridpeers.wire.schema.table_reading import parameter_values
-from gridpeers.wire.schema.table_schema import Below
+from gridpeers.wire.schema.table_schema import Below, Range, Unit
 
 NOTHING_SHARED: Mapping[str, float] = MappingProxyType({})
 """Default of `shared`: no further values."""

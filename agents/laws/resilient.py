@@ -26,7 +26,7 @@ from typing import Annotated, Any, NamedTuple
 
 from gridpeers.agents.laws.consensus import Consensus
 from gridpeers.agents.laws.law import Neighbour, Own, SetPoints, Term, Terms
-from gridpeers.wire.schema.plausible import Range, Unit
+from gridpeers.wire.schema.table_schema import Range, Unit
 
 SLOWER = 10.0
 """How much slower trust comes back than it goes."""

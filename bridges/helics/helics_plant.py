@@ -15,9 +15,8 @@ from gridpeers.bridges.helics.topics import ACT, HELD, SENSORS, SET_POINTS, WHER
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_interface import LivePlant, Reading, RecordedPlant
-from gridpeers.wire.bounds import NAME
 from gridpeers.wire.codec import decode_foreign
-from gridpeers.wire.messages import LoadSetting, PlantEvent
+from gridpeers.wire.messages import NAME, LoadSetting, PlantEvent
 from gridpeers.wire.timing import time_of
 from gridpeers.wire.wording import first_of
 

@@ -12,9 +12,8 @@ from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.plant_config import PlantConfig, PlantSettings
 from gridpeers.plant.plant_interface import LivePlant
 from gridpeers.plant.simulators import Simulator
-from gridpeers.wire.bounds import NAME
-from gridpeers.wire.schema.plausible import Plausible, Unit
-from gridpeers.wire.schema.table_schema import Example, Problem
+from gridpeers.wire.messages import NAME
+from gridpeers.wire.schema.table_schema import Example, Plausible, Problem, Unit
 
 BROKER = "tcp://127.0.0.1:23404"  # address of a HELICS broker that was started without options on this machine
 _ADDRESS = re.compile(r"(tcp://)?([A-Za-z0-9_.-]+)(:(?P<port>\d{1,5}))?")

@@ -21,7 +21,7 @@ from gridpeers.scenarios.checks.check_verdict import (
 )
 from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.record.record_info import LIVE
-from gridpeers.wire.schema.plausible import Plausible, Unit
+from gridpeers.wire.schema.table_schema import Plausible, Unit
 
 _NO_ARRIVALS = 'in real time a record = "decisions" does not have what arrived'
 

@@ -23,7 +23,6 @@ from gridpeers.scenarios.record.decision_entries import INSTANT, Hole, JournalCo
 from gridpeers.scenarios.record.journal_reader import entries_of, values_of
 from gridpeers.scenarios.record.record_file import RecordFile
 from gridpeers.scenarios.record.record_info import RecordInfo
-from gridpeers.wire.bounds import MOST_COUNT
 from gridpeers.wire.codec import sound
 from gridpeers.wire.journal import (
     Decision,
@@ -37,7 +36,7 @@ from gridpeers.wire.journal import (
     kind_of,
     name_of,
 )
-from gridpeers.wire.messages import PLANT, Journal, LinkReport, State
+from gridpeers.wire.messages import MOST_COUNT, PLANT, Journal, LinkReport, State
 from gridpeers.wire.timing import time_of
 
 AHEAD = 5.0

@@ -31,13 +31,13 @@ from gridpeers.wire.journal import (
     RejectedCount,
     SentMessage,
     Token,
+    Traffic,
     WakeUp,
     kind_of,
 )
 from gridpeers.wire.links import Links
 from gridpeers.wire.messages import PLANT, Journal, Measurement, State
 from gridpeers.wire.node import Loss
-from gridpeers.wire.traffic import Traffic
 
 CALLS = ("start", "session", "leave")
 """Kinds of process events that are calls of the node; the others say what it did."""

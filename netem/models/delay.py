@@ -23,8 +23,7 @@ from typing import Annotated
 import msgspec
 
 from gridpeers.netem.draws import Chain, Stream
-from gridpeers.wire.schema.plausible import Plausible, Unit, in_percent
-from gridpeers.wire.schema.table_schema import Problem
+from gridpeers.wire.schema.table_schema import Plausible, Problem, Unit, in_percent
 
 LONGEST_DELAY = 10.0
 """Delays above this (s) are taken for milliseconds by problem: control over such a link is not what netem is for."""

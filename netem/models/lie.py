@@ -14,10 +14,8 @@ from msgspec.structs import replace
 
 from gridpeers.netem.draws import Stream
 from gridpeers.netem.models import INSTANT
-from gridpeers.wire.bounds import Power, Voltage
-from gridpeers.wire.messages import State
-from gridpeers.wire.schema.plausible import Plausible, Unit
-from gridpeers.wire.schema.table_schema import Example, Problem
+from gridpeers.wire.messages import Power, State, Voltage
+from gridpeers.wire.schema.table_schema import Example, Plausible, Problem, Unit
 
 LONGEST_REPLAY = 60.0
 """Longest time (s) by which a replay is old; each receiver keeps the states of that time."""

@@ -13,8 +13,7 @@ from typing import Annotated
 import msgspec
 
 from gridpeers.netem.draws import Chain, Stream
-from gridpeers.wire.schema.plausible import Probability
-from gridpeers.wire.schema.table_schema import Problem
+from gridpeers.wire.schema.table_schema import Probability, Problem
 
 Lost = Callable[[int], bool]
 

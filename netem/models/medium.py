@@ -11,8 +11,7 @@ import msgspec
 from gridpeers.netem.draws import Stream
 from gridpeers.netem.models import INSTANT
 from gridpeers.netem.models.delay import DELAY
-from gridpeers.wire.schema.plausible import Plausible, Probability, Unit
-from gridpeers.wire.schema.table_schema import Problem
+from gridpeers.wire.schema.table_schema import Plausible, Probability, Problem, Unit
 
 LONGEST_FLAP = 600.0
 """Longest plausible up or down time (s)."""

@@ -18,15 +18,16 @@ from gridpeers.netem.models.medium import Corrupt, Cut, Duplicate, Flap, Rate, S
 from gridpeers.netem.models.own_fault import FAULTS
 from gridpeers.netem.schema.pattern import parse
 from gridpeers.wire.plugins.plugin import Plugin, plugin_of, plugin_problems, scalar_objection
-from gridpeers.wire.schema.plausible import Plausible, Unit
 from gridpeers.wire.schema.table_reading import shown
 from gridpeers.wire.schema.table_schema import (
     After,
     Example,
     Label,
     OtherKeys,
+    Plausible,
     Problem,
     Shorthand,
+    Unit,
     below,
     fields_of,
     problems_of,

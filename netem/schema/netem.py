@@ -13,8 +13,7 @@ from gridpeers.netem.models.lie import AnyLie
 from gridpeers.netem.schema.fault import EndTime, Fault, RunTime, Span
 from gridpeers.netem.schema.partition import Partition
 from gridpeers.netem.schema.pattern import Link, links_among, objections
-from gridpeers.wire.schema.plausible import Plausible, Unit
-from gridpeers.wire.schema.table_schema import NO_KEY, Example, Problem, below, problems_of
+from gridpeers.wire.schema.table_schema import NO_KEY, Example, Plausible, Problem, Unit, below, problems_of
 from gridpeers.wire.wording import suggestion
 
 

@@ -12,7 +12,7 @@ from gridpeers.plant.equipment import Feeder, InverterRow, Switch
 from gridpeers.plant.equipment.imported_equipment import LinearElement
 from gridpeers.plant.equipment.inverter_parameters import OwnParameters
 from gridpeers.plant.plant_config import FeederChanges
-from gridpeers.wire.bounds import MOST_INVERTERS
+from gridpeers.wire.messages import MOST_INVERTERS
 
 
 def changed(feeder: Feeder, changes: FeederChanges) -> Feeder:

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin
 import msgspec
 from msgspec.structs import replace
 
-from gridpeers.wire.schema.plausible import Plausible, Unit
-from gridpeers.wire.schema.table_schema import Below, fields_of
+from gridpeers.wire.schema.table_schema import Below, Plausible, Unit, fields_of
 
 TimeConstant = Annotated[float, Unit("s"), Plausible("a time constant", 1e-5, 10.0, above_zero=True)]
 Gain = Annotated[float, Plausible("a gain", 0.0, 1e6)]

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from gridpeers.plant.equipment import Feeder
 from gridpeers.wire.messages import LoadSetting
-from gridpeers.wire.schema.plausible import Plausible
+from gridpeers.wire.schema.table_schema import Plausible
 from gridpeers.wire.wording import first_of, suggestion
 
 FACTOR = Plausible("a factor on a load", 0.0, 10.0)  # factors on the power that a load has in the feeder's tables

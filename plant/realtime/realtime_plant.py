@@ -27,6 +27,7 @@ from gridpeers.plant.realtime.run_commands import LinkCommandSender, RunCommands
 from gridpeers.plant.realtime.silence_detector import SilenceDetector
 from gridpeers.plant.telemetry_reporter import measurement_of
 from gridpeers.wire.codec import RejectedError, encode
+from gridpeers.wire.journal import TimedTraffic
 from gridpeers.wire.keys import READING
 from gridpeers.wire.links import REPORT_TICKS, Links, is_usable
 from gridpeers.wire.messages import (
@@ -44,7 +45,6 @@ from gridpeers.wire.messages import (
 )
 from gridpeers.wire.node import ANYBODY, CLOCK_ALONE, Route
 from gridpeers.wire.timing import RateLimit, Timer
-from gridpeers.wire.traffic import TimedTraffic
 
 Phase = Literal["gathering", "running", "closing", "over"]
 

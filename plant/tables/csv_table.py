@@ -11,9 +11,8 @@ from typing import Any, Generic, Literal, TypeVar, get_args, get_origin
 import msgspec
 
 from gridpeers.plant.equipment import NODES, PHASES
-from gridpeers.wire.schema.plausible import Plausible
 from gridpeers.wire.schema.table_reading import shown
-from gridpeers.wire.schema.table_schema import Field, Label, fields_of, named
+from gridpeers.wire.schema.table_schema import Field, Label, Plausible, fields_of, named
 from gridpeers.wire.text_file import TextFileError, read_table_text
 from gridpeers.wire.wording import suggestion
 

@@ -15,8 +15,7 @@ import msgspec
 
 from gridpeers.plant.equipment import F_NOM
 from gridpeers.plant.tables.csv_table import PhaseLetters
-from gridpeers.wire.schema.plausible import Plausible, Range, Unit
-from gridpeers.wire.schema.table_schema import Label
+from gridpeers.wire.schema.table_schema import Label, Plausible, Range, Unit
 
 SELF_R = Plausible("the resistance of a line", 1e-3, 20.0, above_zero=True)
 SELF_X = Plausible("the reactance of a line", 1e-3, 20.0, above_zero=True)

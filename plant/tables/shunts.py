@@ -17,10 +17,9 @@ from gridpeers.plant.tables import feeder_columns as columns
 from gridpeers.plant.tables.branches import BusTable, require_ground, require_phases
 from gridpeers.plant.tables.csv_table import CsvRow
 from gridpeers.plant.tables.write import inverter_cells
-from gridpeers.wire.bounds import MOST_INVERTERS
 from gridpeers.wire.keys import check_name
-from gridpeers.wire.messages import OFF, PLANT
-from gridpeers.wire.schema.plausible import Plausible
+from gridpeers.wire.messages import MOST_INVERTERS, OFF, PLANT
+from gridpeers.wire.schema.table_schema import Plausible
 from gridpeers.wire.wording import suggestion
 
 TAKEN = {

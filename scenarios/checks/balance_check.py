@@ -29,7 +29,7 @@ from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.results.history import Flags, Floats
 from gridpeers.scenarios.results.island_membership import closed_switches
 from gridpeers.wire.messages import PlantEvent
-from gridpeers.wire.schema.plausible import Plausible, Unit
+from gridpeers.wire.schema.table_schema import Plausible, Unit
 
 MOST_NODES = 1500  # Nodes above which a feeder takes seconds
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import msgspec
 
 from gridpeers.scenarios.results.history import History
-from gridpeers.wire.schema.plausible import Plausible, Unit
+from gridpeers.wire.schema.table_schema import Plausible, Unit
 
 if TYPE_CHECKING:
     from gridpeers.scenarios.checks.checked_case import CheckedCase

@@ -20,7 +20,7 @@ from gridpeers.scenarios.checks.check_verdict import (
 from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.results.history import Flags, Floats
 from gridpeers.scenarios.results.recorded_events import law_failures, tripped_by, tripped_inverters
-from gridpeers.wire.schema.plausible import Plausible, Unit
+from gridpeers.wire.schema.table_schema import Plausible, Unit
 
 _LOADING = Plausible("a limit of loading", 0.1, 10.0, above_zero=True)
 _SWING = Plausible("a swing", 1e-6, 10.0, above_zero=True)

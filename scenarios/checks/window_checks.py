@@ -12,8 +12,7 @@ from gridpeers.scenarios.checks.checked_case import CheckedCase, IslandWindow
 from gridpeers.scenarios.results.history import Flags, Floats
 from gridpeers.scenarios.results.metrics import FEWEST, STEADY, Ends, ends_of
 from gridpeers.scenarios.results.sharing_index import NO_LOAD, sharing_index, total_load
-from gridpeers.wire.schema.plausible import Plausible, Unit
-from gridpeers.wire.schema.table_schema import Below
+from gridpeers.wire.schema.table_schema import Below, Plausible, Unit
 
 _SETTLING = Plausible("a settling time", 0.0, 3600.0)
 _After = Annotated[

@@ -15,12 +15,10 @@ from gridpeers.netem.models.medium import Cut, Rate
 from gridpeers.netem.schema.fault import LONGEST_RUN, PROFILES, Fault
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.netem.schema.pattern import Link, objections
-from gridpeers.wire.bounds import Name, Text
 from gridpeers.wire.codec import decode_foreign
-from gridpeers.wire.messages import LinkReport
+from gridpeers.wire.messages import LinkReport, Name, Text
 from gridpeers.wire.plugins.plugin import Plugin
-from gridpeers.wire.schema.plausible import Plausible
-from gridpeers.wire.schema.table_schema import Problem
+from gridpeers.wire.schema.table_schema import Plausible, Problem
 from gridpeers.wire.wording import first_of, printable
 
 

@@ -25,10 +25,9 @@ from gridpeers.scenarios.live.run_address import UsageError
 from gridpeers.scenarios.live.run_client import NobodyError, RunClient
 from gridpeers.scenarios.live.run_monitor import PlantStatus
 from gridpeers.scenarios.short_texts import aligned, in_order
-from gridpeers.wire.bounds import MOST_COUNT
 from gridpeers.wire.codec import decode_foreign, encode
 from gridpeers.wire.driver.command_line import command_line
-from gridpeers.wire.messages import PLANT, Answer, Command, LinkAcknowledgement, LoadSetting
+from gridpeers.wire.messages import MOST_COUNT, PLANT, Answer, Command, LinkAcknowledgement, LoadSetting
 from gridpeers.wire.schema.table_schema import Problem
 from gridpeers.wire.wording import printable
 

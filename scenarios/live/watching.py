@@ -22,8 +22,7 @@ from gridpeers.scenarios.live.run_client import RunClient
 from gridpeers.scenarios.live.run_monitor import InverterStatus, RunMonitor, Snapshot
 from gridpeers.scenarios.live.run_requests import plant_status, read_config
 from gridpeers.scenarios.short_texts import aligned, short
-from gridpeers.wire.bounds import MOST_INVERTERS
-from gridpeers.wire.messages import PLANT, AgentStatus, Telemetry
+from gridpeers.wire.messages import MOST_INVERTERS, PLANT, AgentStatus, Telemetry
 from gridpeers.wire.timing import SessionDeadline
 
 EVENTS = 6

@@ -9,10 +9,9 @@ import msgpack
 import msgspec
 
 from gridpeers.scenarios.record.record_info import RecordInfo
-from gridpeers.wire.bounds import LONGEST_MESSAGE
 from gridpeers.wire.codec import CRC, sound
 from gridpeers.wire.journal import ENTRIES, AnyEntry, Entry
-from gridpeers.wire.messages import AnyMessage, Measurement, State
+from gridpeers.wire.messages import LONGEST_MESSAGE, AnyMessage, Measurement, State
 
 _HEAD = b"\xdd"  # Begins an array of msgpack, before the number of its values in four bytes
 

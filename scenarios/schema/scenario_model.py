@@ -17,8 +17,17 @@ from gridpeers.plant.equipment.named_loads import FACTOR
 from gridpeers.plant.plant_config import Method, OnLawFailure, Protection, SyncCheck
 from gridpeers.plant.simulators import OURS, tables
 from gridpeers.wire.journal import RecordLevel
-from gridpeers.wire.schema.plausible import Plausible, Unit
-from gridpeers.wire.schema.table_schema import INHERITED, INLINE, Divides, Example, Label, MultipleOf, NamedTables
+from gridpeers.wire.schema.table_schema import (
+    INHERITED,
+    INLINE,
+    Divides,
+    Example,
+    Label,
+    MultipleOf,
+    NamedTables,
+    Plausible,
+    Unit,
+)
 
 AS_RUN = "as_run"
 """Table that a run adds to its copy of the scenario; it is skipped when the copy is read."""

@@ -6,8 +6,7 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
-from gridpeers.wire.schema.plausible import Range
-from gridpeers.wire.schema.table_schema import Example, Problem
+from gridpeers.wire.schema.table_schema import Example, Problem, Range
 
 MOST_POINTS = 1_000_000
 """Most values of one range: more are a slip, and would fill the memory before any message."""

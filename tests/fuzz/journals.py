@@ -15,9 +15,8 @@ from gridpeers.netem.ledger import LinkTrace
 from gridpeers.scenarios.emulation.link_data import report_data
 from gridpeers.scenarios.record.record_file import RecordFile, RecordMessage
 from gridpeers.scenarios.record.record_info import RecordInfo
-from gridpeers.wire.bounds import LATEST, MOST_COUNT
 from gridpeers.wire.codec import CRC, encode
-from gridpeers.wire.messages import PLANT, Journal, LinkReport, State
+from gridpeers.wire.messages import LATEST, MOST_COUNT, PLANT, Journal, LinkReport, State
 from tests.fuzz.mutation import NUMBERS, TEXTS
 from tests.toy.toy_configs import toy_configs
 

@@ -15,7 +15,7 @@ from gridpeers.scenarios.live.run_requests import read_config
 from gridpeers.scenarios.record.journal_reader import entries_of, values_of
 from gridpeers.scenarios.results.run_files import JOURNAL, FolderError, rows_in
 from gridpeers.scenarios.sweep.sweep_case import SweepRow
-from gridpeers.wire.bounds import LONGEST_MESSAGE
+from gridpeers.wire.messages import LONGEST_MESSAGE
 from gridpeers.wire.trust.key_folder import KeysError, read_list
 from gridpeers.wire.trust.site_authority import issue, make_site
 from tests.hostile.cases import sealed

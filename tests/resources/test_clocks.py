@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from gridpeers.wire.bounds import MOST_COUNT
 from gridpeers.wire.driver.process import new_epoch
+from gridpeers.wire.messages import MOST_COUNT
 from tests.toy.town import Town
 
 ROOT = Path(__file__).parents[2]

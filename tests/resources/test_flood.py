@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gridpeers.wire.bounds import LONGEST_MESSAGE
 from gridpeers.wire.driver.session import Session
+from gridpeers.wire.messages import LONGEST_MESSAGE
 from tests.resources.trial import Trial, Watch, attack_on, attacking
 from tests.toy.town import Town
 

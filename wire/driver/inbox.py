@@ -20,7 +20,7 @@ from contextlib import suppress
 from time import monotonic
 from typing import Literal
 
-from gridpeers.wire.bounds import LONGEST_MESSAGE
+from gridpeers.wire.messages import LONGEST_MESSAGE
 from gridpeers.wire.node import Loss
 
 Kind = Literal["message", "appeared", "vanished", "word"]

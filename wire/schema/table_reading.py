@@ -12,7 +12,6 @@ from typing import Any, Literal, TypeVar, get_args, get_origin
 
 import msgspec
 
-from gridpeers.wire.schema.plausible import number_in
 from gridpeers.wire.schema.table_schema import (
     INHERITED,
     INLINE,
@@ -25,6 +24,7 @@ from gridpeers.wire.schema.table_schema import (
     below,
     contradictions,
     fields_of,
+    number_in,
 )
 from gridpeers.wire.wording import printable, suggestion
 

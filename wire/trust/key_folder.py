@@ -21,9 +21,9 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from gridpeers.wire.bounds import is_name
 from gridpeers.wire.codec import decode_foreign
 from gridpeers.wire.keys import Role
+from gridpeers.wire.messages import is_name
 from gridpeers.wire.trust.credentials import DATE_AND_TIME, Credentials, Member
 from gridpeers.wire.wording import printable
 

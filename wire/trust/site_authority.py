@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from gridpeers.wire.bounds import is_name
 from gridpeers.wire.keys import Role
+from gridpeers.wire.messages import is_name
 from gridpeers.wire.trust.credentials import DATE_AND_TIME, LONGEST_COMMON_NAME, Member
 from gridpeers.wire.trust.key_folder import (
     CA,

@@ -24,7 +24,7 @@ from gridpeers.scenarios.live.run_requests import (
     links_of_run,
     links_text,
 )
-from gridpeers.wire.schema.plausible import Plausible
+from gridpeers.wire.schema.table_schema import Plausible
 
 link = typer.Typer(
     cls=Commands,

@@ -29,12 +29,11 @@ from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.record.recorded_decision import RecordedDecision
 from gridpeers.scenarios.results.record import Recorder
-from gridpeers.wire.bounds import LONGEST_MESSAGE
 from gridpeers.wire.codec import decode, encode
 from gridpeers.wire.driver.session import Session
 from gridpeers.wire.journal import ProcessEvent, RejectedCount, Token, WakeUp
 from gridpeers.wire.keys import Keys
-from gridpeers.wire.messages import Ready, State, Telemetry
+from gridpeers.wire.messages import LONGEST_MESSAGE, Ready, State, Telemetry
 from tests.hostile.cases import sealed
 from tests.toy.toy_configs import toy_configs
 from tests.toy.toy_runs import TOY

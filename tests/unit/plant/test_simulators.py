@@ -11,8 +11,7 @@ import gridpeers as gp
 from gridpeers.plant.build import start_plant
 from gridpeers.plant.simulators import SIMULATORS, Simulator
 from gridpeers.scenarios.schema.configs import configs
-from gridpeers.wire.schema.plausible import Plausible, Unit
-from gridpeers.wire.schema.table_schema import Problem
+from gridpeers.wire.schema.table_schema import Plausible, Problem, Unit
 
 
 class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec import inspect
 
-from gridpeers.wire.bounds import LONGEST_MESSAGE
 from gridpeers.wire.codec import KINDS, RejectedError, RejectedMessages, decode, encode
 from gridpeers.wire.messages import (
+    LONGEST_MESSAGE,
     MESSAGES,
     AgentStatus,
     LinkReport,

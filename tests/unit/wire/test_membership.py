@@ -10,10 +10,9 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from gridpeers.agents.agent import Agent
-from gridpeers.wire.bounds import MOST_INVERTERS
 from gridpeers.wire.codec import RejectedError
 from gridpeers.wire.membership import ASKED_AT_ONCE, MOST_PROCESSES, Admission, Membership
-from gridpeers.wire.messages import Nameplate, State
+from gridpeers.wire.messages import MOST_INVERTERS, Nameplate, State
 from tests.toy.toy_configs import agent_config
 
 

@@ -11,6 +11,7 @@ from gridpeers.wire.codec import encode
 from gridpeers.wire.journal import (
     AT_ONCE,
     NOTED_REJECTED,
+    SHOWN_PAYLOAD,
     Entry,
     Exchange,
     JournalBuffer,
@@ -19,12 +20,13 @@ from gridpeers.wire.journal import (
     ReceivedMessage,
     RejectedCount,
     SentMessage,
+    TickTraffic,
+    TimedTraffic,
     Token,
     WakeUp,
 )
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import Leave, State
-from gridpeers.wire.traffic import SHOWN_PAYLOAD, TickTraffic, TimedTraffic
 
 KEYS = Keys("toy")
 STATE = encode(State(sender="inv2", epoch=3, seq=5, t=0.1, P_set=5e4, V_set=277.0, Q=0.0))

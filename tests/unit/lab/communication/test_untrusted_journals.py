@@ -8,9 +8,8 @@ import msgspec
 import pytest
 
 from gridpeers.netem.ledger import LinkTrace
-from gridpeers.wire.bounds import MOST_COUNT
 from gridpeers.wire.codec import encode
-from gridpeers.wire.messages import State
+from gridpeers.wire.messages import MOST_COUNT, State
 from tests.fuzz.journals import judged, link_report
 
 DECISION = ["decision", 4, 1, ["inv2"], [1], [], []]

@@ -18,12 +18,11 @@ from gridpeers.scenarios.live.run_monitor import RunMonitor, RunTokens
 from gridpeers.scenarios.live.run_requests import read_config
 from gridpeers.scenarios.live.watching import RunSubscriber, plain
 from gridpeers.scenarios.results.link_record import LinkRecord
-from gridpeers.wire.bounds import MOST_INVERTERS
 from gridpeers.wire.codec import RejectedError, decode, encode
 from gridpeers.wire.driver.inbox import Inbox
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.membership import MOST_PROCESSES
-from gridpeers.wire.messages import AgentStatus, LinkReport, LinkRequest, Message, Telemetry
+from gridpeers.wire.messages import MOST_INVERTERS, AgentStatus, LinkReport, LinkRequest, Message, Telemetry
 from gridpeers.wire.node import MOST_PLANTS
 from tests.hostile.cases import Truth, hostile
 from tests.toy.toy_configs import agent_config

@@ -8,8 +8,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from gridpeers.scenarios.record.journal_reader import entries_of
-from gridpeers.wire.bounds import LONGEST_MESSAGE
 from gridpeers.wire.journal import Entry, Exchange, MessageReference, RejectedCount, SentMessage, Token
+from gridpeers.wire.messages import LONGEST_MESSAGE
 
 ENTRIES: list[Entry] = [
     Exchange(3, [b"measured", [1, 2.5, None]], [b"state", ["inv1", True]]),

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from gridpeers.wire.bounds import LONGEST_MESSAGE
 from gridpeers.wire.codec import decode, encode, is_marked
 from gridpeers.wire.driver.inbox import BYTES, MOST_OF_ONE, ROOM, Inbox
-from gridpeers.wire.messages import MESSAGES, Message, State
+from gridpeers.wire.messages import LONGEST_MESSAGE, MESSAGES, Message, State
 from gridpeers.wire.node import Loss
 from tests.hostile.cases import packed, sound
 

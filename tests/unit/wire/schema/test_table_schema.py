@@ -8,9 +8,8 @@ import pytest
 from gridpeers.agents.carriers.law_registry import LAWS
 from gridpeers.plant.tables.feeder_columns import TABLES, LoadColumns
 from gridpeers.scenarios.reference import page
-from gridpeers.wire.schema.plausible import Plausible, Range, Unit
 from gridpeers.wire.schema.table_reading import parameter_values, read_parameters, read_table
-from gridpeers.wire.schema.table_schema import Below, Divides, fields_of
+from gridpeers.wire.schema.table_schema import Below, Divides, Plausible, Range, Unit, fields_of
 
 Gain = Annotated[float, Unit("1/s"), Range(0, 100), Below("most"), "Rate of the law."]
 Step = Annotated[float, Unit("s", in_key=False), Plausible("a step", 1e-5, 0.02, above_zero=True), Divides("period")]
