@@ -1,16 +1,19 @@
-"""A campaign: many runs with disturbances, what they violate, and each kind of failure shrunk to a scenario file."""
+"""A campaign: many runs with disturbances, what they violate, and each kind of failure shrunk to a scenario file.
+
+Its folder has a line for each run in chaos.csv, and the scenario of each kind of failure.
+"""
 
 from __future__ import annotations
 
 import csv
 import json
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, closing, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 from io import StringIO
 from pathlib import Path
-from types import MappingProxyType
+from typing import NamedTuple
 
 import msgspec
 
@@ -46,14 +49,35 @@ from gridpeers.scenarios.sweep.workers import on_workers
 from gridpeers.wire.driver.command_line import command_line
 from gridpeers.wire.wording import counted
 
+RUNS = 100
+
 REPEATED = 20
 """Each run whose number is a multiple of this one is done twice, by any worker that is free."""
+
+SEEDS = 1_000_000
+"""Seeds of the messages' fates for each seed of a campaign: run n has one of its own."""
+
+SCENARIO, SETTINGS = "scenario.toml", "asked.json"
+"""Files from which a campaign goes on, beside its journal: its scenario; its seed and its number of runs."""
+
+COLUMNS = (
+    *("run", "seed", "status", "violated", "why", "disturbances", "schedule"),
+    *("passed", "trips", "since_s", "history_sha256", "links_sha256", "took_s"),
+)
 
 Stage = Callable[[float], AbstractContextManager[Callable[[str, float], None]]]
 """Begins a stage of so many parts: its function takes the present work, and how many parts are done."""
 
 
-@dataclass(frozen=True, kw_only=True)
+class Failure(NamedTuple):
+    row: ChaosRow
+    """The run in which it was found, among those with the fewest disturbances."""
+    simplest: ChaosRow
+    """The run of the simplest schedule found for it."""
+    file: Path
+
+
+@dataclass(kw_only=True)
 class Campaign:
     base: ChaosBase
     seed: int
@@ -62,35 +86,92 @@ class Campaign:
     jobs: int = 1
     dask: str = ""
     """Address of a Dask scheduler to use instead; its workers have their own folders for temporary files."""
+    path: Path | None = None
+    """Its folder; None until it is made."""
+    command: str = ""
+    rows: dict[int, ChaosRow] = field(default_factory=dict)
+    failures: dict[str, Failure] = field(default_factory=dict)
+    """By the check that is violated."""
 
+    def run(self, stage: Stage) -> None:
+        """Do the runs that the folder lacks, shrink what fails, and write all of it, also after an interruption.
 
-@dataclass(frozen=True, kw_only=True)
-class Failure:
-    violated: str
-    row: ChaosRow
-    """The run in which it was found, among those with the fewest disturbances."""
-    simplest: ChaosRow
-    """The run of the simplest schedule found for it."""
-    file: Path
+        MachineError if the machine lacks what a run needs: that is no failure of the scenario, and nothing is shrunk.
+        """
+        try:
+            with closing(TransientFolder("gridpeers-chaos-")) as temporary:  # workers that are ended leave theirs in it
+                within = None if self.dask else temporary.path
+                self._do_runs(stage, within)
+                self._add_failures()
+                self._shrink_all(stage, within)
+            self._conclude()
+            set_complete(self._file())
+        except BaseException as error:
+            why = refusal(self._file(), error) if isinstance(error, OSError) else str(error) or type(error).__name__
+            why = "interrupted" if isinstance(error, KeyboardInterrupt) else why
+            set_broken(self._file(), f"{why} after {len(self.rows)} of {self.runs} runs")
+            with suppress(OSError):  # a full disk may take no more of them; the error above is the one to tell
+                self._add_failures()
+                self._conclude()
+            raise
 
+    def _do_runs(self, stage: Stage, within: Path | None) -> None:
+        text, driver = self.base.text, self.driver
+        calls = ((text, self.seed, number, schedule, driver, within) for number, schedule in self._missing())
+        jobs = 1 if driver == "processes" else self.jobs
+        with stage(self.runs) as tell, closing(on_workers(calls, jobs, run_number, self.dask)) as results:
+            progress = f"{self.base.scenario.name}, {{}} of {self.runs} runs"
+            tell(progress.format(len(self.rows)), len(self.rows))
+            for row in results:
+                first = self.rows.get(row.number)
+                self.add(row if first is None else compared(first, row, REPEATS))
+                tell(f"{progress.format(len(self.rows))}, {self.violated} violated", len(self.rows))
 
-@dataclass(frozen=True, kw_only=True)
-class Summary:
-    campaign: Campaign
-    rows: dict[int, ChaosRow]
-    failures: tuple[Failure, ...]
+    def _missing(self) -> Iterator[tuple[int, Schedule]]:
+        known = dict(self.rows)
+        for batch in range(-(-self.runs // BATCH)):
+            numbers = range(batch * BATCH, min((batch + 1) * BATCH, self.runs))
+            once = {number for number in numbers if number not in known}
+            twice = {n for n in numbers if n % REPEATED == 0 and (n in once or REPEATS not in known[n].passed)}
+            if once | twice:
+                schedules = dict(zip(numbers, drawn(self.base, self.seed, batch), strict=False))
+                yield from ((number, schedules[number]) for which in (once, twice) for number in sorted(which))
+
+    def _add_failures(self) -> None:
+        rows = sorted(self.rows.values(), key=lambda row: (len(row.schedule), row.number))
+        for violated in sorted({name for row in rows for name in row.violated} - self.failures.keys()):
+            row = next(row for row in rows if violated in row.violated)
+            self.failures[violated] = Failure(row, row, self.write_failure(violated, row, row))
+
+    def _shrink_all(self, stage: Stage, within: Path | None) -> None:
+        if not self.failures:
+            return
+        kinds = counted(len(self.failures), "kind of failure", "kinds of failure")
+        calls = []
+        for name, it in self.failures.items():  # processes only for a failure that one process cannot show
+            driver = self.driver if name in (SAME_IN_PROCESSES, REPEATS) else "inprocess"
+            calls.append((self.base.text, self.seed, it.row.number, name, driver, within))
+        workers = on_workers(calls, min(self.jobs, len(calls)), shrink_number, self.dask)
+        with stage(len(calls)) as tell, closing(workers) as simpler:
+            tell(f"shrinking, 0 of {kinds}", 0)
+            for done, (violated, simplest) in enumerate(simpler, start=1):
+                row = self.failures[violated].row
+                self.failures[violated] = Failure(row, simplest, self.write_failure(violated, row, simplest))
+                tell(f"shrinking, {done} of {kinds}", done)
+
+    # ---------------------------------------------------------------- its report
 
     @property
     def violated(self) -> int:
         return sum(bool(row.violated) for row in self.rows.values())
 
     def lines(self) -> Iterator[str]:
-        base, rows = self.campaign.base, self.rows.values()
-        how = "in one process each" if self.campaign.driver == "inprocess" else "with processes"
+        base, rows = self.base, self.rows.values()
+        how = "in one process each" if self.driver == "inprocess" else "with processes"
         numbers = Counter(it.kind for row in rows for it in base.effective(row.schedule))
         drawn = ", ".join(f"{kind} {numbers[kind]}" for kind in KINDS if numbers[kind]) or "none"
-        head = f"{base.scenario.name}, case {base.case}: {len(rows)} of {self.campaign.runs} runs {how}"
-        yield f"{head}, seed {self.campaign.seed}; disturbances: {drawn}"
+        head = f"{base.scenario.name}, case {base.case}: {len(rows)} of {self.runs} runs {how}"
+        yield f"{head}, seed {self.seed}; disturbances: {drawn}"
         yield f"{'asked':18} {'judged':>7} {'violated':>9}  first"
         for name in dict.fromkeys((*ASKED, *chosen_checks(base.scenario.checks), RETURNS)):
             passed = sum(name in row.passed for row in rows)
@@ -101,96 +182,110 @@ class Summary:
         collapses = sum(bool(row.collapse) for row in rows)
         beyond = f"; {collapses} with a collapse that no control prevents, and that lasts" if collapses else ""
         yield f"{self.violated} of {len(rows)} runs violated anything; {sum(row.trips for row in rows)} trips{beyond}"
-        for failure in self.failures:  # of the run as found if the simplest one passes the next time
-            name, found = failure.violated, failure.row
-            yield f"{name}, run {found.number}: {failure.simplest.violated.get(name, found.violated[name])}"
-            yield from (f"    {line}" for line in base.lines(failure.simplest.schedule))
-            yield f"    {again(failure.file)}"
+        for name, (found, simplest, file) in self.failures.items():
+            # of the run as found if the simplest one passes the next time
+            yield f"{name}, run {found.number}: {simplest.violated.get(name, found.violated[name])}"
+            yield from (f"    {line}" for line in base.lines(simplest.schedule))
+            yield f"    {again(file)}"
+
+    # ---------------------------------------------------------------- its folder
+
+    def _file(self, name: str = "") -> Path:
+        assert self.path is not None
+        return self.path / name
+
+    def begin(self) -> None:
+        """Write what a campaign goes on from."""
+        write_whole(self._file(SCENARIO), self.base.text)
+        write_whole(self._file(SETTINGS), json.dumps({"seed": self.seed, "runs": self.runs}) + "\n")
+        open_journal(self._file()).close()
+        self.write_table()
+
+    def add(self, row: ChaosRow) -> None:
+        with self._file(JOURNAL).open("ab") as file:
+            file.write(journal_line(row))
+        self.rows[row.number] = row  # only now that it is kept: after an error the command counts these rows
+
+    def write_table(self) -> None:
+        text = StringIO()
+        table = csv.writer(text, lineterminator="\n")
+        table.writerow(COLUMNS)
+        for _, row in sorted(self.rows.items()):
+            why = [*(row.violated[it] for it in sorted(row.violated)), row.collapse, row.unsettled]
+            table.writerow(
+                (
+                    *(row.number, seed_of(self.seed, row.number), row.status, " ".join(sorted(row.violated))),
+                    *("; ".join(filter(None, why)), len(row.schedule), json.dumps(msgspec.to_builtins(row.schedule))),
+                    *(" ".join(row.passed), row.trips, row.since_s, row.history_sha256, row.links_sha256, row.took_s),
+                )
+            )
+        write_whole(self._file("chaos.csv"), text.getvalue())
+
+    def write_failure(self, violated: str, row: ChaosRow, simplest: ChaosRow) -> Path:
+        """Write the scenario of a failure of a run, as it is or as it was shrunk; return its file."""
+        file = self._file("failures") / f"{violated}.toml"
+        file.parent.mkdir(exist_ok=True)
+        seed, schedule = seed_of(self.seed, row.number), simplest.schedule
+        fewer = len(schedule) < len(row.schedule)
+        remarks = [
+            f"Found by chaos: {simplest.violated.get(violated, row.violated[violated])}"[:300],
+            f"{self.command}, run {row.number}, seed of the messages {seed}"
+            + (f", shrunk from {len(row.schedule)} disturbances to {len(schedule)}" if fewer else ""),
+            f"Once more: {again(file)}",
+            *(f"  {line}" for line in self.base.lines(schedule)),
+        ]
+        scenario = msgspec.structs.replace(
+            self.base.disturbed(schedule, seed, simplest.since_s),
+            name=f"{self.base.scenario.name[:16]}-{violated}"[:31],
+            title="",
+        )
+        scenario = with_relative_folders(scenario, file.parent)
+        write_whole(file, to_toml(scenario, {}, [remark.replace("\n", " ") for remark in remarks], terse=True))
+        return file
+
+    def _conclude(self) -> None:
+        self.write_table()
+        write_whole(self._file("report.txt"), "\n".join(self.lines()) + "\n")
+
+    def take_up(self) -> None:
+        """Take the runs that its folder has; those in one process do not count where it has processes.
+
+        FolderError if the folder is of a campaign with another scenario, another seed or more runs, or is damaged.
+        """
+        folder = self._file()
+        where, (seed, _) = f"--resume {folder}", asked_of(folder)
+        try:
+            if (folder / SCENARIO).read_text(encoding="utf-8") != self.base.text:
+                raise FolderError(f"{where}: its {SCENARIO} is not the scenario and case to disturb; take a new folder")
+            rows = rows_in(folder, ChaosRow, lambda row: "")
+        except OSError as error:
+            raise FolderError(f"{where}: no folder of a campaign: {error.strerror}") from None
+        if seed != self.seed:
+            raise FolderError(f"{where}: it was begun with --seed {seed}, not {self.seed}; give that one")
+        if rows and (last := max(rows)) >= self.runs:
+            raise FolderError(f"{where}: it has run {last} already; give --runs {last + 1} or more")
+        here = {SAME_IN_PROCESSES} if self.driver == "processes" else set()
+        self.rows = {number: row for number, row in rows.items() if here <= {*row.passed, *row.violated}}
 
 
-def run_campaign(campaign: Campaign, folder: ChaosFolder, stage: Stage) -> Summary:
-    """Do the runs that the folder lacks, shrink what fails, and write all of it, also what came until an interruption.
+def seed_of(seed: int, number: int) -> int:
+    return seed * SEEDS + number
 
-    MachineError if the machine lacks what a run needs: that is no failure of the scenario, and nothing is shrunk.
-    """
-    failures: dict[str, Failure] = {}
+
+def again(file: Path) -> str:
+    return command_line("run", shown(file), "--driver", "inprocess", "--require-checks")
+
+
+def asked_of(folder: Path) -> tuple[int, int]:
+    """Return the seed and the number of runs with which a campaign was begun; FolderError if it is no such folder."""
     try:
-        with closing(TransientFolder("gridpeers-chaos-")) as temporary:  # workers that are ended leave theirs in it
-            within = None if campaign.dask else temporary.path
-            _do_runs(campaign, folder, stage, within)
-            _add_failures(failures, folder)
-            _shrink_all(campaign, folder, failures, stage, within)
-        summary = _concluded(campaign, folder, failures)
-        set_complete(folder.path)
-    except BaseException as error:
-        why = refusal(folder.path, error) if isinstance(error, OSError) else str(error) or type(error).__name__
-        why = "interrupted" if isinstance(error, KeyboardInterrupt) else why
-        set_broken(folder.path, f"{why} after {len(folder.rows)} of {campaign.runs} runs")
-        with suppress(OSError):  # a full disk may take no more of them; the error above is the one to tell
-            _add_failures(failures, folder)
-            _concluded(campaign, folder, failures)
-        raise
-    return summary
-
-
-def _do_runs(campaign: Campaign, folder: ChaosFolder, stage: Stage, within: Path | None) -> None:
-    text, seed, driver = campaign.base.text, campaign.seed, campaign.driver
-    calls = ((text, seed, number, it, driver, within) for number, it in _numbered(campaign, dict(folder.rows)))
-    jobs = 1 if driver == "processes" else campaign.jobs
-    head, of = campaign.base.scenario.name, campaign.runs
-    with stage(of) as tell, closing(on_workers(calls, jobs, run_number, campaign.dask)) as results:
-        tell(f"{head}, {len(folder.rows)} of {of} runs", len(folder.rows))
-        for row in results:
-            first = folder.rows.get(row.number)
-            folder.add(row if first is None else compared(first, row, REPEATS))
-            done, bad = len(folder.rows), sum(bool(row.violated) for row in folder.rows.values())
-            tell(f"{head}, {done} of {of} runs, {bad} violated", done)
-
-
-def _numbered(campaign: Campaign, known: Mapping[int, ChaosRow]) -> Iterator[tuple[int, Schedule]]:
-    for batch in range(-(-campaign.runs // BATCH)):
-        numbers = range(batch * BATCH, min((batch + 1) * BATCH, campaign.runs))
-        once = {number for number in numbers if number not in known}
-        twice = {n for n in numbers if n % REPEATED == 0 and (n in once or REPEATS not in known[n].passed)}
-        if not once | twice:
-            continue
-        schedules = dict(zip(numbers, drawn(campaign.base, campaign.seed, batch), strict=False))
-        yield from ((number, schedules[number]) for which in (once, twice) for number in sorted(which))
-
-
-def _add_failures(failures: dict[str, Failure], folder: ChaosFolder) -> None:
-    rows = sorted(folder.rows.values(), key=lambda row: (len(row.schedule), row.number))
-    for violated in sorted({name for row in rows for name in row.violated} - failures.keys()):
-        row = next(row for row in rows if violated in row.violated)
-        file = folder.write_failure(violated, row, row)
-        failures[violated] = Failure(violated=violated, row=row, simplest=row, file=file)
-
-
-def _shrink_all(
-    campaign: Campaign, folder: ChaosFolder, failures: dict[str, Failure], stage: Stage, within: Path | None
-) -> None:
-    if not failures:
-        return
-    kinds = counted(len(failures), "kind of failure", "kinds of failure")
-    calls = []
-    for name, it in failures.items():  # processes only for a failure that one process cannot show
-        driver = campaign.driver if name in (SAME_IN_PROCESSES, REPEATS) else "inprocess"
-        calls.append((campaign.base.text, campaign.seed, it.row.number, name, driver, within))
-    workers = on_workers(calls, min(campaign.jobs, len(calls)), shrink_number, campaign.dask)
-    with stage(len(failures)) as tell, closing(workers) as simpler:
-        tell(f"shrinking, 0 of {kinds}", 0)
-        for done, (violated, simplest) in enumerate(simpler, start=1):
-            found = failures[violated]
-            file = folder.write_failure(violated, found.row, simplest)
-            failures[violated] = replace(found, simplest=simplest, file=file)
-            tell(f"shrinking, {done} of {kinds}", done)
-
-
-def _concluded(campaign: Campaign, folder: ChaosFolder, failures: dict[str, Failure]) -> Summary:
-    folder.write_table()
-    summary = Summary(campaign=campaign, rows=folder.rows, failures=tuple(failures.values()))
-    write_whole(folder.path / "report.txt", "\n".join(summary.lines()) + "\n")
-    return summary
+        found = json.loads((folder / SETTINGS).read_text(encoding="utf-8"))
+        return int(found["seed"]), int(found["runs"])
+    except (OSError, ValueError, LookupError, TypeError) as error:
+        why = error.strerror if isinstance(error, OSError) else f"its {SETTINGS} is damaged"
+        raise FolderError(
+            f"--resume {folder}: no folder of a campaign: {why}; name one with {SCENARIO} and {SETTINGS}"
+        ) from None
 
 
 # -------------------------------------------------------------------- on a worker
@@ -231,121 +326,3 @@ def shrink_number(
         raise
     # that of the run itself is not run to shrink it
     return violated, rows.get(msgspec.json.encode(simplest)) or row_of(simplest)
-
-
-# -------------------------------------------------------------------- its folder
-
-
-SCENARIO, SETTINGS = "scenario.toml", "asked.json"
-"""Files from which a campaign goes on, beside its journal: its scenario; its seed and its number of runs."""
-
-RUNS = 100
-
-SEEDS = 1_000_000
-"""Seeds of the messages' fates for each seed of a campaign: run n has one of its own."""
-
-COLUMNS = (
-    *("run", "seed", "status", "violated", "why", "disturbances", "schedule"),
-    *("passed", "trips", "since_s", "history_sha256", "links_sha256", "took_s"),
-)
-
-
-def seed_of(seed: int, number: int) -> int:
-    return seed * SEEDS + number
-
-
-def again(file: Path) -> str:
-    return command_line("run", shown(file), "--driver", "inprocess", "--require-checks")
-
-
-class ChaosFolder:
-    def __init__(
-        self,
-        path: Path,
-        base: ChaosBase,
-        seed: int,
-        command: str,
-        rows: Mapping[int, ChaosRow] = MappingProxyType({}),
-        runs: int = RUNS,
-    ) -> None:
-        self.path, self._base, self._seed, self._command = path, base, seed, command
-        self.rows = dict(rows)
-        write_whole(path / SCENARIO, base.text)
-        write_whole(path / SETTINGS, json.dumps({"seed": seed, "runs": runs}) + "\n")
-        open_journal(path).close()
-        self.write_table()
-
-    def add(self, row: ChaosRow) -> None:
-        with (self.path / JOURNAL).open("ab") as file:
-            file.write(journal_line(row))
-        self.rows[row.number] = row  # only now that it is kept: after an error the command counts these rows
-
-    def write_table(self) -> None:
-        text = StringIO()
-        table = csv.writer(text, lineterminator="\n")
-        table.writerow(COLUMNS)
-        for _, row in sorted(self.rows.items()):
-            why = [*(row.violated[it] for it in sorted(row.violated)), row.collapse, row.unsettled]
-            table.writerow(
-                (
-                    *(row.number, seed_of(self._seed, row.number), row.status, " ".join(sorted(row.violated))),
-                    *("; ".join(filter(None, why)), len(row.schedule), json.dumps(msgspec.to_builtins(row.schedule))),
-                    *(" ".join(row.passed), row.trips, row.since_s, row.history_sha256, row.links_sha256, row.took_s),
-                )
-            )
-        write_whole(self.path / "chaos.csv", text.getvalue())
-
-    def write_failure(self, violated: str, row: ChaosRow, simplest: ChaosRow) -> Path:
-        """Write the scenario of a failure of a run, as it is or as it was shrunk; return its file."""
-        file = self.path / "failures" / f"{violated}.toml"
-        file.parent.mkdir(exist_ok=True)
-        seed, schedule = seed_of(self._seed, row.number), simplest.schedule
-        fewer = len(schedule) < len(row.schedule)
-        remarks = [
-            f"Found by chaos: {simplest.violated.get(violated, row.violated[violated])}"[:300],
-            f"{self._command}, run {row.number}, seed of the messages {seed}"
-            + (f", shrunk from {len(row.schedule)} disturbances to {len(schedule)}" if fewer else ""),
-            f"Once more: {again(file)}",
-            *(f"  {line}" for line in self._base.lines(schedule)),
-        ]
-        scenario = msgspec.structs.replace(
-            self._base.disturbed(schedule, seed, simplest.since_s),
-            name=f"{self._base.scenario.name[:16]}-{violated}"[:31],
-            title="",
-        )
-        scenario = with_relative_folders(scenario, file.parent)
-        write_whole(file, to_toml(scenario, {}, [remark.replace("\n", " ") for remark in remarks], terse=True))
-        return file
-
-
-def asked_of(folder: Path) -> tuple[int, int]:
-    """Return the seed and the number of runs with which a campaign was begun; FolderError if it is no such folder."""
-    try:
-        found = json.loads((folder / SETTINGS).read_text(encoding="utf-8"))
-        return int(found["seed"]), int(found["runs"])
-    except (OSError, ValueError, LookupError, TypeError) as error:
-        why = error.strerror if isinstance(error, OSError) else f"its {SETTINGS} is damaged"
-        raise FolderError(
-            f"--resume {folder}: no folder of a campaign: {why}; name one with {SCENARIO} and {SETTINGS}"
-        ) from None
-
-
-def kept_rows(folder: Path, base: ChaosBase, seed: int, driver: Driver, runs: int) -> dict[int, ChaosRow]:
-    """Return the runs that a campaign has in its folder, for one that goes on there.
-
-    Runs in one process are none of a campaign with processes. FolderError if the folder is of a campaign with another
-    scenario, another seed or more runs, or is damaged.
-    """
-    where, (theirs, _) = f"--resume {folder}", asked_of(folder)
-    try:
-        if (folder / SCENARIO).read_text(encoding="utf-8") != base.text:
-            raise FolderError(f"{where}: its {SCENARIO} is not the scenario and case to disturb; take a new folder")
-        rows = rows_in(folder, ChaosRow, lambda row: "")
-    except OSError as error:
-        raise FolderError(f"{where}: no folder of a campaign: {error.strerror}") from None
-    if theirs != seed:
-        raise FolderError(f"{where}: it was begun with --seed {theirs}, not {seed}; give that one")
-    if rows and (last := max(rows)) >= runs:
-        raise FolderError(f"{where}: it has run {last} already; give --runs {last + 1} or more")
-    here = {SAME_IN_PROCESSES} if driver == "processes" else set()
-    return {number: row for number, row in rows.items() if here <= {*row.passed, *row.violated}}

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -30,7 +29,6 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from gridpeers.lab.chaos.campaign import Campaign
-    from gridpeers.lab.chaos.chaos_run import ChaosRow
     from gridpeers.scenarios.schema import ScenarioModel
 
 _PACKAGES = {"hypothesis": "the schedules", "joblib": "the runs over all cores"}
@@ -93,11 +91,12 @@ def chaos(
     from datetime import datetime
 
     from gridpeers.cli.progress import remaining
-    from gridpeers.lab.chaos.campaign import RUNS, Campaign, ChaosFolder, asked_of, kept_rows, run_campaign
+    from gridpeers.lab.chaos.campaign import RUNS, Campaign, asked_of
     from gridpeers.lab.chaos.disturbed_scenario import ChaosBase
     from gridpeers.scenarios.results.run_files import (
         FolderError,
         broken_if_ended,
+        locked,
         new_folder,
         require_folder,
         set_status,
@@ -106,46 +105,48 @@ def chaos(
     from gridpeers.scenarios.sweep.workers import cores
     from gridpeers.wire.driver.command_line import command_line
 
+    def lock(folder: Path, option: str) -> None:
+        handle = locked(folder, option, "chaos")
+        context.call_on_close(lambda: os.close(handle))
+
     if out is not None and resume is not None:
         fail([f"--out {out}: --resume {resume} goes on in that folder; leave one of them out"], BAD_INPUT)
-    base = ChaosBase(spec, feeder)
     name, console = f"{spec.name}-chaos", terminal()
     try:
         first_seed, first_runs = (1, RUNS) if resume is None else asked_of(resume)
-        seed, runs = first_seed if seed is None else seed, runs or first_runs
-        campaign = Campaign(base=base, seed=seed, runs=runs, driver=driver, jobs=jobs or cores(), dask=dask)
-        kept = _Kept(scenario, campaign, resume)
-        with kept.told_if_ended():
+        campaign = Campaign(
+            base=ChaosBase(spec, feeder),
+            seed=first_seed if seed is None else seed,
+            runs=runs or first_runs,
+            driver=driver,
+            jobs=jobs or cores(),
+            dask=dask,
+            path=resume,
+        )
+        words = ["chaos", scenario, "--case", campaign.base.case]
+        with _told_if_ended(campaign, [*words, "--driver", driver]):
             if resume is None:
                 require_folder(out, name)
             else:
-                _lock(context, resume, "--resume")
-                kept.rows = kept_rows(resume, base, seed, driver, runs)
+                lock(resume, "--resume")
+                campaign.take_up()
             _try_undisturbed(console, campaign)
-            if resume is None:  # the folder is made only once the scenario has passed without disturbances
-                kept.path = new_folder(out, name, datetime.now().astimezone())
-                _lock(context, kept.path, "--out")
-            path = kept.path
-            assert path is not None
+            path = resume
+            if path is None:  # the folder is made only once the scenario has passed without disturbances
+                path = campaign.path = new_folder(out, name, datetime.now().astimezone())
+                lock(path, "--out")
             set_status(path, "running")
-            words = ["chaos", scenario, "--case", base.case, "--runs", str(runs), "--seed", str(seed)]
+            words += ["--runs", str(campaign.runs), "--seed", str(campaign.seed), "--driver", driver]
+            campaign.command = command_line(*words)
             with broken_if_ended(path):
-                folder = ChaosFolder(path, base, seed, command_line(*words, "--driver", driver), kept.rows, runs)
-            kept.rows = folder.rows
-            summary = run_campaign(campaign, folder, partial(remaining, console))
+                campaign.begin()
+            campaign.run(partial(remaining, console))
     except FolderError as error:
         fail([str(error)], BAD_INPUT)
-    for line in summary.lines():
+    for line in campaign.lines():
         typer.echo(line)
     typer.echo(f"\nResults: {shown(path)}/")
-    raise typer.Exit(CLAIM_FAILED if summary.violated else PASSED)
-
-
-def _lock(context: typer.Context, folder: Path, option: str) -> None:
-    from gridpeers.scenarios.results.run_files import locked
-
-    handle = locked(folder, option, "chaos")
-    context.call_on_close(lambda: os.close(handle))
+    raise typer.Exit(CLAIM_FAILED if campaign.violated else PASSED)
 
 
 def _refuse_unless_possible(scenario: str, spec: ScenarioModel, case: str | None, driver: str) -> None:
@@ -180,35 +181,28 @@ def _try_undisturbed(console: Console, campaign: Campaign) -> None:
     typer.echo(f"{name}: it violates nothing; next {counted(campaign.runs, 'run')} with disturbances, {how} ...")
 
 
-@dataclass
-class _Kept:
-    scenario: str
-    campaign: Campaign
-    path: Path | None
-    rows: Mapping[int, ChaosRow] = field(default_factory=dict)
+@contextmanager
+def _told_if_ended(campaign: Campaign, words: list[str]) -> Iterator[None]:
+    """Say what is kept of a campaign that ends early, and by which command, in words, it goes on."""
+    from gridpeers.cli.usage import exit_code, interruptible
+    from gridpeers.lab.chaos.chaos_run import MachineError, machine_error
+    from gridpeers.scenarios.results.run_files import refusal, shown
+    from gridpeers.scenarios.sweep.workers import WorkersError
+    from gridpeers.wire.driver.command_line import command_line
 
-    @contextmanager
-    def told_if_ended(self) -> Iterator[None]:
-        from gridpeers.cli.usage import exit_code, interruptible
-        from gridpeers.lab.chaos.chaos_run import MachineError, machine_error
-        from gridpeers.scenarios.results.run_files import refusal, shown
-        from gridpeers.scenarios.sweep.workers import WorkersError
-        from gridpeers.wire.driver.command_line import command_line
-
-        try:
-            with interruptible():
-                yield
-        except (KeyboardInterrupt, OSError, MemoryError, MachineError, WorkersError) as error:
-            kept, path, campaign = len(self.rows), self.path, self.campaign
-            where = "and no folder was made"
-            if path and not path.is_dir():
-                kept, where = 0, f"as {shown(path)}/ is gone"
-            elif path:
-                words = ["chaos", self.scenario, "--case", campaign.base.case, "--driver", campaign.driver]
-                where = f"in {shown(path)}/; go on with: {command_line(*words, '--resume', shown(path))}"
-            left = f"{kept} of {campaign.runs} runs are kept {where}"
-            if isinstance(error, KeyboardInterrupt):
-                fail([f"interrupted; {left}"], exit_code(error))
-            if isinstance(error, OSError) and path:
-                fail([refusal(path, error), left], BROKEN)
-            fail([str(machine_error(error) or error), left], BROKEN)
+    try:
+        with interruptible():
+            yield
+    except (KeyboardInterrupt, OSError, MemoryError, MachineError, WorkersError) as error:
+        kept, path = len(campaign.rows), campaign.path
+        where = "and no folder was made"
+        if path and not path.is_dir():
+            kept, where = 0, f"as {shown(path)}/ is gone"
+        elif path:
+            where = f"in {shown(path)}/; go on with: {command_line(*words, '--resume', shown(path))}"
+        left = f"{kept} of {campaign.runs} runs are kept {where}"
+        if isinstance(error, KeyboardInterrupt):
+            fail([f"interrupted; {left}"], exit_code(error))
+        if isinstance(error, OSError) and path:
+            fail([refusal(path, error), left], BROKEN)
+        fail([str(machine_error(error) or error), left], BROKEN)

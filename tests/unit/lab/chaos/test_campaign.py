@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from gridpeers.lab.chaos import schedules as schedules_of_chaos
-from gridpeers.lab.chaos.campaign import Campaign, ChaosFolder, run_campaign
+from gridpeers.lab.chaos.campaign import Campaign
 from gridpeers.lab.chaos.chaos_run import ChaosRow, run_scenario
 from gridpeers.plant.tables.read import DATA
 from gridpeers.scenarios.catalogue_files import CATALOGUE
@@ -49,15 +49,16 @@ def test_a_planted_bug_is_found_and_shrunk(elsewhere: Path, monkeypatch: pytest.
     others = [f'{{ use = "{name}", off = true }}' for name in ALWAYS if name != "frequency"]
     (elsewhere / "breaks.py").write_text(BREAKS, encoding="utf-8")
     base = base_in(small(elsewhere, f'law = "breaks:Breaks"\nchecks = [{", ".join(others)}]'))
-    folder = ChaosFolder(elsewhere, base, 8, "gridpeers chaos small")
+    campaign = Campaign(base=base, seed=8, runs=3, path=elsewhere)
+    campaign.begin()
 
-    summary = run_campaign(Campaign(base=base, seed=8, runs=3), folder, lambda of: nullcontext(lambda what, done: None))
-    (failure,) = summary.failures
+    campaign.run(lambda of: nullcontext(lambda what, done: None))
+    ((violated, failure),) = campaign.failures.items()
     again, _ = load_scenario(failure.file)
 
-    assert failure.violated == "frequency"
+    assert violated == "frequency"
     assert 1 <= len(failure.simplest.schedule) <= 3 < len(failure.row.schedule)
-    assert f"frequency, run {failure.row.number}: {failure.simplest.violated['frequency']}" in [*summary.lines()]
+    assert f"frequency, run {failure.row.number}: {failure.simplest.violated['frequency']}" in [*campaign.lines()]
     assert again == base_in(failure.file).scenario
     assert "frequency" in run_scenario(base_in(failure.file)).violated
 
@@ -76,7 +77,7 @@ def test_a_failure_can_be_moved_with_the_law_check_and_feeder_that_it_names(
     base = base_in(study / "small.toml")
     found = elsewhere / "here" / "found"
     found.mkdir()
-    file = ChaosFolder(found, base, 8, "gridpeers chaos").write_failure("frequency", row, row)
+    file = Campaign(base=base, seed=8, runs=9, path=found).write_failure("frequency", row, row)
 
     kept = [line for line in file.read_text().splitlines() if not line.startswith("#")]
     assert str(elsewhere) not in "\n".join(kept)

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 
 from gridpeers.lab.chaos import campaign as campaigns
 from gridpeers.lab.chaos import chaos_run
-from gridpeers.lab.chaos.campaign import ChaosFolder, shrink_number
+from gridpeers.lab.chaos.campaign import Campaign, shrink_number
 from gridpeers.lab.chaos.chaos_run import MachineError, run_scenario
 from gridpeers.scenarios.run import run_case
 from tests.command_line import invoke
@@ -63,15 +63,15 @@ def test_ctrl_c_keeps_what_there_is(elsewhere: Path, monkeypatch: pytest.MonkeyP
 def test_a_full_disk_is_told_and_the_folder_says_broken(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The command tells the first error, though later files cannot be written either."""
 
-    def full(folder: ChaosFolder, *rest: Any) -> None:
+    def full(campaign: Campaign, *rest: Any) -> None:
         if len(rest) == 1:
-            folder.rows[rest[0].number] = replace(rest[0], violated={"frequency": "too low"})
-        if folder.rows:
-            raise OSError(errno.ENOSPC, "No space left on device", str(folder.path / "chaos.csv"))
+            campaign.rows[rest[0].number] = replace(rest[0], violated={"frequency": "too low"})
+        if campaign.rows:
+            raise OSError(errno.ENOSPC, "No space left on device", str((campaign.path or elsewhere) / "chaos.csv"))
 
     small(elsewhere)
     for method in ("add", "write_table", "write_failure"):
-        monkeypatch.setattr(ChaosFolder, method, full)
+        monkeypatch.setattr(Campaign, method, full)
     code, text = invoke("chaos", "small.toml", "--runs", "2", "--jobs", "1", "--out", "out")
 
     assert code == 3

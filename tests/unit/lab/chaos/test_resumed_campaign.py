@@ -9,15 +9,21 @@ from typing import Any
 import pytest
 
 from gridpeers.lab.chaos import campaign as campaigns
-from gridpeers.lab.chaos.campaign import ChaosFolder, kept_rows
+from gridpeers.lab.chaos.campaign import Campaign
 from gridpeers.lab.chaos.chaos_run import ChaosRow
-from gridpeers.lab.chaos.disturbed_scenario import Disturbance
+from gridpeers.lab.chaos.disturbed_scenario import ChaosBase, Disturbance
 from gridpeers.scenarios.results.run_files import LOCK, locked
 from tests.command_line import invoke
 from tests.unit.lab.chaos.bases import base_in
 from tests.unit.lab.chaos.small_campaign import rows_of, small
 
 pytestmark = pytest.mark.usefixtures("elsewhere", "few_schedules")
+
+
+def _begun(folder: Path, base: ChaosBase) -> Campaign:
+    campaign = Campaign(base=base, seed=3, runs=9, path=folder)
+    campaign.begin()
+    return campaign
 
 
 def test_an_interrupted_campaign_goes_on(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -46,7 +52,7 @@ def test_an_interrupted_campaign_goes_on(elsewhere: Path, monkeypatch: pytest.Mo
 
 def test_all_that_a_campaign_had_is_there_when_it_goes_on(elsewhere: Path) -> None:
     """Also what runs violated, and the later result of one done twice; half a line, of a kill -9, is left out."""
-    folder = ChaosFolder(elsewhere, base_in(small(elsewhere)), 3, "")
+    folder = _begun(elsewhere, base_in(small(elsewhere)))
     cut = Disturbance(table="link", entry={"on": "inv1 <-> inv4", "from_s": 0.4, "to_s": 0.7, "cut": True})
     folder.add(ChaosRow(number=0, schedule=()))
     folder.add(ChaosRow(number=0, schedule=(), passed=("ends", "repeats")))
@@ -56,16 +62,21 @@ def test_all_that_a_campaign_had_is_there_when_it_goes_on(elsewhere: Path) -> No
     journal.write_text(journal.read_text(encoding="utf-8") + '{"number":3', encoding="utf-8")
 
     base = base_in(elsewhere / "small.toml")
-    assert kept_rows(elsewhere, base, 3, "inprocess", 9) == folder.rows
+    again, others = (
+        Campaign(base=base, seed=3, runs=9, path=elsewhere, driver=driver) for driver in ("inprocess", "processes")
+    )
+    again.take_up()
+    others.take_up()
+    assert again.rows == folder.rows
     assert len(folder.rows) == 3
-    assert kept_rows(elsewhere, base, 3, "processes", 9) == {}, "none of them was done with processes"
+    assert others.rows == {}, "none of them was done with processes"
 
 
 def test_two_campaigns_never_write_in_one_folder(elsewhere: Path) -> None:
     """While one is at work there, another is refused before it runs anything."""
     base = base_in(small(elsewhere))
     (elsewhere / "old").mkdir()
-    ChaosFolder(elsewhere / "old", base, 3, "").add(ChaosRow(number=0, schedule=()))
+    _begun(elsewhere / "old", base).add(ChaosRow(number=0, schedule=()))
     handle = locked(elsewhere / "old", "--out", "chaos")
     try:
         code, text = invoke("chaos", "small.toml", "--seed", "3", "--resume", "old")
@@ -98,7 +109,7 @@ def test_a_campaign_goes_on_only_where_it_was(elsewhere: Path, options: tuple[st
     base = base_in(small(elsewhere))
     for name in ("old", "other", "bad", "below"):
         (elsewhere / name).mkdir()
-        folder = ChaosFolder(elsewhere / name, base, 3, "")
+        folder = _begun(elsewhere / name, base)
         folder.add(ChaosRow(number=0, schedule=()))
         folder.add(ChaosRow(number=1, schedule=()))
     (elsewhere / "other" / "scenario.toml").write_text("", encoding="utf-8")

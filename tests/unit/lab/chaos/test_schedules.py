@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from msgspec import json
 
 from gridpeers.lab.chaos import schedules as schedules_of_chaos
-from gridpeers.lab.chaos.campaign import Campaign, ChaosFolder, Summary
+from gridpeers.lab.chaos.campaign import Campaign
 from gridpeers.lab.chaos.chaos_run import ChaosRow, run_schedule
 from gridpeers.lab.chaos.disturbed_scenario import (
     JUDGED_S,
@@ -156,13 +156,13 @@ def test_a_lie_of_an_agent_that_has_left_changes_nothing_and_the_report_says_so(
     schedule = (_lie("inv4", 0.3, 0.6), AWAY)
     row, without = (run_schedule(base, which, 1) for which in (schedule, (AWAY,)))
     found = ChaosRow(number=0, schedule=schedule, violated={"ends": "no"})
-    failed = ChaosFolder(tmp_path, base, 1, "").write_failure("ends", found, row)
-    summary = Summary(campaign=Campaign(base=base, seed=1, runs=1), rows={0: row}, failures=())
+    campaign = Campaign(base=base, seed=1, runs=1, path=tmp_path, rows={0: row})
+    failed = campaign.write_failure("ends", found, row)
 
     assert base.is_possible(schedule)
     assert (row.history_sha256, row.passed) == (without.history_sha256, without.passed)
     assert "(nothing happens: inv4 has left at 0.3 s)" in failed.read_text(encoding="utf-8")
-    assert next(summary.lines()).endswith("; disturbances: leave 1")
+    assert next(campaign.lines()).endswith("; disturbances: leave 1")
 
 
 def test_every_check_with_a_first_time_gets_one_of_the_schedule() -> None:

@@ -8,7 +8,7 @@ import pytest
 from msgspec.structs import replace
 
 from gridpeers.lab.chaos import chaos_run
-from gridpeers.lab.chaos.campaign import ChaosFolder
+from gridpeers.lab.chaos.campaign import Campaign
 from gridpeers.lab.chaos.chaos_run import (
     ChaosRow,
     Collapse,
@@ -52,7 +52,7 @@ def test_inverters_that_never_return_are_named_and_the_file_shows_it_again(tmp_p
     """An inverter that trips three times stays off: the run names it, with time and reason, and so does the failure."""
     base = base_in(_file(tmp_path, 0.975))
     row = run_schedule(base, (), 1)
-    failed = ChaosFolder(tmp_path, base, 0, "gridpeers chaos small").write_failure("returns", row, row)
+    failed = Campaign(base=base, seed=0, runs=9, path=tmp_path).write_failure("returns", row, row)
     again, _ = load_scenario(failed)
 
     assert "not back in service, inv8 tripped: undervoltage" in row.violated["returns"]
