@@ -1,4 +1,4 @@
-"""The messages of a run as flows: from whom to whom, when sent and when arrived, or why not."""
+"""The messages of a run as flows: from whom to whom, when sent and when arrived, or why not; as a Perfetto trace."""
 
 from __future__ import annotations
 
@@ -117,6 +117,8 @@ CUTS = ("cut", "partition", "flap")
 
 
 class PerfettoTrace:
+    """Tracks and events in the format `perfetto.protos.Trace`, which https://ui.perfetto.dev opens."""
+
     def __init__(self) -> None:
         from perfetto.protos.perfetto.trace import perfetto_trace_pb2 as protos
 
@@ -175,6 +177,11 @@ class PerfettoTrace:
 
 
 def write_perfetto_trace(record: RunRecord, path: Path) -> int:
+    """Write tracks of agents and links, an arrow for each message, and counters of the physics; return the arrows.
+
+    A track of a link has an instant for each arrival, at the end of the arrow from its sender, and for each loss one
+    without an arrow. A cut is a slice from its first lost message to its last.
+    """
     trace = PerfettoTrace()
     for number, name in enumerate(("run", PLANT, *in_order(record.agents)), 1):
         trace.track(name, process=number)

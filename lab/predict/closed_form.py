@@ -1,4 +1,4 @@
-r"""Theory from the graph alone, in continuous time: rates, settling times, step limits, limits of delay.
+r"""Theory from the graph alone, in continuous time: rates, settling times, limits of step and delay; robustness.
 
 With y = m_p P_set, K = diag(kappa), the Laplacian L, leaders g and the quasi-steady plant e = w y + const, the paper's
 (12), (13) are
@@ -159,6 +159,10 @@ class Robustness(NamedTuple):
 
 def robustness(A: Floats, exact: int = EXACT) -> Robustness:
     """Return the largest r for which a graph is r-robust, by its adjacency (1), row = receiver.
+
+    A set of agents is r-reachable if one of them hears r agents outside of it. A graph is r-robust if of any two
+    disjoint sets, neither empty, one at least is r-reachable (LeBlanc et al., IEEE J. Sel. Areas Commun. 31(4), 2013).
+    On a (2F + 1)-robust graph the honest agents agree by W-MSR with F, if each hears at most F liars.
 
     For more than `exact` agents these are bounds. Above: nobody hears more agents than it has neighbours, and of two
     sets one has at most half of all agents. Below, if all links go both ways: at least lambda_2 |S| |V - S| / |V| links

@@ -40,10 +40,8 @@ from gridpeers.lab.predict.inverter_group import InverterGroup
 from gridpeers.lab.predict.linear_model import AT_REST
 from gridpeers.lab.predict.times import LoadStep
 from gridpeers.plant.build import build_plant
-from gridpeers.plant.dynamics import PlantError
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.feeder import GRID, Plant, raise_for_trip
-from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.scenarios.results.history import Floats
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.scenarios.schema.configs import configs
@@ -79,12 +77,6 @@ class VarResponse:
         """Dv / dV_set (pu per pu), N x N, with the plant at rest."""
         return np.asarray(self.v.sum(axis=0))
 
-    def columns_of(self, inverters: InverterGroup) -> list[int]:
-        unknown = [name for name in inverters.names if name not in self.names]
-        if unknown:
-            raise ValueError(f"no response of {', '.join(unknown)}; there are {', '.join(self.names)}")
-        return [self.names.index(name) for name in inverters.names]
-
 
 def var_response(scenario: ScenarioModel, feeder: Feeder) -> VarResponse:
     """Return the response of the plant on droop alone at the end of the first event's window."""
@@ -93,21 +85,18 @@ def var_response(scenario: ScenarioModel, feeder: Feeder) -> VarResponse:
     names, count = tuple(row.name for row in feeder.inverters), round(LENGTH / config.T_c)
     scale = np.array([[row.P_rated, row.V_nom] for row in feeder.inverters])
     steps = np.zeros((count + 1, len(names), 2, len(names)))
-    try:
-        plant = build_plant(config)
-        _advance(plant, math.floor(end / config.T_c + 1e-9) - plant.tick)
-        for column, name in enumerate(names):
-            for sign in (1.0, -1.0):
-                moved = copy.deepcopy(plant)
-                here = moved.measure()[name]
-                moved.hold(name, here.P_set, here.V_set + sign * STEP * scale[column, 1])
-                for k in range(1, count + 1):
-                    _advance(moved, 1)
-                    read = moved.measure()
-                    outputs = np.array([[read[of].Q, read[of].V] for of in names]) / scale
-                    steps[k, :, :, column] += sign * outputs / (2.0 * STEP)
-    except PlantError as error:
-        raise LoadError(f"on droop alone: {error}") from error
+    plant = build_plant(config)
+    _advance(plant, math.floor(end / config.T_c + 1e-9) - plant.tick)
+    for column, name in enumerate(names):
+        for sign in (1.0, -1.0):
+            moved = copy.deepcopy(plant)
+            here = moved.measure()[name]
+            moved.hold(name, here.P_set, here.V_set + sign * STEP * scale[column, 1])
+            for k in range(1, count + 1):
+                _advance(moved, 1)
+                read = moved.measure()
+                outputs = np.array([[read[of].Q, read[of].V] for of in names]) / scale
+                steps[k, :, :, column] += sign * outputs / (2.0 * STEP)
     pulses = np.diff(steps, axis=0)
     return VarResponse(names=names, q=pulses[:, :, 0], v=pulses[:, :, 1])
 
@@ -124,7 +113,7 @@ def var_spectral_radius(inverters: InverterGroup, plant: VarResponse, *, local: 
     `local` is the delay of measurement or set-point (control periods). Eigenvalues of set-points that the law never
     moves are left out.
     """
-    at, free = plant.columns_of(inverters), np.ix_(inverters.acts, inverters.acts)
+    at, free = [plant.names.index(name) for name in inverters.names], np.ix_(inverters.acts, inverters.acts)
     S, H = plant.S[np.ix_(at, at)], plant.H[np.ix_(at, at)]
     a, b = _factors(inverters)
     z = inverters.m_q[:, None] * S
@@ -168,7 +157,7 @@ def _mean_of_neighbours(inverters: InverterGroup) -> Floats:
 
 def var_growth(inverters: InverterGroup, plant: VarResponse, *, link_delay_s: float = 0.0) -> float:
     """Return the rate (1/s) at which the law for voltage and vars grows over late links; negative where it decays."""
-    at = plant.columns_of(inverters)
+    at = [plant.names.index(name) for name in inverters.names]
     n, K, T = inverters.n, len(plant.q), inverters.T_c
     late = max(0, math.ceil(link_delay_s / T - 1e-9) - 1)  # a state takes one period in any case
     z_of, v_of = (
@@ -203,21 +192,10 @@ class IslandStep:
     load: LoadStep | None
 
 
-class LoadError(RuntimeError):
-    """The plant has no solution on droop alone; the message says where."""
-
-
 def load_steps(scenario: ScenarioModel, feeder: Feeder) -> tuple[IslandStep, ...]:
-    """Return the islands without the grid after each event, and their steps of load."""
+    """Return the islands without the grid after each event, and their steps of load; PlantError if it has none."""
     config, _ = configs(scenario, feeder, next(iter(scenario.cases)))
     rating = {row.name: row.P_rated for row in inverters_of(scenario, feeder)}
-    try:
-        return _through(scenario, config, rating)
-    except PlantError as error:
-        raise LoadError(f"on droop alone: {error}") from error
-
-
-def _through(scenario: ScenarioModel, config: PlantConfig, rating: dict[str, float]) -> tuple[IslandStep, ...]:
     plant, T = build_plant(config), scenario.time.T_c_s
     on = set(plant.inverters) - set(config.settings.spares)
     ends = [event.t_s for event in scenario.events[1:]] + [scenario.time.end_s]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -12,7 +12,7 @@ from scipy.linalg import expm
 
 from gridpeers.agents.agent_config import Control, Gains
 from gridpeers.agents.graphs import in_neighbours
-from gridpeers.plant.equipment import F_NOM, Feeder
+from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters, InverterParameters
 from gridpeers.scenarios.results.history import Flags, Floats
 from gridpeers.scenarios.schema import ScenarioModel
@@ -27,31 +27,18 @@ class InverterGroup:
     """Which are grid-forming: the leaders, g_i = 1."""
     A: Floats
     """Adjacency c_ij (1), row = receiver."""
-    acts: Flags = field(default_factory=lambda: np.zeros(0, bool))
-    """Which run the secondary law; the others keep their set-points. All, if left out."""
-    shares: Flags = field(default_factory=lambda: np.zeros(0, bool))
-    """Which have an agent: the sharing index is theirs, as in a run (`Nameplates.shares`). All, if left out."""
-    s: Floats = field(default_factory=lambda: np.zeros(0))
-    m_p: Floats = field(default_factory=lambda: np.zeros(0))
-    m_q: Floats = field(default_factory=lambda: np.zeros(0))
-    gains: Gains = field(default_factory=Gains)
+    acts: Flags
+    """Which run the secondary law; the others keep their set-points."""
+    shares: Flags
+    """Which have an agent: the sharing index is theirs, as in a run (`Nameplates.shares`)."""
+    s: Floats
+    m_p: Floats
+    m_q: Floats
+    gains: Gains
     """Of the law; its limits are not part of a linear model."""
-    f_nom: float = F_NOM
-    T_c: float = 0.02
-    parameters: tuple[InverterParameters, ...] = ()
-    """Of the plant's inverters; the defaults of their kind, if left out."""
-
-    def __post_init__(self) -> None:
-        n = len(self.names)
-        defaults = {"acts": True, "shares": True, "s": 1.0, "m_p": 0.01, "m_q": 0.05}
-        for name, value in defaults.items():
-            if not getattr(self, name).size:
-                object.__setattr__(self, name, np.full(n, value))
-        if not self.parameters:
-            kinds = tuple(GfmParameters() if forming else GflParameters() for forming in self.GFM.tolist())
-            object.__setattr__(self, "parameters", kinds)
-        if self.A.shape != (n, n):
-            raise ValueError(f"A must be {n} x {n}, one row per name, got {self.A.shape}")
+    f_nom: float
+    T_c: float
+    parameters: tuple[InverterParameters, ...]
 
     @property
     def n(self) -> int:
@@ -153,9 +140,23 @@ PlantModel = Literal["lagged", "quasi-steady"]
 
 @dataclass(frozen=True, kw_only=True)
 class Response:
-    """Plant between two ticks: x(k+1) = A x(k) + B u(k) + E l, and at tick k e = C x + D u + F l with u of before.
+    r"""Plant between two ticks: x(k+1) = A x(k) + B u(k) + E l, and at tick k e = C x + D u + F l with u of before.
 
     Powers: pi = C_p x + D_p u + F_p l in the same way. With N inverters and n states, A is n x n, B n x N, C_p N x n.
+
+    Everything is a pu frequency: set-points y = m_p P_set, powers pi = m_p p, the load l = P_load / sum (s_i/m_i). The
+    GFM (set F) share the rest of the load, by their weights w_i, so that all have the same frequency:
+
+    .. math:: w_F e = \sum_F w_i y_i - u, \qquad T_p \dot u = l - \sum_{GFL} w_j \pi_j - u
+
+    where u is what the GFM's filtered powers add up to. A GFL sees e through its PLL and its frequency filter, and its
+    power lags (inverter-models.md sections 3 and 4):
+
+    .. math:: \dot\delta = e - f, \quad f = k_p \delta + \zeta, \quad \dot\zeta = k_i \delta, \quad
+              T_{ff} \dot\phi = f - \phi, \quad T_{pf} \dot\pi_j = y_j - \phi - \pi_j
+
+    Left out: power limits, voltages (loads are constant power), the angles' swing among the GFM, current controllers,
+    dead bands. Without the lags ("quasi-steady") e = sum w_i y_i - l, docs/theory.md's plant.
     """
 
     A: Floats

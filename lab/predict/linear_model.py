@@ -3,11 +3,11 @@ r"""The whole loop, law and plant, as one linear map from tick to tick, with del
 The law is that of `gridpeers.agents.laws.consensus`, not the continuous one. With a_i = `towards`(kappa_i, d_i, T_c)
 and b_i = 1 - exp(-kappa_i T_c):
 
-.. math:: y_i(k) = y_i(k-1) + a_i \big(\bar y_i - y_i(k-1-o)\big) - g_i b_i e_i(k - m_i)
+.. math:: y_i(k) = y_i(k-1) + a_i \big(\bar y_i - y_i(k-1-o)\big) - g_i b_i e(k - m)
 
 where the mean is over y_j(k-1-n_ij). Delays in whole ticks: n_ij of a link beyond the one period that every state
-takes, m_i of the measurement, o of the own value in the comparison, s_i of the set-point on its way to the plant, which
-holds y_i(k-s_i).
+takes, m of the measurement (one of the set-point on its way to the plant is the same to the loop), o of the own value
+in the comparison.
 
 **Loss.** Of a lossy link the last value received is held. If each message is lost with probability p by itself, its
 mean obeys exactly H(k) = (1-p) y_j(k-1-n) + p H(k-1), as the draw is independent of what was sent. Its mean age is that
@@ -20,10 +20,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from gridpeers.agents.laws.consensus import towards
 from gridpeers.lab.predict.closed_form import DelayKind
@@ -38,12 +39,11 @@ AT_REST = 1e-9
 
 @dataclass(frozen=True, kw_only=True)
 class Ticks:
-    """Delays in control periods, and losses; a number holds for all, a mapping for those that it names (others: 0)."""
+    """Delays in control periods, and losses; a number holds for all links, a mapping for those that it names."""
 
     link: int | Mapping[LinkEnds, int] = 0
     """Of neighbours' states beyond the one period they always take, by (src, dst)."""
-    measurement: int | Mapping[str, int] = 0
-    setpoint: int | Mapping[str, int] = 0
+    measurement: int = 0
     own: int = 0
     """Of the own value where it is compared with the neighbours'; a correct agent has 0."""
     loss: float | Mapping[LinkEnds, float] = 0.0
@@ -61,12 +61,10 @@ class Path:
 
 
 class _Delays(NamedTuple):
-    """Ticks, spread out; rows are receivers."""
+    """Delays of links (ticks) and losses, spread out; rows are receivers."""
 
-    link: list[list[int]]
-    measurement: list[int]
-    setpoint: list[int]
-    loss: list[list[float]]
+    link: NDArray[np.int64]
+    loss: Floats
     lossy: list[tuple[int, int]]
     """(receiver, sender) of links that lose and carry something."""
     depth: int
@@ -83,23 +81,23 @@ class Loop:
 
     @cached_property
     def _delays(self) -> _Delays:
-        heard, names, ticks = self.inverters.heard, self.inverters.names, self.ticks
-        link = [[_of(ticks.link, (src, dst)) for src in names] for dst in names]
-        loss = [[_of(ticks.loss, (src, dst)) for src in names] for dst in names]
-        measurement, setpoint = ([_of(of, name) for name in names] for of in (ticks.measurement, ticks.setpoint))
-        late = (ticks.own, *setpoint, *(n for row in link for n in row))
-        if any(n < 0 or n != int(n) for n in (*late, *measurement)):
-            raise ValueError(f"a delay is a whole number of control periods, 0 or more, got {min(*late, *measurement)}")
-        if wrong := [p for row in loss for p in row if not 0.0 <= p < 1.0]:
+        ticks, names = self.ticks, self.inverters.names
+        link, loss = (
+            np.array([[of.get((src, dst), 0) if isinstance(of, Mapping) else of for src in names] for dst in names])
+            for of in (ticks.link, ticks.loss)
+        )
+        if (least := min(ticks.own, ticks.measurement, link.min())) < 0:
+            raise ValueError(f"a delay is a whole number of control periods, 0 or more, got {least}")
+        if wrong := [p for p in loss.flat if not 0.0 <= p < 1.0]:
             raise ValueError(f"loss is a probability from 0 to below 1, got {wrong[0]:g}; write 0.3 for 30 %")
-        lossy = [(i, j) for i, row in enumerate(loss) for j, p in enumerate(row) if heard[i, j] and p > 0.0]
-        return _Delays(link, measurement, setpoint, loss, lossy, depth=1 + max(late))
+        lossy = [(i, j) for i, j in np.argwhere((loss > 0.0) & (self.inverters.heard > 0.0)).tolist()]
+        return _Delays(link, loss, lossy, depth=1 + max(ticks.own, int(link.max())))
 
     @property
     def _heard(self) -> Floats:
         if not self.muted:
             return self.inverters.heard
-        return np.where(np.array(self._delays.link) < self.muted, self.inverters.heard, 0.0)
+        return np.where(self._delays.link < self.muted, self.inverters.heard, 0.0)
 
     @property
     def gains(self) -> tuple[Floats, Floats]:
@@ -115,42 +113,29 @@ class Loop:
 
         The state: y(k-1), ..., y(k-H); x(k); e(k-1), ..., e(k-M); held values; the load.
         """
-        inverters, plant = self.inverters, response(self.inverters, self.plant)
-        delays, n, states = self._delays, self.inverters.n, len(plant.A)
-        link, measurement, setpoint, loss = delays.link, delays.measurement, delays.setpoint, delays.loss
-        H, M = delays.depth, max(delays.measurement)
+        inverters, plant, own = self.inverters, response(self.inverters, self.plant), self.ticks.own
+        link, loss, lossy, H = self._delays
+        n, states, M = inverters.n, len(plant.A), self.ticks.measurement
         x0 = H * n
         e0, held0 = x0 + states, x0 + states + M
-        load = held0 + len(delays.lossy)
+        load = held0 + len(lossy)
         one = np.eye(load + 1)
-
-        def y(back: int, i: int) -> Floats:
-            row: Floats = one[(back - 1) * n + i]
-            return row
-
-        before = np.array([y(1 + setpoint[i], i) for i in range(n)])
-        x = one[x0:e0]
-        e_now = plant.C @ x + plant.D @ before + plant.F * one[load]
-        powers = plant.C_p @ x + plant.D_p @ before + np.outer(plant.F_p, one[load])
+        y, x = one[:x0].reshape(H, n, -1), one[x0:e0]
+        e_now = plant.C @ x + plant.D @ y[0] + plant.F * one[load]
+        powers = plant.C_p @ x + plant.D_p @ y[0] + np.outer(plant.F_p, one[load])
 
         held = {}
-        for k, (i, j) in enumerate(delays.lossy):
-            held[i, j] = (1.0 - loss[i][j]) * y(1 + link[i][j], j) + loss[i][j] * one[held0 + k]
+        for k, (i, j) in enumerate(lossy):
+            held[i, j] = (1.0 - loss[i, j]) * y[link[i, j], j] + loss[i, j] * one[held0 + k]
 
-        (a, b), audible, new = self.gains, self._heard, []
+        (a, b), audible, new = self.gains, self._heard, y[0].copy()
         degree = audible.sum(axis=1)
-        for i in range(n):
-            row = y(1, i)
-            if degree[i]:
-                row = row - a[i] * y(1 + self.ticks.own, i)
-                for j in np.flatnonzero(audible[i]).tolist():
-                    heard = held[i, j] if (i, j) in held else y(1 + link[i][j], j)
-                    row = row + (a[i] * audible[i, j] / degree[i]) * heard
-            if inverters.leads[i]:
-                row = row - b[i] * (one[e0 + measurement[i] - 1] if measurement[i] else e_now)
-            new.append(row)
-        now = np.array([y(setpoint[i], i) if setpoint[i] else new[i] for i in range(n)])
-        moved = plant.A @ x + plant.B @ now + np.outer(plant.E, one[load])
+        for i in np.flatnonzero(degree).tolist():
+            new[i] -= a[i] * y[own, i]
+            for j in np.flatnonzero(audible[i]).tolist():
+                new[i] += (a[i] * audible[i, j] / degree[i]) * held.get((i, j), y[link[i, j], j])
+        new -= np.outer(b, one[e0 + M - 1] if M else e_now)
+        moved = plant.A @ x + plant.B @ new + np.outer(plant.E, one[load])
         rows = [*new, *one[: (H - 1) * n], *moved]
         rows += [e_now, *one[e0 : held0 - 1]] if M else []
         rows += [*held.values(), one[load]]
@@ -210,7 +195,7 @@ class Loop:
         z[-1] = load
         e, powers, set_points = np.zeros(ticks), np.zeros((ticks, n)), np.zeros((ticks, n))
         step = sp.csr_array(matrix)
-        longest = max(n for row in self._delays.link for n in row) if islanding else 0
+        longest = int(self._delays.link.max()) if islanding else 0
         steps = {n: sp.csr_array(replace(self, muted=n).matrix) for n in range(1, longest + 1)}
         for k in range(ticks):
             e[k], powers[k] = e_row @ z, power_rows @ z
@@ -218,10 +203,6 @@ class Loop:
             set_points[k] = z[:n]
         t: Floats = np.arange(1.0, ticks + 1.0) * inverters.T_c
         return Path(t, e, powers, set_points)
-
-
-def _of(value: float | Mapping[Any, Any], key: object) -> Any:
-    return value.get(key, 0) if isinstance(value, Mapping) else value
 
 
 # -------------------------------------------------------------------- limits of delay

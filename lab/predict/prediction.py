@@ -25,7 +25,6 @@ from gridpeers.lab.predict.closed_form import (
 )
 from gridpeers.lab.predict.droop_runs import (
     IslandStep,
-    LoadError,
     VarResponse,
     load_steps,
     var_delay_limit,
@@ -35,6 +34,7 @@ from gridpeers.lab.predict.droop_runs import (
 from gridpeers.lab.predict.inverter_group import InverterGroup, inverter_group_of
 from gridpeers.lab.predict.linear_model import Loop, delay_limit
 from gridpeers.lab.predict.times import Times, predicted_times
+from gridpeers.plant.dynamics import PlantError
 from gridpeers.plant.equipment import Feeder
 from gridpeers.runs.choices import with_cases
 from gridpeers.scenario import Scenario, as_scenario
@@ -71,8 +71,8 @@ def predictions(spec: ScenarioModel, feeder: Feeder, *, voltage: bool) -> dict[s
         )
     try:
         steps, plant = load_steps(spec, feeder), var_response(spec, feeder) if voltage else None
-    except LoadError as error:
-        raise BrokenRunError(f"{spec.name}: {error}") from error
+    except PlantError as error:
+        raise BrokenRunError(f"{spec.name}: on droop alone: {error}") from error
     found = {}
     for name, rule in spec.cases.items():
         title = f"{spec.name}, case {name}" + (f" {rule.title}" if rule.title else "")

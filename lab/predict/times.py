@@ -2,8 +2,7 @@
 
 All of it comes from `gridpeers.lab.predict.linear_model`, law and plant in discrete time, and is exact for that
 model. Delays are in seconds and become control periods as in a simulated run: a state sent at t_k with delay d is used
-from the first tick at or after t_k + d, and never before t_(k+1); a measurement or set-point from the first tick at or
-after t_k + d.
+from the first tick at or after t_k + d, and never before t_(k+1).
 """
 
 from __future__ import annotations
@@ -11,17 +10,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, TypeVar
 
 import numpy as np
 
 from gridpeers.lab.predict.closed_form import groups
-from gridpeers.lab.predict.inverter_group import InverterGroup, PlantModel
+from gridpeers.lab.predict.inverter_group import InverterGroup
 from gridpeers.lab.predict.linear_model import LinkEnds, Loop, Path, Ticks
 from gridpeers.scenarios.results.history import Flags, Floats
 from gridpeers.scenarios.results.metrics import F_BAND, MPSI_BAND
-
-Key = TypeVar("Key")
 
 HORIZON = 120.0
 
@@ -55,27 +51,22 @@ def predicted_times(
     inverters: InverterGroup,
     *,
     link_delay_s: float | Mapping[LinkEnds, float] = 0.0,
-    measurement_delay_s: float | Mapping[str, float] = 0.0,
-    setpoint_delay_s: float | Mapping[str, float] = 0.0,
     loss: float | Mapping[LinkEnds, float] = 0.0,
     load: LoadStep | None = None,
-    plant: PlantModel = "lagged",
 ) -> Times:
     """Return the times to restore and to share after a step of the load, and whether the loop is stable.
 
-    Delays (s) are those of states from agent to agent, by (src, dst), and from the plant to an agent and back, by name;
-    what a mapping leaves out has none. `loss` is the probability that a state is lost, when the last one is held. The
-    load is that of the paper's event 1 if left out; `load_steps` has those of a scenario.
+    Delays (s) of states from agent to agent, and probabilities that one is lost, so that the last one is held, are for
+    all links, or by (src, dst) for some. The load is that of the paper's event 1 if left out; `load_steps` has those of
+    a scenario.
     """
     step = LoadStep() if load is None else load
-    T_c = inverters.T_c
-    ticks = Ticks(
-        link=_in_ticks(link_delay_s, T_c, least=1),
-        measurement=_in_ticks(measurement_delay_s, T_c),
-        setpoint=_in_ticks(setpoint_delay_s, T_c),
-        loss=loss,
-    )
-    loop = Loop(inverters=inverters, ticks=ticks, plant=plant)
+    link: int | dict[LinkEnds, int]
+    if isinstance(link_delay_s, Mapping):
+        link = {ends: _in_ticks(delay, inverters.T_c) for ends, delay in link_delay_s.items()}
+    else:
+        link = _in_ticks(link_delay_s, inverters.T_c)
+    loop = Loop(inverters=inverters, ticks=Ticks(link=link, loss=loss))
     if not loop.stable:
         return Times(restore_s=None, share_s=None, stable=False, note="unstable: oscillations grow")
     # until the slowest mode has fallen to 1e-5, but no longer than anybody would wait
@@ -102,13 +93,11 @@ def sharing_index(path: Path, inverters: InverterGroup) -> Floats:
     return np.asarray(np.mean(np.abs(power / eta[:, None] - 1.0), axis=1))
 
 
-def _in_ticks(delay: float | Mapping[Key, float], T_c: float, least: int = 0) -> Any:
-    """Return a delay (s), or several by name, in control periods beyond the `least` that every message takes."""
-    if isinstance(delay, Mapping):
-        return {key: _in_ticks(each, T_c, least) for key, each in delay.items()}
+def _in_ticks(delay: float, T_c: float) -> int:
+    """Return a delay (s) in control periods beyond the one that every state takes."""
     if not (math.isfinite(delay) and delay >= 0.0):
         raise ValueError(f"a delay must be 0 s or more, got {delay:g} s")
-    return max(least, math.ceil(delay / T_c - 1e-9)) - least
+    return max(1, math.ceil(delay / T_c - 1e-9)) - 1
 
 
 def _for_good(t: Floats, holds: Flags) -> float | None:
@@ -137,11 +126,9 @@ def _note(inverters: InverterGroup, restore: float | None, share: float | None) 
         return "no secondary control: droop alone keeps its error"
     if restore is None and not inverters.leads.any():
         return "no leader: nobody corrects the frequency"
-    idle = inverters.shares & ~inverters.acts
-    if share is None and idle.any():
-        return (
-            f"{int(idle.sum())} of {int(inverters.shares.sum())} with an agent run no secondary law: their power stays"
-        )
-    if share is None and len(groups(inverters)) > 1:
-        return f"the graph falls into {len(groups(inverters))} groups, which do not agree on a share"
+    idle, agents = int((inverters.shares & ~inverters.acts).sum()), int(inverters.shares.sum())
+    if share is None and idle:
+        return f"{idle} of {agents} with an agent run no secondary law: their power stays"
+    if share is None and (parts := len(groups(inverters))) > 1:
+        return f"the graph falls into {parts} groups, which do not agree on a share"
     return f"not within {HORIZON:g} s"
