@@ -26,7 +26,7 @@ from gridpeers.lab.chaos.chaos_run import (
     compared,
     run_schedule,
 )
-from gridpeers.lab.chaos.disturbed_scenario import KINDS, ChaosBase, Schedule, base_of
+from gridpeers.lab.chaos.disturbed_scenario import KINDS, ChaosBase, Schedule, base_of, in_order
 from gridpeers.lab.chaos.schedules import BATCH, drawn, shrunk
 from gridpeers.plant.request_process import TransientFolder
 from gridpeers.scenarios.checks.check_registry import RETURNS, chosen_checks
@@ -168,7 +168,7 @@ class Campaign:
     def lines(self) -> Iterator[str]:
         base, rows = self.base, self.rows.values()
         how = "in one process each" if self.driver == "inprocess" else "with processes"
-        numbers = Counter(it.kind for row in rows for it in base.effective(row.schedule))
+        numbers = Counter(it.kind for row in rows for it in row.schedule)
         drawn = ", ".join(f"{kind} {numbers[kind]}" for kind in KINDS if numbers[kind]) or "none"
         head = f"{base.scenario.name}, case {base.case}: {len(rows)} of {self.runs} runs {how}"
         yield f"{head}, seed {self.seed}; disturbances: {drawn}"
@@ -185,7 +185,7 @@ class Campaign:
         for name, (found, simplest, file) in self.failures.items():
             # of the run as found if the simplest one passes the next time
             yield f"{name}, run {found.number}: {simplest.violated.get(name, found.violated[name])}"
-            yield from (f"    {line}" for line in base.lines(simplest.schedule))
+            yield from (f"    {it}" for it in in_order(simplest.schedule))
             yield f"    {again(file)}"
 
     # ---------------------------------------------------------------- its folder
@@ -232,7 +232,7 @@ class Campaign:
             f"{self.command}, run {row.number}, seed of the messages {seed}"
             + (f", shrunk from {len(row.schedule)} disturbances to {len(schedule)}" if fewer else ""),
             f"Once more: {again(file)}",
-            *(f"  {line}" for line in self.base.lines(schedule)),
+            *(f"  {it}" for it in in_order(schedule)),
         ]
         scenario = msgspec.structs.replace(
             self.base.disturbed(schedule, seed, simplest.since_s),

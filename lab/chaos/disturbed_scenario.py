@@ -6,6 +6,7 @@ disturbance has ended (docs/chaos.md).
 
 from __future__ import annotations
 
+import json
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -24,10 +25,9 @@ from gridpeers.netem.schema.partition import Partition
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.tables import read_feeder
 from gridpeers.scenarios.checks.check_registry import ALWAYS, RETURNS, check_name
-from gridpeers.scenarios.schema.check_notes import AgentEvent, why_away
 from gridpeers.scenarios.schema.checks import check_switches, check_times
 from gridpeers.scenarios.schema.loading import check_tables, read_tables
-from gridpeers.scenarios.schema.participants import check_agentless, check_netem, check_schedule, inverters_of, netem_of
+from gridpeers.scenarios.schema.participants import check_agentless, check_netem, check_schedule, netem_of
 from gridpeers.scenarios.schema.scenario_errors import Problems
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.scenarios.schema.scenario_writing import to_toml
@@ -79,9 +79,9 @@ class Disturbance(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
     --------
     >>> cut = Disturbance(table="link", entry={"on": "inv1 <-> inv4", "from_s": 2.0, "to_s": 3.0, "cut": True})
     >>> str(cut), cut.settled_s
-    ('2 to 3 s: link on = inv1 <-> inv4, cut = true', 3.0)
+    ('2 to 3 s: link on = "inv1 <-> inv4", cut = true', 3.0)
     >>> str(Disturbance(table="event", entry={"t_s": 2.0, "leave": ["inv2"]}))
-    '2 s: event leave = [inv2]'
+    '2 s: event leave = ["inv2"]'
     """
 
     table: Literal["event", "link", "partition", "node"]
@@ -107,26 +107,18 @@ class Disturbance(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
 
     def __str__(self) -> str:
         until = "" if self.ends_s == inf else f" to {self.ends_s:g}"
-        what = {key: value for key, value in self.entry.items() if key not in ("t_s", "from_s", "to_s")}
-        return f"{self.begins_s:g}{until} s: {self.table} {_pairs(what)}"
+        what = [
+            f"{key} = {json.dumps(value)}" for key, value in self.entry.items() if key not in ("t_s", "from_s", "to_s")
+        ]
+        return f"{self.begins_s:g}{until} s: {self.table} {', '.join(what)}"
 
 
 Schedule = tuple[Disturbance, ...]
 """Disturbances of one run, as they were drawn: not in the order of time."""
 
 
-def _pairs(entry: Mapping[str, Any]) -> str:
-    return ", ".join(f"{key} = {_word(value)}" for key, value in entry.items())
-
-
-def _word(value: Any) -> str:
-    if isinstance(value, Mapping):
-        return "{" + _pairs(value) + "}"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(_word, value)) + "]"
-    if isinstance(value, bool):
-        return str(value).lower()
-    return f"{value:g}" if isinstance(value, float) else str(value)
+def in_order(schedule: Schedule) -> list[Disturbance]:
+    return sorted(schedule, key=lambda it: it.begins_s)
 
 
 @dataclass(frozen=True)
@@ -190,36 +182,13 @@ class ChaosBase:
 
     def kept(self, drawn: Iterable[Disturbance]) -> Schedule:
         """Return those of some disturbances that are possible together: of two that are not, the first."""
-        kept = tuple(drawn)
-        if self.is_possible(kept):
-            return kept
-        kept = ()
+        kept: Schedule = ()
+        if self.is_possible(tuple(drawn)):
+            return tuple(drawn)
         for disturbance in drawn:
             if self.is_possible((*kept, disturbance)):
                 kept = (*kept, disturbance)
         return kept
-
-    def lines(self, schedule: Schedule) -> list[str]:
-        lines = []
-        for disturbance in sorted(schedule, key=lambda it: it.begins_s):
-            why = self._why_idle(schedule, disturbance)
-            lines.append(f"{disturbance} (nothing happens: {why})" if why else str(disturbance))
-        return lines
-
-    def effective(self, schedule: Schedule) -> Schedule:
-        """Return the disturbances of a schedule without those that only meet an agent that is away."""
-        return tuple(it for it in schedule if not self._why_idle(schedule, it))
-
-    def _why_idle(self, schedule: Schedule, disturbance: Disturbance) -> str:
-        """Return why a disturbance has no effect, as a lie of an agent that has left before; "" if it may have one."""
-        if disturbance.table != "node":
-            return ""
-        name = str(disturbance.entry["name"])
-        events = merged_events(self.tree.get("event", ()), schedule)
-        agent_events = [AgentEvent(float(it["t_s"]), it.get("leave", ()), it.get("join", ())) for it in events]
-        at_start = any(row.name == name and not row.spare for row in inverters_of(self.scenario, self.feeder))
-        why = why_away(name, disturbance.begins_s, disturbance.ends_s, agent_events, at_start=at_start)
-        return f"{name} {why}" if why else ""
 
     def _tree(self, schedule: Schedule, seed: int, since_s: float = 0.0) -> dict[str, Any]:
         changed, T_c = self.changed_s(schedule), self.scenario.time.T_c_s
@@ -230,7 +199,7 @@ class ChaosBase:
         tree["checks"] = chaos_checks(self.scenario.checks, changed, since)
         tree["event"] = merged_events(self.tree.get("event", []), schedule)
         for table in ("link", "partition", "node"):
-            added = [dict(it.entry) for it in sorted(schedule, key=lambda it: it.begins_s) if it.table == table]
+            added = [dict(it.entry) for it in in_order(schedule) if it.table == table]
             if entries := [*self.tree.get(table, []), *added]:
                 tree[table] = entries
         return tree

@@ -51,51 +51,50 @@ class FeasibleSupply:
 
     def objection(self, scenario: ScenarioModel, case: str) -> str:
         """Return why an island cannot be fed or controlled at some time, "" if all can."""
-        leaders = self._leaders(scenario, case)
-        both = (state for closes in (True, False) for state in self._states(scenario, case, waiting_closes=closes))
-        for state in both:
-            forming = frozenset(row.name for row in self._rows if row.kind == "GFM" and row.name in state.present)
-            for part in self._parts_of(state.closed, forming):
-                if text := self._objection(part, state, leaders):
-                    return f"at {state.t_s:g} s {text}"
-        return ""
-
-    def _leaders(self, scenario: ScenarioModel, case: str) -> frozenset[str]:
         chosen, agentless = scenario.cases[case].secondary, without_agent(scenario, case)
-        names = {row.name for row in self._rows if row.kind == "GFM" and chosen != "none"} - agentless
-        return frozenset(names if isinstance(chosen, str) else names & set(chosen))
+        leaders = {row.name for row in self._rows if row.kind == "GFM" and chosen != "none"} - agentless
+        leaders = leaders if isinstance(chosen, str) else leaders & set(chosen)
+        for waiting_closes in (True, False):
+            for state in self._states(scenario, case, waiting_closes=waiting_closes):
+                forming = frozenset(row.name for row in self._rows if row.kind == "GFM" and row.name in state.present)
+                for part in self._parts_of(state.closed, forming):
+                    if text := self._objection(part, state, leaders):
+                        return f"at {state.t_s:g} s {text}"
+        return ""
 
     def _states(self, scenario: ScenarioModel, case: str, *, waiting_closes: bool) -> Iterator[_State]:
         """Yield the feeder at t = 0 and after each change; a switch that waits for synchronism may never close."""
-        closed, killed = self._graph.closed_at_start(), frozenset[str]()
         present = frozenset(row.name for row in inverters_of(scenario, self._feeder) if not row.spare)
+        state = _State(0.0, self._graph.closed_at_start(), present, frozenset(), {})
+        yield state
         set_powers = {event.t_s: powers for event, powers in powers_after(scenario, self._feeder)}
-        powers: Mapping[str, complex] = {}
-        deaths = [(node.from_s, node.name) for node in netem_of(scenario, case).nodes if node.kill]
         changes: list[tuple[float, Event | str]] = [(event.t_s, event) for event in scenario.events]
-        yield _State(0.0, closed, present, killed, powers)
-        for t_s, change in sorted([*changes, *deaths], key=lambda item: item[0]):
+        changes += [(node.from_s, node.name) for node in netem_of(scenario, case).nodes if node.kill]
+        for t_s, change in sorted(changes, key=lambda item: item[0]):
             if isinstance(change, str):
-                killed |= {change}
+                state = state._replace(t_s=t_s, killed=state.killed | {change})
             else:
-                closed = closed - {self._switches.get(name, "") for name in change.open}
+                closed = state.closed - {self._switches.get(name, "") for name in change.open}
                 if waiting_closes or not change.synchronised:
                     closed |= {self._switches[name] for name in change.close if name in self._switches}
-                present = (present - set(change.leave)) | set(change.join)
-                powers = set_powers[change.t_s]
-            yield _State(t_s, closed, present, killed, powers)
+                present = (state.present - set(change.leave)) | set(change.join)
+                state = _State(t_s, closed, present, state.killed, set_powers[change.t_s])
+            yield state
 
     def _parts(self, closed: frozenset[str], forming: frozenset[str]) -> tuple[_Part, ...]:
         fed, dead = self._graph.fed(closed, (row for row in self._rows if row.name in forming))
-        parts = []
-        for nodes in (*fed, *dead):
-            load = sum(S.real for bus, ends, S in self._demands if any((bus, phase) in nodes for phase in ends))
-            there = tuple(row for row in self._rows if row.node in nodes)
-            buses = frozenset(bus for bus, _ in nodes)
-            parts.append(_Part(there, load, buses, self._source in nodes, energised=nodes in fed))
-        return tuple(parts)
+        return tuple(
+            _Part(
+                inverters=tuple(row for row in self._rows if row.node in nodes),
+                load=sum(S.real for bus, ends, S in self._demands if any((bus, phase) in nodes for phase in ends)),
+                buses=frozenset(bus for bus, _ in nodes),
+                has_substation=self._source in nodes,
+                energised=nodes in fed,
+            )
+            for nodes in (*fed, *dead)
+        )
 
-    def _objection(self, part: _Part, state: _State, leaders: frozenset[str]) -> str:
+    def _objection(self, part: _Part, state: _State, leaders: set[str]) -> str:
         there = [row for row in part.inverters if row.name in state.present]
         if part.has_substation or not there:
             return ""

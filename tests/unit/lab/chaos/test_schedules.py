@@ -10,8 +10,6 @@ from hypothesis import given, settings
 from msgspec import json
 
 from gridpeers.lab.chaos import schedules as schedules_of_chaos
-from gridpeers.lab.chaos.campaign import Campaign
-from gridpeers.lab.chaos.chaos_run import ChaosRow, run_schedule
 from gridpeers.lab.chaos.disturbed_scenario import (
     JUDGED_S,
     KINDS,
@@ -28,8 +26,7 @@ from gridpeers.scenarios.schema.scenario_writing import to_toml
 from gridpeers.wire.plugins.plugin import table_of
 from gridpeers.wire.schema.table_schema import fields_of
 from tests.scenario_files import written
-from tests.unit.lab.chaos.bases import NAMES, base_in, base_named
-from tests.unit.lab.chaos.small_campaign import SMALL
+from tests.unit.lab.chaos.bases import NAMES, base_named
 
 CUT = Disturbance(table="link", entry={"on": "* <-> *", "from_s": 2.0, "to_s": 3.0, "cut": True})
 LEAVE = Disturbance(table="event", entry={"t_s": 2.0, "leave": ["inv2"]}, back={"t_s": 3.0, "join": ["inv2"]})
@@ -139,30 +136,6 @@ def test_shrinking_runs_each_schedule_once_and_no_more_than_it_may(monkeypatch: 
     assert 1 < len(simplest) < len(_batch(1)[number])
     assert 0 < len(asked) <= tries
     assert len({json.encode(schedule) for schedule in asked}) == len(asked)
-
-
-AWAY = Disturbance(table="event", entry={"t_s": 0.3, "leave": ["inv4"]}, back={"t_s": 0.6, "join": ["inv4"]})
-
-
-def _lie(name: str, begin: float, end: float) -> Disturbance:
-    lie = {"model": "offset", "P_set_W": 300e3, "Q_var": 300e3}
-    return Disturbance(table="node", entry={"name": name, "from_s": begin, "to_s": end, "lies": lie})
-
-
-def test_a_lie_of_an_agent_that_has_left_changes_nothing_and_the_report_says_so(tmp_path: Path) -> None:
-    """The run has the same bytes without it; report and scenario say why, and it is no lie of the count."""
-    (file := tmp_path / "small.toml").write_text(SMALL.format(extra=""), encoding="utf-8")
-    base = base_in(file)
-    schedule = (_lie("inv4", 0.3, 0.6), AWAY)
-    row, without = (run_schedule(base, which, 1) for which in (schedule, (AWAY,)))
-    found = ChaosRow(number=0, schedule=schedule, violated={"ends": "no"})
-    campaign = Campaign(base=base, seed=1, runs=1, path=tmp_path, rows={0: row})
-    failed = campaign.write_failure("ends", found, row)
-
-    assert base.is_possible(schedule)
-    assert (row.history_sha256, row.passed) == (without.history_sha256, without.passed)
-    assert "(nothing happens: inv4 has left at 0.3 s)" in failed.read_text(encoding="utf-8")
-    assert next(campaign.lines()).endswith("; disturbances: leave 1")
 
 
 def test_every_check_with_a_first_time_gets_one_of_the_schedule() -> None:
