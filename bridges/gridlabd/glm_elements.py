@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from gridpeers.bridges.feeder_import import FeederImport
 from gridpeers.bridges.gridlabd.glm_text import SWITCHES
-from gridpeers.bridges.import_checks import element_of
-from gridpeers.plant.equipment import Switch
-from gridpeers.plant.equipment.imported_equipment import LinearElement, LoadPart, bus_behind, cut_off
+from gridpeers.plant.equipment.connectivity import Node
+from gridpeers.plant.equipment.imported_equipment import LoadPart, cut_off
 
 Matrix = np.ndarray[Any, np.dtype[np.complex128]]
 
@@ -40,18 +40,15 @@ def voltages_of(bus: Mapping[str, Any]) -> dict[str, complex]:
     return {p: -V[p] if bus["phases"] & SPLIT and p == "B" else V[p] for p in letters_of(bus["phases"])}
 
 
-class GlmElements:
-    """Collects the linear elements (`rows`) and switches of a model; notes in `problems` what cannot be represented.
+class GlmBranches:
+    """Takes the branches of a model over; lines in `wanted` become switches, by name or as `class.name`.
 
-    Lines in `wanted` become switches, by name or as `class.name`; `used` are those that were met.
+    `used` are the wanted lines that were met.
     """
 
-    def __init__(self, buses: list[dict[str, Any]], wanted: Collection[str], problems: list[str]) -> None:
-        self._buses, self._wanted, self._problems = buses, set(wanted), problems
-        self.rows: list[LinearElement] = []
-        self.switches: list[Switch] = []
+    def __init__(self, found: FeederImport, buses: list[dict[str, Any]], wanted: Collection[str]) -> None:
+        self._found, self._buses, self._wanted = found, buses, set(wanted)
         self.used: set[str] = set()
-        self.added: dict[str, str] = {}  # buses that are not in the model, and the bus before each
 
     def add(self, branch: dict[str, Any]) -> None:
         kind, name = branch["class"], f"{branch['class']}.{branch['name']}"
@@ -59,43 +56,43 @@ class GlmElements:
         wanted = {name, branch["name"]} & self._wanted
         if kind in SWITCHES:
             letters = letters_of(branch["phases"])
-            if len({letter in closed for letter in letters}) == 1:
-                self._add_switch(name, branch, letters, _diagonal(branch, letters), closed=letters[0] in closed)
-            else:  # one switch for each phase
-                for p in letters:
-                    self._add_switch(name, branch, p, _diagonal(branch, p), closed=p in closed, suffix=f".{p}")
+            # one switch for each phase where their states differ
+            for each in [letters] if len({letter in closed for letter in letters}) == 1 else letters:
+                suffix = "" if each == letters else f".{each}"
+                self._add(branch, _diagonal(branch, each), each, closed=each[0] in closed, suffix=suffix)
         elif kind == "fuse":
-            self._append(name, branch, _diagonal(branch, closed))
+            self._add(branch, _diagonal(branch, closed))
         elif branch["open"]:
-            self._problems.append(f'{name}: status OPEN; leave it out (leave_out=["{name}"]), or put a switch there')
+            self._found.refuse(name, f'status OPEN; leave it out (leave_out=["{name}"]), or put a switch there')
         elif wanted:
             self.used |= wanted
-            self._add_switch(name, branch, self._letters(branch, "from"), self._matrix(branch), closed=True)
+            self._add(branch, self._matrix(branch), self._letters(branch, "from"), closed=True)
         else:
-            self._append(name, branch, self._matrix(branch))
+            self._add(branch, self._matrix(branch))
 
     def add_unbalanced(self, bus: str, ratios: Matrix) -> str:
         """Put a bus of balanced voltages before one of unbalanced voltages; return its name.
 
         Between them is an ideal transformer for each phase: what stands against it is next to no impedance.
         """
-        stiff = bus_behind(bus, "swing")
-        self.added[stiff] = bus
+        stiff = self._found.add_bus(bus, "swing")
         Y = STIFF * np.block([[np.diag(abs(ratios) ** 2), np.diag(-ratios.conj())], [np.diag(-ratios), np.eye(3)]])
-        self.rows.append(element_of(f"swing.{bus}", [(name, p) for name in (stiff, bus) for p in LETTERS], Y))
+        self._found.add_element(f"swing.{bus}", [(name, p) for name in (stiff, bus) for p in LETTERS], Y)
         return stiff
 
-    def _add_switch(
-        self, name: str, branch: dict[str, Any], letters: str, blocks: Matrix, *, closed: bool, suffix: str = ""
+    def _add(
+        self, branch: dict[str, Any], Y: Matrix, switched: str = "", *, closed: bool = True, suffix: str = ""
     ) -> None:
-        """Put an ideal switch before a branch, or before one of its phases."""
-        bus, short = self._buses[branch["from"]]["name"], branch["name"] + suffix
-        behind = bus_behind(bus, short)
-        self.added[behind] = bus
-        self._append(name + suffix, branch, blocks, behind)
-        self.switches.append(
-            Switch(name=f"{bus}-{behind}", alias=short, from_bus=bus, to_bus=behind, phases=letters, closed=closed)
-        )
+        """Keep an element between the nodes that it connects, behind an ideal switch of the phases `switched`."""
+        start, end = (self._buses[branch[end]]["bus"] for end in ("from", "to"))
+        if switched:
+            start = self._found.add_switch(start, branch["name"] + suffix, switched, closed=closed)
+        nodes = [(bus, letter) for bus in (start, end) for letter in LETTERS]
+        own = [letter in self._letters(branch, end) for end in ("from", "to") for letter in LETTERS]
+        at = [k for k, there in enumerate(own) if there and (Y[k].any() or Y[:, k].any())]
+        if at:
+            name = f"{branch['class']}.{branch['name']}{suffix}"
+            self._found.add_element(name, [nodes[k] for k in at], Y[np.ix_(at, at)])
 
     def _letters(self, branch: dict[str, Any], end: str) -> str:
         phases, of_bus = branch["phases"], self._buses[branch[end]]["phases"]
@@ -116,17 +113,6 @@ class GlmElements:
                 [-sign * branch["Y_to"] @ first, sign * branch["YS_to"] @ second],
             ]
         )
-
-    def _append(self, name: str, branch: dict[str, Any], Y: Matrix, start: str = "") -> None:
-        """Keep an element between the nodes that it really connects."""
-        buses = {"from": start or self._buses[branch["from"]]["name"], "to": self._buses[branch["to"]]["name"]}
-        ends = [(end, letter) for end in buses for letter in LETTERS]
-        at = [k for k, (end, p) in enumerate(ends) if p in self._letters(branch, end) and (Y[k].any() or Y[:, k].any())]
-        if not np.isfinite(Y).all():
-            self._problems.append(f"{name}: GridLAB-D gives no admittance for it; leave it out or change it")
-        elif at:
-            nodes = [(buses[end], letter) for end, letter in ends]
-            self.rows.append(element_of(name, [nodes[k] for k in at], Y[np.ix_(at, at)]))
 
 
 def _diagonal(branch: dict[str, Any], letters: str) -> Matrix:
@@ -169,7 +155,7 @@ def load_parts(name: str, bus: Mapping[str, Any], takes: Mapping[tuple[str, str]
             found.append(
                 LoadPart(
                     name=name,
-                    bus=bus["name"],
+                    bus=bus["bus"],
                     ends=LEGS.get(branch) or (branch[0], branch[1:]),
                     S=complex(S),
                     V_nom=V_nom,
@@ -183,11 +169,12 @@ def load_parts(name: str, bus: Mapping[str, Any], takes: Mapping[tuple[str, str]
     return found
 
 
-def shunt(name: str, bus: str, takes: Mapping[tuple[str, str], complex]) -> LinearElement:
+def shunt(bus: str, takes: Mapping[tuple[str, str], complex]) -> tuple[list[Node], Matrix]:
+    """Return the nodes and the admittances of a capacitor, from those of its branches."""
     ends = {branch: LEGS.get(branch) or (branch[0], branch[1:]) for _, branch in takes}
     letters = sorted({letter for pair in ends.values() for letter in pair if letter})
     Y = np.zeros((len(letters), len(letters)), complex)
     for (_, branch), y in takes.items():
         across = np.array([(letter == ends[branch][0]) - (letter == ends[branch][1]) * 1.0 for letter in letters])
         Y += y * np.outer(across, across)
-    return element_of(name, [(bus, letter) for letter in letters], Y)
+    return [(bus, letter) for letter in letters], Y

@@ -1,13 +1,10 @@
 """GridLAB-D's own power flow of a model: a program for a process of its own, as GridLAB-D's state is global.
 
 It loads the model and solves the power flow by Newton's method at the model's first moment. Where regulators or
-capacitors have a control, GridLAB-D goes on until they rest. Then it writes what the solver holds, pickled: buses,
-branches with their admittance matrices as the solver uses them, and the powers, currents and admittances that every
-node, meter, load and capacitor takes itself. GridLAB-D publishes no admittances, so they are read from its tables of
-the solver, `NR_busdata` and `NR_branchdata`, whose layout is that of version 6.0.0.
-
-Usage: `python -m gridpeers.bridges.gridlabd.gridlabd_power_flow MODEL RESULT PARENT [first]`; `first`: not
-beyond the first moment.
+capacitors have a control, GridLAB-D goes on until they rest. The result is what the solver holds: buses, branches with
+their admittance matrices as the solver uses them, and the powers, currents and admittances that every node, meter, load
+and capacitor takes itself. GridLAB-D publishes no admittances, so they are read from its tables of the solver,
+`NR_busdata` and `NR_branchdata`, whose layout is that of version 6.0.0.
 """
 
 from __future__ import annotations
@@ -15,15 +12,17 @@ from __future__ import annotations
 import ctypes
 import math
 import os
-import pickle
-import sys
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 
+from gridpeers.bridges.engine_process import Tell, serve
 from gridpeers.bridges.gridlabd.delta_mode import GridlabdCore, NotImportableError, end_with, gridlabd_package
 from gridpeers.bridges.gridlabd.glm_text import CHILD_OF_BUS, WATCHING
+from gridpeers.plant.tables.read import FeederError
+from gridpeers.wire.wording import damaged, printable
 
 STRIDE = 3  # doubles of a complex number in GridLAB-D's arrays: real part, imaginary part, notation
 
@@ -167,13 +166,12 @@ KINDS = {"P": "power", "I": "current", "Y": "shunt"}
 
 
 class PowerFlowModel:
-    """A model of GridLAB-D, loaded; `solve` gives what the solver holds, at rest if it `settles`."""
+    """A model of GridLAB-D, loaded; what it writes goes into the folder `scratch`."""
 
-    def __init__(self, path: str, scratch: Path, *, settles: bool) -> None:
-        self._scratch, self._settles = scratch, settles
-        self._module = gridlabd_package()
+    def __init__(self, module: ModuleType, path: Path, scratch: Path) -> None:
+        self._scratch, self._module = scratch, module
         self._gridlabd = self._module.DirectGridLabD()
-        if self._gridlabd.load_glm([path]) != self._module.GLDErrorCode.SUCCESS:
+        if self._gridlabd.load_glm([str(path)]) != self._module.GLDErrorCode.SUCCESS:
             raise RuntimeError("the model was not loaded")
         self._core = ModelCore()
         self._classes = {
@@ -183,7 +181,11 @@ class PowerFlowModel:
         }
 
     def solve(self) -> dict[str, Any]:
-        """Solve the power flow at the model's first moment, or when its regulators and capacitors rest."""
+        """Return what the solver holds at the model's first moment, or when its regulators and capacitors rest.
+
+        It has `buses`, `branches` and what each object `takes` if there is a solution, `settling` if a control may move
+        something.
+        """
         frequency = self._gridlabd.get_global("powerflow::nominal_frequency")
         result: dict[str, Any] = {"objects": self._objects(), "has_powerflow": frequency != ""}
         if not result["has_powerflow"]:
@@ -207,18 +209,13 @@ class PowerFlowModel:
         self._keep_quiet()
         if result["method"] != "NR":
             self._give_a_swing()
-        moved = self._controlled() if self._settles else []
-        if moved:
+        if moved := self._controlled():
             self._core.stop_after(LONGEST_SETTLING)
         self._gridlabd.setup_after_load()
         if moved:
-            result["settling"] = self._settle(moved)
-            result["solved"] = result["settling"]["solved"]
-        else:
-            result["solved"] = self._gridlabd.run() == self._module.GLDErrorCode.SUCCESS
-        if result["solved"]:
+            result |= self._settle(moved)
+        elif self._gridlabd.run() == self._module.GLDErrorCode.SUCCESS:
             result |= self._solver_tables()
-            result["takes"] = {name: self._takes(name) for name, kind in self._classes.items() if kind in CHILD_OF_BUS}
         return result
 
     def _objects(self) -> list[dict[str, Any]]:
@@ -271,8 +268,9 @@ class PowerFlowModel:
     def _settle(self, moved: list[str]) -> dict[str, Any]:
         """Go on until the positions have been the same for longer than any control waits, or for an hour.
 
-        Return whether the power flow was `solved` all the time and whether they `rest`, the `time` as GridLAB-D writes
-        it, the `seconds` since the first moment, and the positions at the `first` moment and the `last`, by object.
+        Return what the solver holds then, or at the first moment if it finds no solution later. `settling` has whether
+        it was `solved` all the time and whether the positions `rest`, the `time` as GridLAB-D writes it, the `seconds`
+        since the first moment, and the positions at the `first` moment and the `last`, by object.
         """
         wait = 2.0 * max(
             (self._core.doubles(name, key)[0] for name in self._classes for key in DELAYS if self._core.has(name, key)),
@@ -280,6 +278,7 @@ class PowerFlowModel:
         )
         start = changed = later = self._core.clock()
         first = last = self._positions(moved)
+        tables: dict[str, Any] = {}
         solved = True
         while solved and later - changed <= wait and later <= start + LONGEST_SETTLING:
             now, time = later, self._gridlabd.get_global("clock")
@@ -288,10 +287,15 @@ class PowerFlowModel:
             later = max(self._core.clock(), now)
             if now == start:
                 first = last
+                if solved and later > start:
+                    tables = self._solver_tables()
             elif last != before:
                 changed = now
         rest = min(later, start + LONGEST_SETTLING) - changed > wait
-        return {"solved": solved, "rest": rest, "time": time, "seconds": now - start, "first": first, "last": last}
+        if solved:
+            tables = self._solver_tables()
+        settling = {"solved": solved, "rest": rest, "time": time, "seconds": now - start, "first": first, "last": last}
+        return {**tables, "settling": settling}
 
     def _positions(self, names: list[str]) -> dict[str, list[str]]:
         found = {}
@@ -301,7 +305,7 @@ class PowerFlowModel:
         return found
 
     def _solver_tables(self) -> dict[str, Any]:
-        """Return `buses` and `branches`, whose ends are places of buses."""
+        """Return `buses`, `branches`, whose ends are places of buses, and what each object `takes`."""
         powerflow = ctypes.CDLL(str(Path(str(self._module.__file__)).parent / "lib" / "powerflow.so"))
 
         def table(name: str, row: type[ctypes.Structure]) -> Any:
@@ -340,7 +344,8 @@ class PowerFlowModel:
             elif self._core.has(name, "fuse_resistance"):  # the solver has the admittance (1 + j) / R
                 row["Z"] = self._core.doubles(name, "fuse_resistance")[0] / (1.0 + 1.0j)
             branches.append(row)
-        return {"buses": buses, "branches": branches}
+        takes = {name: self._takes(name) for name, kind in self._classes.items() if kind in CHILD_OF_BUS}
+        return {"buses": buses, "branches": branches, "takes": takes}
 
     def _takes(self, name: str) -> dict[tuple[str, str], complex]:
         """Return the powers, currents and admittances of one object itself, by kind and branch."""
@@ -376,24 +381,17 @@ class PowerFlowModel:
 
 
 def main() -> None:
-    """Solve the model and write the result; where that fails, the last line on standard output says why."""
-    model, result = sys.argv[1], Path(sys.argv[2])
-    end_with(int(sys.argv[3]))
+    serve("GridLAB-D", read_model)
+
+
+def read_model(request: dict[str, Any], _tell: Tell) -> dict[str, Any]:
+    """Return what GridLAB-D's solver holds of a model (`PowerFlowModel.solve`); `parent`: the process that asks."""
+    path, scratch = Path(request["path"]), Path.cwd()
+    end_with(request["parent"])
     try:
-        answer = PowerFlowModel(model, result.parent, settles="first" not in sys.argv[4:]).solve()
+        module = gridlabd_package()
     except NotImportableError as error:
-        answer = {"not_importable": str(error)}
-    except Exception as error:
-        answer = {"error": f"{type(error).__name__}: {error}"}
-    status = 0
-    try:
-        result.write_bytes(pickle.dumps(answer))
-    except OSError as error:
-        print(f"\n{error}")
-        status = os.EX_CANTCREAT
-    sys.stdout.flush()
-    os._exit(status)  # GridLAB-D's own end is slow, and may fail
-
-
-if __name__ == "__main__":
-    main()
+        problem = damaged("gridlabd", printable(str(error)), "the import of .glm files")
+        raise FeederError(path.name, (problem,)) from None
+    os.chdir(path.parent)  # where GridLAB-D seeks what the model includes
+    return PowerFlowModel(module, path, scratch).solve()

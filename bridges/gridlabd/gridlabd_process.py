@@ -1,21 +1,16 @@
-"""GridLAB-D's processes: one that is stepped from outside, and one that solves the power flow of a model."""
+"""GridLAB-D in a process of its own that is stepped from outside, and what GridLAB-D prints as sentences."""
 
 from __future__ import annotations
 
-import importlib.util
 import os
-import pickle
 import re
-import subprocess
 import sys
 from collections.abc import Sequence
-from contextlib import closing
 from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from gridpeers.plant.request_process import ProcessEndedError, RequestProcess, TransientFolder, no_room, program
-from gridpeers.plant.tables.read import FeederError
+from gridpeers.plant.request_process import ProcessEndedError, RequestProcess, TransientFolder
 from gridpeers.wire.wording import damaged, printable
 
 PLACED = re.compile(r"^(?P<file>\S[^()]*)\((?P<line>\d+)\)\s*: (?P<text>.*)$")
@@ -53,7 +48,7 @@ def messages(printed: str) -> list[str]:
 
 
 SHOWN = 2  # so many of GridLAB-D's own errors are in an error of ours; the first ones are the cause, the others follow
-LONGEST = 600.0  # longest time (s) until a model is loaded and its first power flow solved
+LONGEST = 600.0  # longest time (s) until a model is loaded and its first step done
 KEPT_MEMORY = {"MALLOC_MMAP_THRESHOLD_": str(32 * 2**20), "MALLOC_TRIM_THRESHOLD_": str(2**30)}
 """Lets glibc keep the memory of one power flow for the next: GridLAB-D's solver takes and returns its matrices in every
 iteration. Returned to the system each time, they take a quarter of the processor time. No number depends on it."""
@@ -111,60 +106,3 @@ class DeltaModeProcess:
         """Return GridLAB-D's first errors as the end of a sentence, on one line as all that goes over the wire."""
         first = [text.removeprefix("GridLAB-D: ").rstrip(".") for text in messages(self._process.printed())[:SHOWN]]
         return f"; its own words: {'; '.join(first)}" if first else "; it has printed no error"
-
-
-def solved_model(path: Path) -> dict[str, Any]:
-    """Return what GridLAB-D's solver holds of a model (`gridlabd_power_flow`).
-
-    Its `settling` says how regulators and capacitors moved until they rest, if any has a control. Where GridLAB-D finds
-    no solution on the way, its `solved` is false, and all else is of the first moment. FeederError has GridLAB-D's own
-    messages, each with its file and line.
-    """
-    if importlib.util.find_spec("gridlabd") is None:
-        missing = "reading .glm files needs GridLAB-D; install it: pip install 'gridpeers[gridlabd]'"
-        raise FeederError(path.name, (missing,))
-    answer, printed = _solved(path)
-    settling = answer.get("settling", {})
-    if settling and not settling["solved"] and settling["seconds"]:
-        answer, printed = _solved(path, "first")
-        answer["settling"] = settling
-    if not answer.get("solved", True):
-        said = messages(printed) or [f"{path.name}: GridLAB-D's power flow does not converge"]
-        if answer["method"] != "NR":
-            said.append(
-                f"{path.name}: has solver_method {answer['method']}, and is solved with NR here; try NR there, too"
-            )
-        raise FeederError(path.name, tuple(said))
-    return answer
-
-
-def _solved(path: Path, *options: str) -> tuple[dict[str, Any], str]:
-    module = "gridpeers.bridges.gridlabd.gridlabd_power_flow"
-    with closing(TransientFolder("gridpeers-gridlabd-")) as folder:
-        result = folder.path / "result.pickle"
-        try:
-            done = subprocess.run(
-                program(module, str(path), str(result), str(os.getpid()), *options),
-                cwd=path.parent,
-                env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"},
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.STDOUT,
-                pass_fds=(folder.user,),
-                timeout=LONGEST,
-                check=False,
-            )
-        except subprocess.TimeoutExpired:
-            raise FeederError(path.name, (f"GridLAB-D did not end within {LONGEST:g} s; simplify the model",)) from None
-        printed = done.stdout.decode("utf-8", errors="replace")
-        if done.returncode == os.EX_CANTCREAT:
-            problem = no_room("what GridLAB-D has solved", printable(printed.splitlines()[-1]))
-            raise FeederError(path.name, (f"{path.name}: {problem}",))
-        ended = f"GridLAB-D's process ended with code {done.returncode} and said nothing; run the model in GridLAB-D"
-        answer: dict[str, Any] = pickle.loads(result.read_bytes()) if result.is_file() else {"error": ended}
-    if "not_importable" in answer:
-        reason = printable(answer["not_importable"])
-        raise FeederError(path.name, (damaged("gridlabd", reason, "the import of .glm files"),))
-    if "error" in answer:
-        raise FeederError(path.name, tuple(messages(printed)) or (f"GridLAB-D: {printable(answer['error'])}",))
-    return answer, printed

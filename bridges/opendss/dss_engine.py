@@ -6,17 +6,15 @@ The commands come one by one, so that each problem has a file and a line, and no
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator
 from math import inf
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from gridpeers.bridges.import_checks import path_problems
+from gridpeers.bridges.feeder_import import FeederImport
 from gridpeers.plant.equipment import PHASES
-from gridpeers.plant.equipment.connectivity import Node
-from gridpeers.plant.equipment.imported_equipment import LoadPart
 from gridpeers.plant.tables.feeder_columns import Manifest
 from gridpeers.wire.schema.table_schema import named
 from gridpeers.wire.text_file import script_of
@@ -56,63 +54,82 @@ EXACT = ("set controlmode=off", "set tolerance=1e-11", "solve")
 class DssEngine:
     """One circuit in an engine of its own; `tell` takes what the engine is about to do, with file and line.
 
-    `notes` are failures on which the network does not depend, `places` file and line of each element and "bus NAME".
+    Failures on which the network does not depend are notes of `found`.
     """
 
-    def __init__(self, tell: Callable[[str], None]) -> None:
+    def __init__(self, found: FeederImport, tell: Callable[[str], None]) -> None:
         from dss import DSS
 
         engine = DSS.NewContext()
         engine.AllowForms = engine.AllowEditor = engine.AllowChangeDir = False
         engine.Error.ExtendedErrors = True
         self._engine: Any = engine
-        self._tell = tell
+        self._found, self._tell = found, tell
         self._folder = Path()
         self._problems: dict[str, str] = {}  # by message: where it came first
         self._not_run: dict[str, str] = {}
-        self.notes: list[str] = []
-        self.places: dict[str, str] = {}
 
     @property
     def circuit(self) -> Any:
         return self._engine.ActiveCircuit
 
-    def read(self, path: Path, scratch: Path) -> list[str]:
-        """Run a script and solve its circuit; return all problems, each with its file and line.
+    def read(self, path: Path, scratch: Path) -> None:
+        """Run a script and solve its circuit; FeederError has all problems, each with its file and line.
 
         `scratch` takes what the engine writes by itself (traces of controls).
         """
-        if problems := path_problems(path):
-            return problems
+        found, problems, places = self._found, self._found.problems, self._found.places
         self.execute(f'set datapath="{scratch}"')
         self._run(path, path.name, depth=0)
-        problems = [f"{where}: {message}" for message, where in self._problems.items()]
+        problems += [f"{where}: {message}" for message, where in self._problems.items()]
         if not self._engine.NumCircuits:
-            return [*problems[:FEW], f"{path.name}: makes no circuit; a script has a line New Circuit.name"]
-        if problems:
-            more = len(problems) - MOST
-            return [*problems[:MOST], f"and {more} problems more"] if more > 0 else problems
-        self.notes[:0] = [f"{where}: {verb} was not run" for verb, where in self._not_run.items()]
+            problems[FEW:] = [f"{path.name}: makes no circuit; a script has a line New Circuit.name"]
+        elif (more := len(problems) - MOST) > 0:
+            problems[MOST:] = [f"and {more} problems more"]
+        found.raise_problems()
+        found.notes[:0] = [f"{where}: {verb} was not run" for verb, where in self._not_run.items()]
         for command in SETTLE:
             message = self.execute(command, path.name)
             if HUNTING in message:
-                self.notes.append(
+                found.notes.append(
                     f"{path.name}: its controls hunt; they stay at their positions of the 1000th iteration"
                 )
             elif message:
-                return [f"{path.name}: the engine cannot solve the circuit: {message}"]
-        if problems := impossible_values(self.circuit):
-            return problems
+                found.refuse(path.name, f"the engine cannot solve the circuit: {message}")
+                found.raise_problems()
+        self._refuse_impossible_values()
+        found.raise_problems()
         if not self.circuit.Solution.Converged:
-            return [f"{path.name}: the engine's power flow does not converge; it would not in OpenDSS either"]
+            found.refuse(path.name, "the engine's power flow does not converge; it would not in OpenDSS either")
+            found.raise_problems()
         for command in EXACT:  # may end at rounding instead: not every circuit allows its tolerance
             self.execute(command, path.name)
         for name in self.circuit.AllElementNames:
             self.circuit.SetActiveElement(name)
             for bus in self.circuit.ActiveCktElement.BusNames:
-                if place := self.places.get(str(name).lower()):
-                    self.places.setdefault(f"bus {bus_of(bus)}", place)
-        return []
+                if place := places.get(str(name).lower()):
+                    places.setdefault(f"bus {bus_of(bus)}", place)
+
+    def _refuse_impossible_values(self) -> None:
+        """Refuse each value with which no power flow has a solution."""
+        circuit = self.circuit
+        if text := named(Manifest, "f_nom_Hz").objection(float(circuit.Solution.Frequency)):
+            self._found.refuse(FREQUENCY, f"{text}; correct Set DefaultBaseFrequency or Set Frequency")
+        for rows in (circuit.Loads, circuit.Capacitors, circuit.Transformers):
+            for row in rows if rows.Count else ():
+                element = circuit.ActiveCktElement
+                name = str(element.Name).lower()
+                values = {}
+                if not name.startswith("transformer."):
+                    values["kv"] = (row.kV, "kV")
+                else:
+                    for winding in range(1, row.NumWindings + 1):
+                        row.Wdg = winding
+                        values[f"kv of winding {winding}"] = (row.kV, "kV")
+                        values[f"kva of winding {winding}"] = (row.kVA, "kVA")
+                for key, (value, unit) in values.items():
+                    if element.Enabled and not 0.0 < value < inf:
+                        self._found.refuse(name, f"{key} must be above 0, got {value:g} {unit}")
 
     def execute(self, command: str, where: str = "") -> str:
         from dss import DSSException
@@ -158,7 +175,7 @@ class DssEngine:
             self._not_run.setdefault(f"set {key}" if key else verb, where)
             return
         if "freq" in key:
-            self.places[FREQUENCY] = where
+            self._found.places[FREQUENCY] = where
         if verb in COORDINATES:
             command = f'{verb} "{self._whole_path(rest)}"'
         else:
@@ -167,12 +184,12 @@ class DssEngine:
         name = ""
         if self._engine.NumCircuits and (verb in ABOUT_AN_ELEMENT or "." in first):
             name = str(self.circuit.ActiveDSSElement.Name).lower()
-            self.places.setdefault(name, where)
+            self._found.places.setdefault(name, where)
         kind = name.partition(".")[0]
         if not message or (verb == "solve" and HUNTING in message):
             return
         if verb in COORDINATES or kind in ASIDE:
-            self.notes.append(f"{where}: {message}")
+            self._found.notes.append(f"{where}: {message}")
         else:
             self._problems.setdefault(message, where)
         if kind in METERS:  # the engine solves nothing while one measures nowhere
@@ -230,44 +247,18 @@ FAR = 1.5  # ratio of two voltages that only a lost factor explains, such as tha
 DEAD = 0.01  # voltage (pu) below which nothing feeds a node, so that nothing can be said of it
 
 
-def impossible_values(circuit: Any) -> list[str]:
-    """Return a problem for each value with which no power flow has a solution; a circuit that has been read."""
-    frequency = float(circuit.Solution.Frequency)
-    text = named(Manifest, "f_nom_Hz").objection(frequency)
-    problems = [f"{FREQUENCY}: {text}; correct Set DefaultBaseFrequency or Set Frequency"] if text else []
-    values: list[tuple[str, str, float, str]] = []
-    for rows in (circuit.Loads, circuit.Capacitors, circuit.Transformers):
-        for row in rows if rows.Count else ():
-            element = circuit.ActiveCktElement
-            name = str(element.Name).lower()
-            if not element.Enabled:
-                continue
-            if not name.startswith("transformer."):
-                values.append((name, "kv", row.kV, "kV"))
-                continue
-            for winding in range(1, row.NumWindings + 1):
-                row.Wdg = winding
-                at = f"of winding {winding}"
-                values += [(name, f"kv {at}", row.kV, "kV"), (name, f"kva {at}", row.kVA, "kVA")]
-    return problems + [
-        f"{name}: {key} must be above 0, got {value:g} {unit}"
-        for name, key, value, unit in values
-        if not 0.0 < value < inf
-    ]
+def note_unusual_voltages(found: FeederImport, unbased: Collection[str]) -> None:
+    """Note loads whose `kv`, and buses whose voltage base, is far from the voltage that they have.
 
-
-def unusual_voltages(circuit: Any, parts: Sequence[LoadPart], V: Mapping[Node, complex]) -> list[str]:
-    """Return notes on loads whose `kv`, and buses whose voltage base, is far from the voltage that they have (V)."""
-    loads: list[tuple[str, float, float]] = []
-    for part in parts:
-        one, other = (V.get((part.bus, letter), 0j) for letter in part.ends)
+    Buses in `unbased` have no base.
+    """
+    loads, buses = list[tuple[str, float, float]](), list[tuple[str, float, float]]()  # name, voltage, nominal one
+    for part in found.load_parts:
+        one, other = (found.V.get((part.bus, letter), 0j) for letter in part.ends)
         loads.append((part.name, abs(one - other), part.V_nom))
-    buses: list[tuple[str, float, float]] = []
-    for bus in dict.fromkeys(bus for bus, _ in V):
-        circuit.SetActiveBus(bus)
-        highest = max(abs(V.get((bus, letter), 0j)) for letter in PHASES)
-        buses.append((f"bus {bus}", highest, 1e3 * float(circuit.ActiveBus.kVBase)))
-    notes = []
+    for bus, (V_nom, *_) in found.buses.items():
+        if bus not in unbased:
+            buses.append((f"bus {bus}", max(abs(found.V.get((bus, letter), 0j)) for letter in PHASES), V_nom))
     for rows, meant, remedy in (
         (loads, "kv, and beyond Vminpu and Vmaxpu a load does not take its kw", "correct kv, or what feeds it"),
         (buses, "voltage base", "correct Set VoltageBases, or the kvs of a transformer"),
@@ -275,13 +266,12 @@ def unusual_voltages(circuit: Any, parts: Sequence[LoadPart], V: Mapping[Node, c
         ratios = {name: V / V_nom for name, V, V_nom in rows if V > DEAD * V_nom > 0.0}
         far = {name: ratio for name, ratio in ratios.items() if not 1.0 / FAR <= ratio <= FAR}
         if far:
-            notes.append(f"{_first(far)}: has {next(iter(far.values())):.2g} times its {meant}; {remedy}")
-    if unbased := [name for name, _, V_base in buses if V_base <= 0.0]:
-        notes.append(
-            f"{_first(unbased)}: without a voltage base, so that the voltage there counts as nominal; "
+            found.notes.append(f"{_first(far)}: has {next(iter(far.values())):.2g} times its {meant}; {remedy}")
+    if unbased:
+        found.notes.append(
+            f"bus {_first(unbased)}: without a voltage base, so that the voltage there counts as nominal; "
             "write Set VoltageBases=[...] and CalcVoltageBases"
         )
-    return notes
 
 
 def _first(names: Collection[str]) -> str:

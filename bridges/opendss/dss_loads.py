@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
 from msgspec.structs import replace
 
+from gridpeers.bridges.feeder_import import FeederImport
 from gridpeers.bridges.opendss.dss_engine import DssEngine, bus_of, complexes
 from gridpeers.plant.dynamics.kernel.solve import limited_admittance
 from gridpeers.plant.equipment import NODES
@@ -54,7 +56,7 @@ def letter_of(node: int) -> str:
     return NODES[node - 1] if node > 0 else ""
 
 
-def branches_of(element: Any, kV: float, *, is_delta: bool) -> Branches:
+def branches_of(element: Any, kV: float, bus_names: Mapping[str, str], *, is_delta: bool) -> Branches:
     """Return the branches of a load or generator, which is active.
 
     `kV` is line-to-line in a delta and where a wye has two or three phases, else that of its phase. Phases of a delta
@@ -62,7 +64,7 @@ def branches_of(element: Any, kV: float, *, is_delta: bool) -> Branches:
     """
     phases, conductors = int(element.NumPhases), int(element.NumConductors)
     return Branches(
-        bus=bus_of(element.BusNames[0]),
+        bus=bus_names[bus_of(element.BusNames[0])],
         letters=[letter_of(node) for node in element.NodeOrder],
         conductors=[(k, (k + 1) % conductors if is_delta else phases) for k in range(phases)],
         V_nom=kV * 1e3 / sqrt(3.0) if not is_delta and phases in (2, 3) else kV * 1e3,
@@ -77,13 +79,15 @@ ADMITTANCE = 2  # load model of a solution that makes an impedance of every load
 VARIABLE = 0  # status of a load that the circuit's load multiplier scales
 
 
-def read_loads(engine: DssEngine, left_out: set[str], notes: list[str], problems: list[str]) -> list[LoadPart]:
+def read_loads(
+    engine: DssEngine, left_out: set[str], bus_names: Mapping[str, str], found: FeederImport
+) -> list[LoadPart]:
     """Return the parts of all loads that are enabled and not left out; a problem for each that cannot be represented.
 
     Of models 6 and 7 one thing is not taken over: that below `vlowpu` (half of the nominal voltage) they jump to
     another impedance.
     """
-    found: list[LoadPart] = []
+    parts: list[LoadPart] = []
     circuit, solution = engine.circuit, engine.circuit.Solution
     impedances, year = int(solution.LoadModel) == ADMITTANCE, int(solution.Year)
     growth = (1.0 + float(solution.pctGrowth) / 100.0) ** (year - 1) if year else 1.0
@@ -93,27 +97,26 @@ def read_loads(engine: DssEngine, left_out: set[str], notes: list[str], problems
         if not element.Enabled or name in left_out or load.kW == load.kvar == 0.0:
             continue
         if int(load.Model) == FIXED_Q and load.kvar and not impedances:
-            notes.append(
+            found.notes.append(
                 f"{name}: model=6 takes less Q just below Vminpu, and more just above Vmaxpu: where its voltage "
                 "crosses one of them, no power flow has a solution, and an island is de-energised; model=1 has none"
             )
         if year and str(load.Growth):
-            problems.append(
-                f"{name}: growth={load.Growth}: growth by a GrowthShape is not supported; leave out set year"
-            )
+            text = f"growth={load.Growth}: growth by a GrowthShape is not supported; leave out set year"
+            found.refuse(name, text)
         scale = growth * (float(solution.LoadMult) if int(load.Status) == VARIABLE else 1.0)
         S = complex(load.kW, load.kvar) * 1e3 / int(element.NumPhases)
         if impedances:
             laws = [{"S": S * scale, **IMPEDANCE}]
         else:
-            laws = _laws(name, load, float(element.Properties("vlowpu").Val or 0.5), S, scale, problems)
-        branches = branches_of(element, float(load.kV), is_delta=bool(load.IsDelta))
+            laws = _laws(name, load, float(element.Properties("vlowpu").Val or 0.5), S, scale, found)
+        branches = branches_of(element, float(load.kV), bus_names, is_delta=bool(load.IsDelta))
         usual = np.abs(branches.across(complexes(element.Voltages))).max() / branches.V_nom
-        found += branches.parts(name, laws, cut_off(float(usual)) if load.kW < 0.0 else 0.0)
-    return found
+        parts += branches.parts(name, laws, cut_off(float(usual)) if load.kW < 0.0 else 0.0)
+    return parts
 
 
-def _laws(name: str, load: Any, V_low: float, S: complex, scale: float, problems: list[str]) -> list[Law]:
+def _laws(name: str, load: Any, V_low: float, S: complex, scale: float, found: FeederImport) -> list[Law]:
     """Return the laws of the parts of a load's phase, which takes this power (VA) before it is scaled."""
     model, V_min, V_max = int(load.Model), float(load.Vminpu), float(load.Vmaxpu)
 
@@ -128,7 +131,7 @@ def _laws(name: str, load: Any, V_low: float, S: complex, scale: float, problems
     if model == ZIP:
         z = [float(value) for value in load.ZIPV]
         if len(z) < 7:
-            problems.append(f"{name}: model=8 needs zipv with seven numbers, got {len(z)}")
+            found.refuse(name, f"model=8 needs zipv with seven numbers, got {len(z)}")
             return []
         S *= scale
         shares = [(complex(S.real * z[k], S.imag * z[k + 3]), n) for k, n in ((0, 2.0), (1, 1.0), (2, 0.0))]
@@ -142,7 +145,7 @@ def _laws(name: str, load: Any, V_low: float, S: complex, scale: float, problems
         ]
     exponents = (float(load.CVRwatts), float(load.CVRvars)) if model == CVR else EXPONENTS.get(model)
     if exponents is None:
-        problems.append(f"{name}: model={model} is not supported; the models are 1 to 8")
+        found.refuse(name, f"model={model} is not supported; the models are 1 to 8")
         return []
     return [law(S * scale, exponents, edge=1.0 if model == 5 else 0.0)]
 
@@ -156,7 +159,7 @@ GENERATOR_LAWS = {2: "impedance", 3: "no limits", 4: "own Q", 5: "own X", 7: "li
 CLOSE = 1e-6  # largest difference between the engine's current and that of the parts, beside the largest current
 
 
-def read_generation(engine: DssEngine, name: str, notes: list[str], problems: list[str]) -> list[LoadPart]:
+def read_generation(engine: DssEngine, name: str, bus_names: Mapping[str, str], found: FeederImport) -> list[LoadPart]:
     """Return the parts of an element of `GENERATION`: loads of negative power, the same in each phase.
 
     The power is that of the engine's solution, the law beyond `vminpu` and `vmaxpu` that of the element's model.
@@ -172,9 +175,9 @@ def read_generation(engine: DssEngine, name: str, notes: list[str], problems: li
     V, current = complexes(element.Voltages), complexes(element.Currents)
     total = complex(-np.sum(V * np.conj(current)))
     if abs(total) < 1.0:
-        notes.append(f"{name}: delivers nothing; left out")
+        found.notes.append(f"{name}: delivers nothing; left out")
         return []
-    branches = branches_of(element, float(read("kv")), is_delta=read("conn").startswith(("d", "l")))
+    branches = branches_of(element, float(read("kv")), bus_names, is_delta=read("conn").startswith(("d", "l")))
     across = branches.across(V)
     kind = GENERATOR_LAWS.get(int(read("model") or 1), "")
     if not name.startswith("generator."):  # the engine does not limit the current of Storage, whatever it says
@@ -207,13 +210,14 @@ def read_generation(engine: DssEngine, name: str, notes: list[str], problems: li
         of_parts[start] -= delivered
         of_parts[end] += delivered
     if np.abs(of_parts - current).max() > CLOSE * np.abs(current).max():
-        problems.append(
-            f"{name}: delivers no constant power, or not the same in each phase (another "
-            f'control); leave it out (leave_out=["{name}"]) or put an inverter there'
+        found.refuse(
+            name,
+            "delivers no constant power, or not the same in each phase (another "
+            f'control); leave it out (leave_out=["{name}"]) or put an inverter there',
         )
         return []
     kW, kvar = (round(power / 1e3, 3) + 0.0 for power in (total.real, total.imag))
     words = "as an impedance" if kind == "impedance" else "constant"
-    notes.append(f"{name}: delivers the {kW:g} kW and {kvar:g} kvar of the snapshot, {words}")
+    found.notes.append(f"{name}: delivers the {kW:g} kW and {kvar:g} kvar of the snapshot, {words}")
     usual = float(np.abs(across).max()) / branches.V_nom
     return branches.parts(name, laws, cut_off(usual) if total.real > 0.0 else 0.0)

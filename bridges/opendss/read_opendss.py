@@ -7,15 +7,21 @@ transformers of any connection; loads come over by the law of their `model`. Wha
 
 from __future__ import annotations
 
+import atexit
+import signal
 from collections.abc import Sequence
 from pathlib import Path
 
-import msgspec
-
-from gridpeers.bridges.import_checks import MATCH, checked, difference, number_of, refuse_if, with_plain_names
-from gridpeers.bridges.opendss.dss_circuit import ImportRequest
-from gridpeers.bridges.opendss.dss_process import circuit_of
+from gridpeers.bridges.engine_process import EngineError, EngineProcess
+from gridpeers.bridges.feeder_import import FeederImport, file_of, number_of
 from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.tables.read import FeederError
+from gridpeers.wire.wording import damaged, printable
+
+ENGINE = EngineProcess("gridpeers.bridges.opendss.dss_circuit", "dss", "the OpenDSS engine", ".dss", "opendss")
+atexit.register(ENGINE.close)
+
+SHOWN = 100  # letters of a command that an error shows
 
 
 def read_opendss(
@@ -25,16 +31,31 @@ def read_opendss(
 
     Its `notes` list what was done instead of what the script says.
     """
-    path = Path(path).absolute()
-    circuit = circuit_of(ImportRequest(str(path), f_nom, list(leave_out), list(switches)))
-    feeder = checked(path, circuit.feeder, circuit.problems, "ground a winding, or leave ppm_antifloat as it is")
-    if not circuit.left_out:
-        try:
-            worst, (bus, letter) = difference(feeder, circuit.V)
-        except ArithmeticError as error:
-            refuse_if(path, [f"{path.name}: the engine solves it, our {error}"])
-        if worst > MATCH:
-            where = f"most at {bus}.{number_of(letter)}"
-            told = f"{path.name}: our power flow differs from the engine's by {worst:.2g} pu, {where}"
-            feeder = msgspec.structs.replace(feeder, notes=(*feeder.notes, told))
-    return with_plain_names(feeder, circuit.added)
+    path = file_of(path)
+    try:
+        found: FeederImport = ENGINE.read(path, f_nom=f_nom, leave_out=list(leave_out), switches=list(switches))
+    except EngineError as error:
+        if not error.ended:
+            raise
+        text = crashed(str(error), error.at, path.name)
+        raise FeederError(path.name, (text,)) from None
+    remedy = "ground a winding, or leave ppm_antifloat as it is"
+    return found.checked("the engine", remedy, number_of, strict=False)
+
+
+def crashed(how: str, at: str, name: str) -> str:
+    """Return one line on an engine that ended while it read a script, or was loaded, where `at` is empty.
+
+    >>> crashed("was killed by SIGSEGV", "lines.dss:3: New Line.x", "Master.dss")
+    'lines.dss:3: the OpenDSS engine itself crashes (its process was killed by SIGSEGV); change this, or take it out; \
+if it is sound, take out what comes before it, half by half, to find the cause: New Line.x'
+    """
+    if not at:
+        return damaged("dss", f"its process {how}", "the import of .dss files")
+    where, _, command = printable(at).partition(": ")
+    memory = ", as where memory runs out" if signal.SIGKILL.name in how else ""
+    shown = command if len(command) <= SHOWN else f"{command[:SHOWN]}..."
+    return (
+        f"{where or name}: the OpenDSS engine itself crashes (its process {how}{memory}); change this, or take it out; "
+        f"if it is sound, take out what comes before it, half by half, to find the cause: {shown}"
+    )

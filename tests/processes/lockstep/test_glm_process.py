@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-WAITING = """import os, signal, sys
+WAITING = """import os, signal
 with open(os.environ["TOLD"], "w") as told:
-    told.write(f"{os.getpid()} {os.path.dirname(sys.argv[2])}")
+    told.write(f"{os.getpid()} {os.getcwd()}")
 signal.pause()
 """
 """A package gridlabd that tells its process and folder, and then loads for ever."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from gridpeers.bridges.gridlabd.glm_elements import voltages_of
-from gridpeers.bridges.gridlabd.gridlabd_process import solved_model
-from gridpeers.bridges.gridlabd.read_glm import read_glm
+from gridpeers.bridges.gridlabd.glm_text import GlmText
+from gridpeers.bridges.gridlabd.read_glm import read_glm, solved_model
 from gridpeers.plant.network import Network, solve_power_flow
 
 TOLERANCE = 1e-6  # largest difference that the tests allow (pu of nominal voltage)
@@ -135,7 +135,7 @@ def write(folder: Path, text: str, name: str = "feeder.glm") -> Path:
 
 def gridlabd_voltages(path: Path) -> dict[tuple[str, str], complex]:
     """Voltage (V) of each node as GridLAB-D has it; A and B are the legs of a split-phase service."""
-    buses = solved_model(path)["buses"]
+    buses = solved_model(path, GlmText(path))["buses"]
     return {(bus["name"], letter): V for bus in buses for letter, V in voltages_of(bus).items()}
 
 

@@ -140,7 +140,7 @@ def test_voltages_that_are_not_gridlabds_are_refused(
 ) -> None:
     """A model is refused where our power flow differs by more than the limit, also without its players."""
     (tmp_path / "p.csv").write_text("2000-01-01 00:00:00,9e3+1e3j\n")
-    monkeypatch.setattr("gridpeers.bridges.gridlabd.read_glm.MATCH", 0.0)
+    monkeypatch.setattr("gridpeers.bridges.feeder_import.MATCH", 0.0)
 
     (problem,) = problems(write(tmp_path, model), leave_out=leave_out)
 

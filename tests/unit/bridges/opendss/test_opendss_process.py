@@ -10,7 +10,7 @@ from unittest.mock import Mock
 
 import pytest
 
-from gridpeers.bridges.opendss import dss_process, read_opendss
+from gridpeers.bridges.opendss.read_opendss import ENGINE, read_opendss
 from gridpeers.plant.request_process import RequestProcess
 from gridpeers.plant.tables.read import FeederError
 from tests.command_line import invoke
@@ -36,11 +36,11 @@ class DSS:
 @pytest.fixture
 def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A file that stands in the place of the package dss, in a process that begins and ends with the test."""
-    dss_process.close_engine()
+    ENGINE.close()
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     monkeypatch.syspath_prepend(tmp_path)
     yield tmp_path / "dss.py"
-    dss_process.close_engine()
+    ENGINE.close()
 
 
 def problem(path: Path) -> str:
@@ -89,7 +89,7 @@ def test_a_damaged_wheel_is_one_line(tmp_path: Path, package: Path, damage: str,
 
 def engine() -> tuple[Path, Path]:
     """Files that tell whether the engine's process, and its folder, are there."""
-    process = Path(f"/proc/{dss_process._processes[os.getpid()][0].pid}")  # noqa: SLF001
+    process = Path(f"/proc/{ENGINE._running[os.getpid()][0].pid}")  # noqa: SLF001
     return process, (process / "cwd").readlink()
 
 
@@ -127,14 +127,14 @@ def test_a_full_disk_is_not_a_crash_of_the_engine(tmp_path: Path) -> None:
     pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")
     path = write(tmp_path, LINE)
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    dss_process.close_engine()
+    ENGINE.close()
     resource.setrlimit(resource.RLIMIT_FSIZE, (1024, before[1]))
     try:
         text = problem(path)
         assert list(engine()[1].iterdir()) == []
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
-        dss_process.close_engine()
+        ENGINE.close()
 
     assert text.startswith(f"{path.name}: what the OpenDSS engine reads cannot be written in {tempfile.gettempdir()} (")
     assert "File too large" in text
