@@ -14,15 +14,14 @@ import pandas as pd
 
 from gridpeers.lab.replay.changes import ChangedRule, Changes, changed_rule
 from gridpeers.lab.replay.closed_loop import ClosedLoop
-from gridpeers.lab.replay.recorded_process import ReplayError, start_plant_of
-from gridpeers.lab.replay.replay import ComparedRows, record_of
+from gridpeers.lab.replay.recorded_process import ReplayError
+from gridpeers.lab.replay.replay import ComparedRows, record_of, run_again
 from gridpeers.plant.build import start_plant
 from gridpeers.runs.comparison import Comparison
 from gridpeers.runs.result import Result, shown_in_notebooks
 from gridpeers.runs.run_folder import RunFolder, new_home
 from gridpeers.runs.running import read, warn_of_laws
 from gridpeers.scenario import plain
-from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.live.live_report import write_report
 from gridpeers.scenarios.record.record_info import LIVE
 from gridpeers.scenarios.record.record_reader import RunRecord
@@ -125,9 +124,9 @@ class Counterfactual:
                 tell(rule.case, 0.0, record.t_end)
             notes = run(record, rule, take)
             recorded = recorder.finish(recorder.ended, recorder.record_step)
-        if changes and effect.difference is None:
-            notes = [*notes, f"the change made no difference: every row up to {effect.t:.2f} s is as recorded"]
-        self.difference, self.compared, self.notes = rows.difference, rows.count, tuple(notes)
+        if changes and effect.part.difference is None:
+            notes = [*notes, f"the change made no difference: every row up to {effect.part.t_end:.2f} s is as recorded"]
+        self.difference, self.compared, self.notes = rows.part.difference, rows.part.count, tuple(notes)
         """The first row of the plant before the change that differs from the record (there should be none); the number
         of rows compared; sentences on effects that are left out, or that the change had none."""
         _write(record, rule, rule.scenario, would_be.path, recorded, would_be=True)
@@ -181,23 +180,10 @@ def _in_real_time(record: RunRecord, rule: ChangedRule, take: Take) -> list[str]
 
 def _in_simulated_time(record: RunRecord, rule: ChangedRule, take: Take) -> list[str]:
     """Run a scenario in simulated time again: messages are late and lost by their numbers, so as they were."""
-    info = record.info
     links = {} if rule.links is None else {"links": rule.links}
     control = {} if rule.control is None else {"control": rule.control}
-    plant = start_plant_of(info, start_plant)
-    try:
-        outcome = run_inprocess(
-            msgspec.structs.replace(info.plant, record="physics", **links),
-            [msgspec.structs.replace(agent, record="physics", **links, **control) for agent in info.agents],
-            take,
-            on_other=take,
-            plant=plant,
-        )
-    except ValueError as error:
-        raise ReplayError(f"the run cannot be made again here: {error}") from None
-    finally:
-        plant.close()
-    return [f"the run would have broken: {outcome.broke}"] if outcome.broke else []
+    broke = run_again(record, take, start_plant, of_agents=links | control, **links)
+    return [f"the run would have broken: {broke}"] if broke else []
 
 
 def _as_recorded(record: RunRecord, folder: Path, until: float) -> Recorded:

@@ -9,11 +9,13 @@ of each agent from the states that it had heard by its record.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from heapq import merge
+from itertools import zip_longest
 from math import inf, isnan
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from msgspec.structs import replace
@@ -53,14 +55,24 @@ TOLERANCE = 1e-9
 UNITS = {"P": "W", "Q": "var", "V": "V", "f": "Hz", "P_set": "W", "V_set": "V", "t": "s"}
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass
 class ReplayedPart:
     name: str
-    count: int
-    """Number of states of an agent, or of rows of the plant, that were compared."""
-    t_end: float
-    difference: Difference | None
     note: str = ""
+    count: int = 0
+    """Number of states of an agent, or of rows of the plant, that were compared."""
+    t_end: float = 0.0
+    difference: Difference | None = None
+
+    @property
+    def is_over(self) -> bool:
+        return bool(self.note) or self.difference is not None
+
+    def compare(self, t: float, difference: Difference | None) -> None:
+        """Note that a state, or a row, of a run time (s) was compared."""
+        self.difference = difference
+        if difference is None:
+            self.count, self.t_end = self.count + 1, t
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,7 +103,7 @@ def replay(run: Result | RunRecord | str | Path, make_plant: MakePlant | None = 
     found = list((_in_simulated_time if record.info.simulated else _in_real_time)(record, make_plant if own else None))
     if not own:
         note = "the physics was not replayed: it was not that of our plant alone"
-        found.append(ReplayedPart(name=PLANT, count=0, t_end=0.0, difference=None, note=note))
+        found.append(ReplayedPart(PLANT, note))
     names = [PLANT, *in_order({part.name for part in found} - {PLANT})]
     return Replay(parts=tuple(sorted(found, key=lambda part: names.index(part.name))))
 
@@ -178,9 +190,12 @@ def _in_real_time(record: RunRecord, make_plant: MakePlant | None) -> Iterator[R
                 again = plant_again(process, record.info, plant, recorded_links(record.info, PLANT))
                 replays.append(_PlantReplay(record, process, again))
         for _, number, step in merge(*(_by_time(number, each) for number, each in enumerate(replays))):
-            if not replays[number].is_over:
+            if not replays[number].part.is_over:
                 replays[number].take(step)
-        yield from (each.result() for each in replays)
+        for each in replays:
+            each.end()
+            each.part.note = each.part.note or each.process.ends
+            yield each.part
     finally:
         close_laws(laws)
         if plant is not None:
@@ -189,7 +204,7 @@ def _in_real_time(record: RunRecord, make_plant: MakePlant | None) -> Iterator[R
 
 def _by_time(number: int, replay: _PlantReplay | _AgentReplay) -> Iterator[tuple[float, int, RecordedStep]]:
     for step in replay.process.steps():
-        if replay.is_over:
+        if replay.part.is_over:
             return
         yield step.due, number, step
 
@@ -198,42 +213,31 @@ class _AgentReplay:
     """An agent, given the calls of its journal; its states are compared."""
 
     def __init__(self, record: RunRecord, process: RecordedProcess, laws: list[Law]) -> None:
-        self.process, self._info, self._laws = process, record.info, laws
+        self.process, self.part, self._info, self._laws = process, ReplayedPart(process.name), record.info, laws
         self._again: ReplayedProcess | None = None
-        self._count, self._t, self._note = 0, 0.0, ""
-        self._difference: Difference | None = None
-
-    @property
-    def is_over(self) -> bool:
-        return bool(self._note) or self._difference is not None
 
     def take(self, step: RecordedStep) -> None:
-        name = self.process.name
+        name, part = self.process.name, self.part
         if self._again is None:
             config = self._info.agent(name)
             if config is None or not step.instance:
-                self._note = f"the record lacks the start of {name}, or its configuration: it was not replayed"
+                part.note = f"the record lacks the start of {name}, or its configuration: it was not replayed"
                 return
             links = recorded_links(self._info, name)
             self._again = agent_again(self.process, config, step.instance, self._laws, links)
         message = self.process.message(step)
         if message is None and step.is_arrival:
-            self._note = f"the record lacks a message that {name} heard at t = {step.t:.2f} s; it was replayed to there"
+            part.note = f"the record lacks a message that {name} heard at t = {step.t:.2f} s; it was replayed to there"
             return
         ours = [decoded for sent in self._again.take(step, message) if (decoded := tick_message(sent)) is not None]
         theirs = [decoded for sent in step.sent if (decoded := tick_message(sent)) is not None]
-        for i in range(len(theirs) if step.last else max(len(ours), len(theirs))):
-            a, b = (each[i] if i < len(each) else None for each in (theirs, ours))
-            self._difference = message_difference(a, b)
-            if self._difference is not None or b is None:
+        for a, b in zip_longest(theirs, ours[: len(theirs)] if step.last else ours):
+            part.compare((a or b).t, message_difference(a, b))
+            if part.difference is not None:
                 return
-            self._count, self._t = self._count + 1, b.t
 
-    def result(self) -> ReplayedPart:
-        note = self._note or self.process.ends
-        return ReplayedPart(
-            name=self.process.name, count=self._count, t_end=self._t, difference=self._difference, note=note
-        )
+    def end(self) -> None:
+        pass
 
 
 class _PlantReplay:
@@ -241,17 +245,13 @@ class _PlantReplay:
 
     def __init__(self, record: RunRecord, process: RecordedProcess, again: ReplayedProcess) -> None:
         self.process, self._again, self._rows = process, again, ComparedRows(record)
-
-    @property
-    def is_over(self) -> bool:
-        return self._rows.difference is not None
+        self.part = self._rows.part
 
     def take(self, step: RecordedStep) -> None:
         self._compare(self._again.take(step, self.process.message(step)))
 
-    def result(self) -> ReplayedPart:
+    def end(self) -> None:
         self._compare(self._again.end())
-        return self._rows.part(self.process.ends)
 
     def _compare(self, sent: list[Message]) -> None:
         for message in sent:
@@ -270,8 +270,7 @@ class ComparedRows:
         self._rows = ((message.inverters, row) for message in record.telemetry() for row in message.rows)
         self._next: tuple[tuple[str, ...], tuple[float, ...]] | None = next(self._rows, None)
         self._numbers = -1
-        self.count, self.t = 0, 0.0
-        self.difference: Difference | None = None
+        self.part = ReplayedPart(PLANT)
 
     def take(self, message: AnyMessage) -> None:
         """Compare the rows of telemetry that come again; some may be missing in the record."""
@@ -281,15 +280,11 @@ class ComparedRows:
         for row in message.rows:
             while self._next is not None and self._next[1][0] < row[0] - 1e-9:
                 self._next = next(self._rows, None)
-            if self._next is None or self.difference is not None or row[0] > self._until + 1e-9:
+            if self._next is None or self.part.difference is not None or row[0] > self._until + 1e-9:
                 return
             inverters, recorded = self._next
             if recorded[0] <= row[0] + 1e-9:
-                self.difference = row_difference(inverters, recorded, row)
-                self.count, self.t = self.count + 1, row[0]
-
-    def part(self, note: str) -> ReplayedPart:
-        return ReplayedPart(name=PLANT, count=self.count, t_end=self.t, difference=self.difference, note=note)
+                self.part.compare(row[0], row_difference(inverters, recorded, row))
 
 
 # -------------------------------------------------------------------- simulated time
@@ -297,49 +292,60 @@ class ComparedRows:
 
 def _in_simulated_time(record: RunRecord, make_plant: MakePlant | None) -> Iterator[ReplayedPart]:
     if make_plant is not None:
-        yield _physics(record, make_plant)
+        rows = ComparedRows(record)
+        T_c, end = record.info.plant.T_c, record.info.plant.end or inf
+        recorded = (int(record.t_end / T_c) + 1) * T_c  # a killed run may have been meant to go on
+        broke = run_again(record, rows.take, make_plant, end=min(end, recorded))
+        if not all(message.reproducible for message in record.telemetry()):
+            rows.part.note = (
+                "something happened in this run that its scenario does not tell, so it cannot be made again"
+            )
+        elif broke and record.outcome == "":
+            rows.part.note = f"the run breaks when it is made again: {broke}"
+        yield rows.part
     for agent in record.agents:
         yield _decisions(record, agent)
 
 
-def _physics(record: RunRecord, make_plant: MakePlant) -> ReplayedPart:
-    info, rows, plant = record.info, ComparedRows(record), start_plant_of(record.info, make_plant)
-    recorded = (int(record.t_end / info.plant.T_c) + 1) * info.plant.T_c  # a killed run may have been meant to go on
+def run_again(
+    record: RunRecord,
+    take: Callable[[Any], None],
+    make_plant: MakePlant,
+    *,
+    of_agents: Mapping[str, Any] = MappingProxyType({}),
+    **of_plant: Any,
+) -> str:
+    """Run a scenario in simulated time again, with other values of configurations; return why it broke, if it did."""
+    info, plant = record.info, start_plant_of(record.info, make_plant)
     try:
         outcome = run_inprocess(
-            replace(info.plant, record="physics", end=min(info.plant.end or inf, recorded)),
-            [replace(agent, record="physics") for agent in info.agents],
-            rows.take,
+            replace(info.plant, record="physics", **of_plant),
+            [replace(agent, record="physics", **of_agents) for agent in info.agents],
+            take,
+            on_other=take,
             plant=plant,
         )
     except ValueError as error:
         raise ReplayError(f"the run cannot be made again here: {error}") from None
     finally:
         plant.close()
-    note = ""
-    if not all(message.reproducible for message in record.telemetry()):
-        note = "something happened in this run that its scenario does not tell, so that it cannot be made again"
-    elif outcome.broke and record.outcome == "":
-        note = f"the run breaks when it is made again: {outcome.broke}"
-    return rows.part(note)
+    return outcome.broke
 
 
 def _decisions(record: RunRecord, agent: str) -> ReplayedPart:
-    count, t = 0, 0.0
+    part = ReplayedPart(agent)
     hole = min((since for since, _ in record.holes(agent)), default=inf)
     try:
         for each in recomputed(record, agent):
             if each.decision.t > hole:  # its law may have a memory, of which nothing is known behind a hole
                 break
-            difference = message_difference(each.decision.state, each.state)
-            if difference is not None:
-                return ReplayedPart(name=agent, count=count, t_end=t, difference=difference)
-            count, t = count + 1, each.decision.t
+            part.compare(each.decision.t, message_difference(each.decision.state, each.state))
+            if part.difference is not None:
+                return part
     except RecordFileError:
         raise
     except ValueError as error:
         raise ReplayError(f"{agent}: its law cannot be made here: {error}") from None
-    note = ""
-    if record.damage and t < record.t_end - 1.5 * record.info.T_c:
-        note = "the record lacks later decisions of some agents, so that these were not compared"
-    return ReplayedPart(name=agent, count=count, t_end=t, difference=None, note=note)
+    if record.damage and part.t_end < record.t_end - 1.5 * record.info.T_c:
+        part.note = "the record lacks later decisions of some agents, so that these were not compared"
+    return part

@@ -176,15 +176,16 @@ def test_rows_are_compared_up_to_a_time(record: RunRecord) -> None:
     rows = ComparedRows(record, until=0.5)
     for message in (*messages[:3], *messages):
         rows.take(message)
-    assert (rows.count, rows.t) == (26, pytest.approx(0.5))
-    assert rows.difference is None
+    assert (rows.part.count, rows.part.t_end) == (26, pytest.approx(0.5))
+    assert rows.part.difference is None
 
     changed = ComparedRows(record)
     for message in messages:
         changed.take(raised(message, 0.3))
-    assert changed.difference is not None
-    assert (changed.difference.t, changed.difference.quantity) == (pytest.approx(0.3), "f")
-    assert changed.count == 16
+    difference = changed.part.difference
+    assert difference is not None
+    assert (difference.t, difference.quantity) == (pytest.approx(0.3), "f")
+    assert changed.part.count == 15
 
 
 def raised(message: Telemetry, t: float) -> Telemetry:
