@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import inf, isfinite
+from math import isfinite
 from typing import Literal
 
 from gridpeers.agents.laws.law import Neighbour, Term
@@ -68,28 +68,22 @@ class Explanation:
         return text_of(self)
 
 
-def explain(record: RunRecord, agent: str, t: float, events: tuple[PlantEvent, ...] | None = None) -> Explanation:
-    """Explain the decision of an agent that was in force at a run time (s).
-
-    `events` are those of the record, if they are known already: to read them takes its whole file.
-    """
+def explain(record: RunRecord, agent: str, t: float) -> Explanation:
+    """Explain the decision of an agent that was in force at a run time (s)."""
     if agent not in record.agents:
         raise RecordFileError(f"{record.path}: there was no agent {agent!s:.64}; agents are {short(record.agents)}")
-    return explained(record, record.decision(agent, t), t, events)
+    return explained(record, record.decision(agent, t), t)
 
 
-def explained(
-    record: RunRecord, decision: RecordedDecision, asked: float, events: tuple[PlantEvent, ...] | None = None
-) -> Explanation:
-    events = record.events() if events is None else events
-    step = law_step(record, decision)
+def explained(record: RunRecord, decision: RecordedDecision, asked: float) -> Explanation:
+    events = record.events()
     return Explanation(
         scenario=record.info.scenario,
         case=record.info.case,
         asked=asked,
         decision=decision,
         neighbours=_accounts(record, decision, events),
-        step=step,
+        step=law_step(record, decision),
         events=tuple(
             event
             for event in events
@@ -105,16 +99,16 @@ def _accounts(
     record: RunRecord, decision: RecordedDecision, events: tuple[PlantEvent, ...]
 ) -> tuple[NeighbourAccount, ...]:
     usual = (1.5 if decision.config.clock == "simulated" else 2.5) * decision.config.T_c
-    old = [each for each in decision.neighbours if each.age is None or each.age > usual]
-    begin = min((0.0 if each.state is None else each.state.t for each in old), default=decision.t)
+    old = {each.name for each in decision.neighbours if each.age is None or each.age > usual}
+    since = (0.0 if each.state is None else each.state.t for each in decision.neighbours if each.name in old)
+    begin = min(since, default=decision.t)
     fates = verdicts(record, decision.agent, begin, decision.t) if old else {}
     rejected = rejections(record, decision.agent, begin, decision.t) if old else {}
     seen = {each.name: each for each in decision.neighbours_used}
     accounts = []
     for each in decision.neighbours:
-        why = "; ".join(filter(None, (reason(record, decision, each), each.lie)))
-        if any(each is other for other in old):
-            why = "; ".join(filter(None, (why, missed(record, decision, each, fates, rejected))))
+        late = missed(record, decision, each, fates, rejected) if each.name in old else ""
+        why = "; ".join(filter(None, (reason(record, decision, each), each.lie, late)))
         accounts.append(NeighbourAccount(name=each.name, input=each, seen=seen.get(each.name), why=why))
     for name in decision.not_met:
         why = "idle agents hear nobody" if decision.action == "idle" else absence(decision, name, events)
@@ -132,23 +126,17 @@ SILENT = 10
 def aftermath(
     record: RunRecord, decision: RecordedDecision, asked: float, events: Sequence[PlantEvent]
 ) -> tuple[str, ...]:
-    """Return in sentences what happened between a decision and a later run time (s) for which there is no other one.
-
-    Empty if the decision is of that time.
-    """
+    """Return in sentences what happened between a decision and a later run time (s) for which there is no other one."""
     T_c = decision.config.T_c
     if asked - decision.t <= 1.5 * T_c:
         return ()
     about = [
-        event
+        event.text
         for event in events
         if event.kind == "roster" and event.subject == decision.agent and decision.t - T_c < event.t <= asked + 1e-9
     ]
-    last = f"it is the last decision before {asked:g} s"
-    if not about and asked - decision.t < SILENT * T_c:
-        return (last,)
-    last += f": {about[-1].text}" if about else ""
-    values = _row(record, decision.agent, asked)
+    last = ": ".join([f"it is the last decision before {asked:g} s", *about[-1:]])
+    values = _row(record, decision.agent, asked) if about or asked - decision.t >= SILENT * T_c else None
     if values is None:
         return (last,)
     _, P, Q, _, P_set, V_set = values
@@ -279,25 +267,19 @@ def rejections(record: RunRecord, agent: str, since: float, until: float) -> Rej
 
 
 def missed(
-    record: RunRecord,
-    decision: RecordedDecision,
-    each: NeighbourInput,
-    fates: Fates,
-    rejected: Rejections,
+    record: RunRecord, decision: RecordedDecision, each: NeighbourInput, fates: Fates, rejected: Rejections
 ) -> str:
     """Return in words what became of a neighbour's states after the last one that was heard.
 
-    Examples of the result: "48 states since: 48 cut off by a partition"; "no state since". Nobody
-    knows the sender of a rejected message without a number. It counts as one of the states whose fate nothing else
-    tells, as long as there are any.
+    Nobody knows the sender of a rejected message without a number. It counts as one of the states whose fate nothing
+    else tells, as long as there are any.
     """
     since = 0.0 if each.state is None else each.state.t
     last = -1 if each.number is None else each.number
-    T = decision.config.T_c
     counts: Counter[str] = Counter()
-    for message in record.messages(each.name, since=since, until=decision.t - 0.5 * T, kind="State"):
+    for message in record.messages(each.name, since=since, until=decision.t - 0.5 * decision.config.T_c, kind="State"):
         if message.number > last or (each.state is not None and message.epoch != each.state.epoch):
-            counts[_fate(message, decision.t, fates)] += 1
+            counts[_fate(message, fates)] += 1
     others: Counter[str] = Counter()
     for number, kind, count in sorted(rejected.get(each.name, ()), reverse=True):
         if number > last or (number < 0 and kind != "stale"):  # a stale one is older than the last one heard
@@ -314,41 +296,35 @@ def missed(
     return "; ".join([text, *strange])
 
 
-def _fate(message: MessageOnWire, now: float, fates: Fates) -> str:
-    """Return why a state had not been heard by now (s of run time): a key of `WORDS`, or empty if nothing tells."""
+def _fate(message: MessageOnWire, fates: Fates) -> str:
+    """Return why a state has not been heard: a key of `WORDS`, or empty if nothing tells."""
     if isinstance(message.message, State) and (message.message.quiet or message.message.idle):
         return "quiet" if message.message.quiet else "idle"
     judged = [outcome for t, outcome in fates.get((message.sender, message.number), ()) if abs(t - message.t) < 1.0]
-    if not judged:
-        return ""
-    outcome = judged[-1]
+    outcome = judged[-1] if judged else ""
     if isinstance(outcome, str):
         return outcome
     sound = [delay for delay, bit in copies_of(outcome) if bit is None]
-    if not sound:
-        return "damaged"
-    return "late" if isfinite(min(sound, default=inf)) else "kept"
+    return "damaged" if not sound else "late" if isfinite(min(sound)) else "kept"
 
 
 def reason(record: RunRecord, decision: RecordedDecision, each: NeighbourInput) -> str:
-    options = decision.config.control.degraded_communication
+    options, here = decision.config.control.degraded_communication, decision.measurement.island
     if each.unused == "silent":
         return "no state of it was heard"
     if each.unused == "stale":
-        most = options.max_age or decision.config.max_age
-        return f"stale: older than max_age = {most:g} s"
-    if each.unused == "island":
-        here = decision.measurement.island
-        if here == OFF:
-            return "the own inverter is out of service"
-        if each.state is not None and each.state.island == OFF:
-            return "its inverter is out of service"
-        if options.islands == "frequency" or each.state is None:
-            return "in another island: its angle drifts"
-        if _island_at(record, decision, each.state.t) == each.state.island:
-            return f"its last state is from before the own island changed from {each.state.island} to {here}"
-        return f"in another island: {each.state.island}, not {here}"
-    return "" if each.weight > 0.0 else "its state is not new: weight 0"
+        return f"stale: older than max_age = {options.max_age or decision.config.max_age:g} s"
+    if each.unused != "island":
+        return "" if each.weight > 0.0 else "its state is not new: weight 0"
+    if here == OFF:
+        return "the own inverter is out of service"
+    if each.state is not None and each.state.island == OFF:
+        return "its inverter is out of service"
+    if options.islands == "frequency" or each.state is None:
+        return "in another island: its angle drifts"
+    if _island_at(record, decision, each.state.t) == each.state.island:
+        return f"its last state is from before the own island changed from {each.state.island} to {here}"
+    return f"in another island: {each.state.island}, not {here}"
 
 
 def _island_at(record: RunRecord, decision: RecordedDecision, t: float) -> str:
@@ -363,6 +339,5 @@ def absence(decision: RecordedDecision, name: str, events: tuple[PlantEvent, ...
     """Return in words why an agent that the graph makes a neighbour was not met, from the last event about it."""
     if decision.config.clock == "simulated" and decision.restarted and not decision.neighbours:
         return "no state yet: at its first tick an agent has heard nobody"
-    about = [event for event in events if event.subject == name and event.t <= decision.t + 1e-9]
-    about = [event for event in about if event.kind == "roster"]
-    return f"not met: {about[-1].text}" if about else "not met: it was not there"
+    about = [e.text for e in events if (e.kind, e.subject) == ("roster", name) and e.t <= decision.t + 1e-9]
+    return f"not met: {about[-1] if about else 'it was not there'}"

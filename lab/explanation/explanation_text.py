@@ -17,22 +17,21 @@ SHOWN = 12
 _SIDES = {1: "cannot deliver more", -1: "cannot deliver less"}
 
 
-def text_of(explanation: Explanation, trails: Sequence[tuple[Quantity, tuple[TrailStep, ...]]] = ()) -> str:
+Trails = Sequence[tuple[Quantity, tuple[TrailStep, ...]]]
+
+
+def text_of(explanation: Explanation, trails: Trails = ()) -> str:
     return printed_text(lambda console: print_explanation(explanation, console, trails)).rstrip("\n")
 
 
-def show(
-    explanation: Explanation, console: Console, trails: Sequence[tuple[Quantity, tuple[TrailStep, ...]]] = ()
-) -> None:
+def show(explanation: Explanation, console: Console, trails: Trails = ()) -> None:
     if console.is_terminal:
         print_explanation(explanation, console, trails)
     else:
         console.print(text_of(explanation, trails), soft_wrap=True)
 
 
-def print_explanation(
-    explanation: Explanation, console: Console, trails: Sequence[tuple[Quantity, tuple[TrailStep, ...]]]
-) -> None:
+def print_explanation(explanation: Explanation, console: Console, trails: Trails) -> None:
     blocks = (
         *(_head(explanation), _neighbours(explanation), *_steps(explanation), _events(explanation)),
         *(_trail(quantity, steps) for quantity, steps in trails),
@@ -76,7 +75,7 @@ def _neighbours(it: Explanation) -> Iterator[RenderableType]:
     yield Text(f"{heard} of {len(it.neighbours)} {which}", style="bold")
     yield _table(
         ("neighbour", "age s", "weight", "P_set pu", "V_set pu", "Q pu", ""),
-        tuple(_neighbour(account) for account in it.neighbours),
+        tuple(map(_neighbour, it.neighbours)),
         left=(0, 6),
         styles=tuple("" if account.used and not account.why else "yellow" for account in it.neighbours),
     )
@@ -86,26 +85,27 @@ def _neighbour(account: NeighbourAccount) -> tuple[str, ...]:
     given = account.input
     age = "-" if given is None or given.age is None else f"{given.age:.3f}"
     weight = "-" if given is None else f"{given.weight:.3g}"
-    if given is None or given.state is None:
-        return account.name, age, weight, "-", "-", "-", account.why
-    state, plate = given.state, given.nameplate
-    values = (state.P_set / plate.P_rated, state.V_set / plate.V_nom, state.Q / plate.P_rated)
-    return account.name, age, weight, *(f"{value:.5f}" for value in values), account.why
+    values = ["-"] * 3
+    if given is not None and given.state is not None:
+        state, plate = given.state, given.nameplate
+        pu = state.P_set / plate.P_rated, state.V_set / plate.V_nom, state.Q / plate.P_rated
+        values = [f"{value:.5f}" for value in pu]
+    return account.name, age, weight, *values, account.why
 
 
 def _steps(it: Explanation) -> Iterator[list[RenderableType]]:
     decision, config = it.decision, it.decision.config
     bases = ("P_set", config.P_rated / 1e3, "kW"), ("V_set", config.V_nom, "V")
     if it.step is None:
-        scales = 1e3, 1.0
-        lines: list[RenderableType] = []
-        for (name, base, unit), scale, before, after in zip(
-            bases, scales, decision.before, decision.after, strict=True
-        ):
-            one, other = before / scale, after / scale
-            ends = f"{one:.2f} -> {other:.2f} {unit}, {one / base:.6f} -> {other / base:.6f} pu"
-            lines.append(Text.assemble((name, "bold"), f"  {ends}: no step of a law"))
-        yield lines
+        ends = zip(decision.before, decision.after, strict=True)
+        yield [
+            Text.assemble(
+                (name, "bold"),
+                f"  {before / scale:.2f} -> {after / scale:.2f} {unit}, "
+                f"{before / scale / base:.6f} -> {after / scale / base:.6f} pu: no step of a law",
+            )
+            for (name, base, unit), scale, (before, after) in zip(bases, (1e3, 1.0), ends, strict=True)
+        ]
         return
     for (name, base, unit), step, side in zip(bases, (it.step.P_set, it.step.V_set), decision.saturated, strict=True):
         yield _step(f"{name} of law {config.control.law.name}", step, base, unit, side)
