@@ -14,7 +14,7 @@ from math import inf
 from pathlib import Path
 from types import MappingProxyType
 
-from gridpeers.lab.communication.accounts import ArrivalAccount, ArrivalAccounts, Heal, Heals, Missing, TickAccounts
+from gridpeers.lab.communication.accounts import ArrivalAccounts, Heal, Heals, TickAccounts
 from gridpeers.lab.communication.record_pass import RecordSink, end_of, opened, read_into
 from gridpeers.lab.communication.sent_states import (
     DecidedStates,
@@ -53,64 +53,53 @@ class OldUse:
     last: float
 
 
-@dataclass(frozen=True, kw_only=True)
-class CommunicationSummary:
-    info: RecordInfo
-    t_end: float
-    unreadable: int
-    sent: Mapping[str, SentStates]
-    counts: Mapping[Link, LinkCounts]
-    unheard: Mapping[Link, Missing]
-    """Simulated time: decisions without the state of the tick before, by link; for those without faults."""
-    arrivals: Mapping[Link, Sequence[ArrivalAccount]]
-    """Real time: what came over each link, for each time in which both of its ends were there."""
-    dropped: Mapping[Link, int]
-    """Real time: how many states their receivers dropped unread."""
-    oldest: Mapping[Link, list[OldUse]]
-    """By link, the oldest value that was used, then the oldest one that was used later, and so on: ages fall."""
-    heals: list[Heal]
-
-
 def summarise(path: Path) -> CommunicationSummary:
     """Go through the file of a record once, twice if parts of it are lost; NotJudgedError if it has no decisions."""
     file = opened(path)
-    t_end = end_of(file)
-    sums = SummaryPass(file.info, t_end)
-    end = read_into(file, sums)
-    last = t_end - 2.0 * file.info.T_c
-    lost = {name: holes for name, found in end.holes.items() if (holes := [hole for hole in found if hole[0] < last])}
+    found = CommunicationSummary(file.info, end_of(file))
+    end = read_into(file, found)
+    last = found.t_end - 2.0 * file.info.T_c
+    lost = {name: holes for name, each in end.holes.items() if (holes := [hole for hole in each if hole[0] < last])}
     if lost:  # known only now, and left out the second time
-        sums = SummaryPass(file.info, t_end, lost)
-        read_into(opened(path), sums)
-    return sums.finish(end.unreadable)
+        found = CommunicationSummary(file.info, found.t_end, lost)
+        read_into(opened(path), found)
+    return found.finish(end.unreadable)
 
 
-class SummaryPass(RecordSink):
-    """One pass over a record that ends at t_end (s); `lost` has the parts of journals that an earlier pass missed."""
+class CommunicationSummary(RecordSink):
+    """What a pass over a record found; `lost` has the parts of journals that an earlier pass missed."""
 
     def __init__(
         self, info: RecordInfo, t_end: float, lost: Mapping[str, Sequence[Hole]] = MappingProxyType({})
     ) -> None:
-        self._info, self._t_end, self._lost = info, t_end, lost
+        self.info, self.t_end, self._lost = info, t_end, lost
         self._simulated = simulated = info.simulated
         speed = max(1.0, info.plant.speed)
         self._delay = DELAY_TICKS * info.T_c if simulated else DELAY * speed
         self._names = frozenset(info.agent_names)
-        self._sent: defaultdict[str, SentStates] = defaultdict(lambda: SentStates(simulated=simulated))
+        self.sent: defaultdict[str, SentStates] = defaultdict(lambda: SentStates(simulated=simulated))
         self._decided: dict[str, DecidedTicks | DecidedStates] = {}
-        self._ticks = TickAccounts(self._sent, info.T_c, lost.get(PLANT, ()))
+        self._ticks = TickAccounts(self.sent, info.T_c, lost.get(PLANT, ()))
         self._arrivals = ArrivalAccounts(PAUSE * speed, LINKED_WITHIN * speed)
-        self._heals = Heals(info, t_end, self._sent)
-        self._counts: dict[Link, LinkCounts] = {}
-        self._dropped: defaultdict[Link, int] = defaultdict(int)
-        self._oldest: defaultdict[Link, list[OldUse]] = defaultdict(list)
+        self._heals = Heals(info, t_end, self.sent)
+        self.unreadable = 0
+        self.counts: dict[Link, LinkCounts] = {}
+        self.unheard = self._ticks.missing
+        """Simulated time: decisions without the state of the tick before, by link; for those without faults."""
+        self.arrivals = self._arrivals.accounts
+        """Real time: what came over each link, for each time in which both of its ends were there."""
+        self.dropped: defaultdict[Link, int] = defaultdict(int)
+        """Real time: how many states their receivers dropped unread."""
+        self.oldest: defaultdict[Link, list[OldUse]] = defaultdict(list)
+        """By link, the oldest value that was used, then the oldest one that was used later, and so on: ages fall."""
+        self.heals: list[Heal] = []
         self._alike: dict[str, tuple[Uses, list[OldUse]]] = {}
         """By agent, the neighbours that its decision in force uses, and the last entries in `oldest` of their links. An
         agent for which quiet states change the ages from tick to tick is left out."""
         self._t = self._flushed = 0.0
 
     def take_state(self, agent: str, state: SentState) -> None:
-        if agent not in self._names or not self._sent[agent].put(state):
+        if agent not in self._names or not self.sent[agent].put(state):
             return
         self._of(agent).state(state)
         (self._ticks if self._simulated else self._arrivals).state(agent, state)
@@ -131,39 +120,29 @@ class SummaryPass(RecordSink):
             self._arrivals.heard(link, epoch, number)
 
     def take_dropped(self, link: Link, count: int) -> None:
-        self._dropped[link] += count
+        self.dropped[link] += count
 
     def take_renewed(self, agent: str, t: float) -> None:
         self._arrivals.renewed(agent, t)
 
     def take_counts(self, link: Link, counts: LinkCounts) -> None:
-        self._counts[link] = counts
+        self.counts[link] = counts
 
     def take_trace(self, trace: LinkTrace) -> None:
         self._heals.trace(trace)
 
     def finish(self, unreadable: int) -> CommunicationSummary:
         self._flush(inf)
-        return CommunicationSummary(
-            info=self._info,
-            t_end=self._t_end,
-            unreadable=unreadable,
-            sent=self._sent,
-            counts=self._counts,
-            unheard=self._ticks.missing,
-            arrivals=self._arrivals.accounts,
-            dropped=self._dropped,
-            oldest=self._oldest,
-            heals=self._heals.found(),
-        )
+        self.unreadable, self.heals = unreadable, self._heals.found()
+        return self
 
     def _of(self, agent: str) -> DecidedTicks | DecidedStates:
         if agent not in self._decided:
-            T_c = self._info.T_c
+            T_c = self.info.T_c
             self._decided[agent] = (
                 DecidedTicks(agent, T_c, self._lost.get(agent, ()))
                 if self._simulated
-                else DecidedStates(agent, T_c, self._sent[agent])
+                else DecidedStates(agent, T_c, self.sent[agent])
             )
         return self._decided[agent]
 
@@ -188,18 +167,18 @@ class SummaryPass(RecordSink):
         for use in used:
             self._note_age(state, use)
         if all(self._is_plain(use.age) for use in used):
-            self._alike[agent] = uses, [self._oldest[use.link][-1] for use in used]
+            self._alike[agent] = uses, [self.oldest[use.link][-1] for use in used]
 
     def _is_plain(self, age: float | None) -> bool:
-        return age is None or not 1.5 * self._info.T_c < age < inf
+        return age is None or not 1.5 * self.info.T_c < age < inf
 
     def _note_age(self, state: SentState, use: NeighbourUse) -> None:
         """Note the age of a value, counted from the last tick at which its sender kept it in force."""
         age = inf if use.age is None else use.age
         if not self._is_plain(age) and (number := use.number_at(state.number)) is not None:
-            kept = self._sent[use.link[0]].window_at(state.t).kept_until(number)
-            age = max(0.0, age - (kept - number) * self._info.T_c)
-        old = self._oldest[use.link]
+            kept = self.sent[use.link[0]].window_at(state.t).kept_until(number)
+            age = max(0.0, age - (kept - number) * self.info.T_c)
+        old = self.oldest[use.link]
         while old and old[-1].age < age:
             old.pop()
         if old and old[-1].age == age:

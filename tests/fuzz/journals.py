@@ -9,7 +9,7 @@ from typing import Any, cast
 import msgspec
 from msgspec.structs import replace
 
-from gridpeers.lab.communication.communication_summary import SummaryPass
+from gridpeers.lab.communication.communication_summary import CommunicationSummary
 from gridpeers.lab.communication.record_pass import read_into
 from gridpeers.netem.ledger import LinkTrace
 from gridpeers.scenarios.emulation.link_data import report_data
@@ -56,9 +56,9 @@ def link_report(receiver: str, *traces: LinkTrace) -> LinkReport:
 
 def judged(
     parts: Iterable[tuple[str, bytes]], reports: Iterable[LinkReport] = (), *, clock: str
-) -> tuple[SummaryPass, int]:
+) -> tuple[CommunicationSummary, int]:
     file = JournalFile(parts, reports, clock=clock)
-    sums = SummaryPass(file.info, file.t_end)
+    sums = CommunicationSummary(file.info, file.t_end)
     return sums, read_into(cast(RecordFile, file), sums).unreadable
 
 

@@ -9,7 +9,7 @@ import msgspec
 import pytest
 
 from gridpeers.lab.communication import record_pass
-from gridpeers.lab.communication.communication_summary import SummaryPass
+from gridpeers.lab.communication.communication_summary import CommunicationSummary
 from gridpeers.lab.communication.sent_states import SentState
 from gridpeers.scenarios.checks.check_verdict import NotJudgedError
 from gridpeers.scenarios.checks.checked_case import CheckedCase
@@ -99,7 +99,7 @@ def test_the_memory_of_a_pass_does_not_grow_with_the_run(sound: CheckedCase, clo
 
     def memory(ticks: int) -> int:
         tracemalloc.start()
-        sums = SummaryPass(info, ticks * info.T_c)
+        sums = CommunicationSummary(info, ticks * info.T_c)
         for number in range(ticks):
             for agent in NAMES:
                 sums.take_state(agent, SentState(number, number * info.T_c, 1, idle=False, quiet=number % 3 == 1))

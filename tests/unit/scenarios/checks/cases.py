@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 import gridpeers as gp
-from gridpeers.lab.communication.communication_summary import SummaryPass
+from gridpeers.lab.communication.communication_summary import CommunicationSummary
 from gridpeers.lab.communication.record_pass import RecordContent
 from gridpeers.scenarios.checks.check_registry import chosen_checks
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict
@@ -41,7 +41,7 @@ def changed(case: CheckedCase, edit: Callable[[dict[str, np.ndarray[Any, Any]]],
 def with_content(case: CheckedCase, content: RecordContent, *, late: float = 0.0) -> CheckedCase:
     """A case whose record has something else in it, in the order of time; of agents' journals, some time (s) late."""
     other = replace(case)
-    sums = SummaryPass(content.info, content.t_end, content.holes)
+    sums = CommunicationSummary(content.info, content.t_end, content.holes)
     of: dict[tuple[str, int, int], float] = {}
     entries: list[tuple[float, int, Callable[[], None]]] = []
     for agent, states in content.states.items():
