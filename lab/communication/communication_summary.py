@@ -13,9 +13,10 @@ from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 from types import MappingProxyType
+from typing import Self
 
 from gridpeers.lab.communication.accounts import ArrivalAccounts, Heal, Heals, TickAccounts
-from gridpeers.lab.communication.record_pass import RecordSink, end_of, opened, read_into
+from gridpeers.lab.communication.record_pass import RecordPass, opened
 from gridpeers.lab.communication.sent_states import (
     DecidedStates,
     DecidedTicks,
@@ -25,7 +26,7 @@ from gridpeers.lab.communication.sent_states import (
     SentStates,
     Uses,
 )
-from gridpeers.netem.ledger import LinkCounts, LinkTrace
+from gridpeers.netem.ledger import LinkTrace
 from gridpeers.scenarios.record.decision_entries import Hole
 from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.wire.journal import Decision
@@ -55,24 +56,24 @@ class OldUse:
 
 def summarise(path: Path) -> CommunicationSummary:
     """Go through the file of a record once, twice if parts of it are lost; NotJudgedError if it has no decisions."""
-    file = opened(path)
-    found = CommunicationSummary(file.info, end_of(file))
-    end = read_into(file, found)
-    last = found.t_end - 2.0 * file.info.T_c
-    lost = {name: holes for name, each in end.holes.items() if (holes := [hole for hole in each if hole[0] < last])}
+    file, t_end = opened(path)
+    found = CommunicationSummary(file.info, t_end).read(file)
+    last = t_end - 2.0 * file.info.T_c
+    lost = {name: holes for name, each in found.holes.items() if (holes := [hole for hole in each if hole[0] < last])}
     if lost:  # known only now, and left out the second time
-        found = CommunicationSummary(file.info, found.t_end, lost)
-        read_into(opened(path), found)
-    return found.finish(end.unreadable)
+        file, _ = opened(path)
+        found = CommunicationSummary(file.info, t_end, lost).read(file)
+    return found.finish()
 
 
-class CommunicationSummary(RecordSink):
+class CommunicationSummary(RecordPass):
     """What a pass over a record found; `lost` has the parts of journals that an earlier pass missed."""
 
     def __init__(
         self, info: RecordInfo, t_end: float, lost: Mapping[str, Sequence[Hole]] = MappingProxyType({})
     ) -> None:
-        self.info, self.t_end, self._lost = info, t_end, lost
+        super().__init__(info, t_end)
+        self._lost = lost
         self._simulated = simulated = info.simulated
         speed = max(1.0, info.plant.speed)
         self._delay = DELAY_TICKS * info.T_c if simulated else DELAY * speed
@@ -82,14 +83,10 @@ class CommunicationSummary(RecordSink):
         self._ticks = TickAccounts(self.sent, info.T_c, lost.get(PLANT, ()))
         self._arrivals = ArrivalAccounts(PAUSE * speed, LINKED_WITHIN * speed)
         self._heals = Heals(info, t_end, self.sent)
-        self.unreadable = 0
-        self.counts: dict[Link, LinkCounts] = {}
         self.unheard = self._ticks.missing
         """Simulated time: decisions without the state of the tick before, by link; for those without faults."""
         self.arrivals = self._arrivals.accounts
         """Real time: what came over each link, for each time in which both of its ends were there."""
-        self.dropped: defaultdict[Link, int] = defaultdict(int)
-        """Real time: how many states their receivers dropped unread."""
         self.oldest: defaultdict[Link, list[OldUse]] = defaultdict(list)
         """By link, the oldest value that was used, then the oldest one that was used later, and so on: ages fall."""
         self.heals: list[Heal] = []
@@ -119,21 +116,15 @@ class CommunicationSummary(RecordSink):
         if not self._simulated and self._names.issuperset(link):
             self._arrivals.heard(link, epoch, number)
 
-    def take_dropped(self, link: Link, count: int) -> None:
-        self.dropped[link] += count
-
     def take_renewed(self, agent: str, t: float) -> None:
         self._arrivals.renewed(agent, t)
-
-    def take_counts(self, link: Link, counts: LinkCounts) -> None:
-        self.counts[link] = counts
 
     def take_trace(self, trace: LinkTrace) -> None:
         self._heals.trace(trace)
 
-    def finish(self, unreadable: int) -> CommunicationSummary:
+    def finish(self) -> Self:
         self._flush(inf)
-        self.unreadable, self.heals = unreadable, self._heals.found()
+        self.heals = self._heals.found()
         return self
 
     def _of(self, agent: str) -> DecidedTicks | DecidedStates:

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Self
 
 import msgspec
 
@@ -53,8 +52,29 @@ _OF_SENDER = ("excess", "stale")
 """Kinds of rejection that may meet sound states of a sender. A journal may have only the number of such states."""
 
 
-class RecordSink:
-    """Takes what a record holds in the order of its file: by time for one node, within a second or so for several."""
+class RecordPass:
+    """One pass over the file of a record. What it takes comes by time for one node, within a second for several."""
+
+    def __init__(self, info: RecordInfo, t_end: float) -> None:
+        self.info, self.t_end = info, t_end
+        self.counts: dict[Link, LinkCounts] = {}
+        """Accounts of emulated links."""
+        self.dropped: dict[Link, int] = defaultdict(int)
+        """Real time: how many states a receiver dropped unread."""
+        self.unreadable = 0
+        """Messages, entries, reports and parts of the file that could not be read, or cannot be true."""
+        self.holes: Mapping[str, Sequence[Hole]] = {}
+        """Simulated time: run times (s) between which it is not known how an agent decided, or what the plant heard:
+        the file is damaged there, or the rest of a journal is missing."""
+        self._latest = t_end + AHEAD * max(1.0, info.plant.speed)
+        self._most = int(self._latest / info.T_c) if info.simulated else MOST_COUNT
+        """Largest number of a state: in simulated time that of its tick."""
+        self._coverage: dict[str, JournalCoverage] = {}
+        self._spoke: dict[str, float] = {}
+        """Real time: run time (s) of the last own state in each agent's journal."""
+        fields = info.fields.get(State.__name__, ())
+        self._length = len(fields)
+        self._places = {name: fields.index(name) for name in _VALUES if name in fields}
 
     def take_state(self, agent: str, state: SentState) -> None:
         """Take a state that an agent sent; it may come twice."""
@@ -65,96 +85,50 @@ class RecordSink:
     def take_heard(self, link: Link, epoch: int, number: int, rejected: str) -> None:
         """Take a state that arrived in real time, and why it was rejected, if it was."""
 
-    def take_dropped(self, link: Link, count: int) -> None:
-        """Take how many states a receiver dropped unread in real time."""
-
     def take_renewed(self, agent: str, t: float) -> None:
         """Take that an agent opened a new session in real time, after its state of a run time (s)."""
-
-    def take_counts(self, link: Link, counts: LinkCounts) -> None:
-        """Take the account of an emulated link up to now."""
 
     def take_trace(self, trace: LinkTrace) -> None:
         """Take further verdicts of an emulated link."""
 
-
-class PassEnd(NamedTuple):
-    unreadable: int
-    """Messages, entries, reports and parts of the file that could not be read, or cannot be true."""
-    holes: dict[str, list[Hole]]
-    """Simulated time: run times (s) between which it is not known how an agent decided, or what the plant heard."""
-
-
-def opened(path: Path) -> RecordFile:
-    """Open the file of a record; raise NotJudgedError if it has no messages and decisions."""
-    file = RecordFile(path)
-    if file.info.level == "physics":
-        raise NotJudgedError('the run was recorded with record = "physics", without decisions')
-    return file
-
-
-def end_of(file: RecordFile) -> float:
-    """Return the run time (s) at which a record ends: no entry is believed that is later than the run's planned end."""
-    end = file.info.plant.end
-    return file.t_end if end is None else min(file.t_end, end)
-
-
-def read_into(file: RecordFile, sink: RecordSink) -> PassEnd:
-    return _Pass(file, sink).read()
-
-
-class _Pass:
-    def __init__(self, file: RecordFile, sink: RecordSink) -> None:
-        self._file, self._sink = file, sink
-        info, self._unreadable = file.info, 0
-        self._simulated, self._T_c = info.simulated, info.T_c
-        self._latest = end_of(file) + AHEAD * max(1.0, info.plant.speed)
-        self._most = int(self._latest / self._T_c) if self._simulated else MOST_COUNT
-        """Largest number of a state: in simulated time that of its tick."""
-        self._coverage: dict[str, JournalCoverage] = {}
-        self._spoke: dict[str, float] = {}
-        """Real time: run time (s) of the last own state in each agent's journal."""
-        fields = info.fields.get(State.__name__, ())
-        self._length = len(fields)
-        self._places = {name: fields.index(name) for name in _VALUES if name in fields}
-
-    def read(self) -> PassEnd:
-        for record in self._file.messages(("journal", "link_reports")):
+    def read(self, file: RecordFile) -> Self:
+        for record in file.messages(("journal", "link_reports")):
             message = sound(record.data)
             if isinstance(message, Journal):
                 self._journal(message)
             elif isinstance(message, LinkReport):
                 self._report(message)
             else:
-                self._unreadable += 1
-        damaged = self._file.holes
-        holes = {
-            name: [*each.holes(damaged), (each.known_until + INSTANT, inf)] for name, each in self._coverage.items()
+                self.unreadable += 1
+        self.unreadable += len(file.damage)
+        self.holes = {
+            name: [*each.holes(file.holes), (each.known_until + INSTANT, inf)] for name, each in self._coverage.items()
         }
-        return PassEnd(self._unreadable + len(self._file.damage), holes)
+        return self
 
     def _journal(self, journal: Journal) -> None:
         """Take a part of a journal, as far as it can be read; in simulated time what is not whole is lost."""
-        before, ticks = self._unreadable, list[int]()
+        before, ticks = self.unreadable, list[int]()
+        simulated, T_c = self.info.simulated, self.info.T_c
         for entry in entries_of(journal.data, self._count_damage):
             if isinstance(entry, Decision | Exchange):
-                if not 0 <= (time_of(entry.tick, self._T_c) if self._simulated else journal.t) <= self._latest:
-                    self._unreadable += 1
+                if not 0 <= (time_of(entry.tick, T_c) if simulated else journal.t) <= self._latest:
+                    self.unreadable += 1
                     continue
                 ticks.append(entry.tick)
             self._take(journal, entry)
-        if self._simulated and self._unreadable == before:  # in real time each entry tells all by itself
-            name, T_c = journal.sender, self._T_c
+        if simulated and self.unreadable == before:  # in real time each entry tells all by itself
+            name = journal.sender
             if name not in self._coverage:
-                self._coverage[name] = JournalCoverage(periodic=is_periodic(self._file.info, name))
+                self._coverage[name] = JournalCoverage(periodic=is_periodic(self.info, name))
             times = (time_of(ticks[0], T_c), time_of(ticks[-1], T_c) if name == PLANT else journal.t) if ticks else None
             self._coverage[name].take(journal, lambda: times)
 
     def _count_damage(self, error: ValueError) -> None:
-        self._unreadable += 1
+        self.unreadable += 1
 
     def _take(self, journal: Journal, entry: Entry) -> None:
-        sink, receiver = self._sink, journal.sender
+        receiver = journal.sender
         match entry:
             case Exchange(states=states):
                 for raw in states:
@@ -164,19 +138,19 @@ class _Pass:
                     self._state(journal, payload)
             case MessageReference(key=key, epoch=epoch, seq=number, rejected=rejected):
                 if kind_of(key) == "state":
-                    sink.take_heard((name_of(key), receiver), epoch, number, rejected)
+                    self.take_heard((name_of(key), receiver), epoch, number, rejected)
             case ReceivedMessage(key=key, payload=payload, rejected=rejected):
                 if kind_of(key) == "state" and rejected not in _NOT_SOUND:  # it arrived, if its key names its sender
                     match values_of(payload):
                         case {"sender": str(src), "epoch": int(epoch), "seq": int(number)} if src == name_of(key):
-                            sink.take_heard((src, receiver), epoch, number, rejected)
+                            self.take_heard((src, receiver), epoch, number, rejected)
             case RejectedCount(key=key, kind=kind, count=count):
                 if kind_of(key) == "state" and kind in _OF_SENDER:
-                    sink.take_dropped((name_of(key), receiver), count)
-            case ProcessEvent(kind="session") if not self._simulated and receiver in self._spoke:
-                sink.take_renewed(receiver, self._spoke[receiver])
+                    self.dropped[name_of(key), receiver] += count
+            case ProcessEvent(kind="session") if not self.info.simulated and receiver in self._spoke:
+                self.take_renewed(receiver, self._spoke[receiver])
             case Decision() if receiver != PLANT:
-                sink.take_decision(receiver, journal.epoch, entry)
+                self.take_decision(receiver, journal.epoch, entry)
 
     def _state(self, journal: Journal, raw: Any) -> None:
         values: dict[str, Any] = {}
@@ -191,13 +165,13 @@ class _Pass:
             )  # fmt: skip
             sender = str(values["sender"])
         except (KeyError, TypeError, ValueError, OverflowError):
-            self._unreadable += 1
+            self.unreadable += 1
             return
         credible = 0 <= state.number <= self._most and 0 <= state.epoch <= MOST_COUNT
         if not (credible and 0.0 <= state.t <= self._latest):
-            self._unreadable += 1
+            self.unreadable += 1
             return
-        self._sink.take_state(sender, state)
+        self.take_state(sender, state)
         if sender == journal.sender:
             self._spoke[sender] = state.t
 
@@ -205,16 +179,28 @@ class _Pass:
         try:
             data = data_of(report)
         except msgspec.MsgspecError:
-            self._unreadable += 1
+            self.unreadable += 1
             return
         for src, counts in data.counts.items():
-            self._sink.take_counts((src, report.sender), counts)
+            self.counts[src, report.sender] = counts
         for trace in data.traces:
             rows = list(zip(trace.seq, trace.t, trace.outcome, strict=True))
             credible = [row for row in rows if row[0] <= self._most and row[1] <= self._latest]
-            self._unreadable += len(rows) - len(credible)
+            self.unreadable += len(rows) - len(credible)
             if credible:
-                self._sink.take_trace(LinkTrace(trace.src, trace.dst, *zip(*credible, strict=True)))
+                self.take_trace(LinkTrace(trace.src, trace.dst, *zip(*credible, strict=True)))
+
+
+def opened(path: Path) -> tuple[RecordFile, float]:
+    """Open the file of a record, and return it with its end (s of run time): no entry is later than the planned end.
+
+    Raise NotJudgedError if it has no messages and decisions.
+    """
+    file = RecordFile(path)
+    if file.info.level == "physics":
+        raise NotJudgedError('the run was recorded with record = "physics", without decisions')
+    end = file.info.plant.end
+    return file, file.t_end if end is None else min(file.t_end, end)
 
 
 # -------------------------------------------------------------------- all of it in memory
@@ -223,35 +209,25 @@ class _Pass:
 MOST_BYTES = 64_000_000  # Largest record that is taken into memory: some ten minutes of nine agents
 
 
-@dataclass(kw_only=True, eq=False)
-class RecordContent(RecordSink):
-    """States sent and heard, decisions, and accounts of emulated links."""
+class RecordContent(RecordPass):
+    """All messages and decisions of a record, up to `MOST_BYTES`, for checks of a user's own."""
 
-    info: RecordInfo
-    t_end: float = 0.0
-    states: dict[str, dict[tuple[int, int], SentState]] = field(default_factory=lambda: defaultdict(dict))
-    """States of each agent by epoch and number, in the order of the file."""
-    decisions: dict[str, list[tuple[int, Decision]]] = field(default_factory=lambda: defaultdict(list))
-    """How each agent decided, with its epoch, in the order of time; in simulated time each holds until the next one."""
-    holes: Mapping[str, Sequence[Hole]] = field(default_factory=dict)
-    """Simulated time: run times (s) between which it is not known how an agent decided, or what the plant heard: the
-    file is damaged there, or the rest of a journal is missing."""
-    heard: dict[Link, dict[tuple[int, int], str]] = field(default_factory=lambda: defaultdict(dict))
-    """Real time: epoch and number of each state that arrived, and why it was rejected, if it was."""
-    dropped: dict[Link, int] = field(default_factory=lambda: defaultdict(int))
-    """Real time: how many states a receiver dropped unread."""
-    counts: dict[Link, LinkCounts] = field(default_factory=dict)
-    traces: dict[Link, list[LinkTrace]] = field(default_factory=lambda: defaultdict(list))
-    """Verdicts of each emulated link."""
-    unreadable: int = 0
-    complete: bool = True
-    """The record was closed properly."""
+    def __init__(self, info: RecordInfo, t_end: float) -> None:
+        super().__init__(info, t_end)
+        self.states: dict[str, dict[tuple[int, int], SentState]] = defaultdict(dict)
+        """States of each agent by epoch and number, in the order of the file."""
+        self.decisions: dict[str, list[tuple[int, Decision]]] = defaultdict(list)
+        """How each agent decided, with its epoch, in the order of time; in simulated time each holds until the next."""
+        self.heard: dict[Link, dict[tuple[int, int], str]] = defaultdict(dict)
+        """Real time: epoch and number of each state that arrived, and why it was rejected, if it was."""
+        self.traces: dict[Link, list[LinkTrace]] = defaultdict(list)
+        """Verdicts of each emulated link."""
+        self.complete = True
+        """The record was closed properly."""
 
     def of_agent(self, agent: str) -> list[SentState]:
         """Return the states of an agent in the order of time."""
         return sorted(self.states[agent].values(), key=lambda state: state.t)
-
-    # ---------------------------------------------------------------- filled by a pass
 
     def take_state(self, agent: str, state: SentState) -> None:
         self.states[agent].setdefault((state.epoch, state.number), state)
@@ -262,26 +238,19 @@ class RecordContent(RecordSink):
     def take_heard(self, link: Link, epoch: int, number: int, rejected: str) -> None:
         self.heard[link][epoch, number] = rejected
 
-    def take_dropped(self, link: Link, count: int) -> None:
-        self.dropped[link] += count
-
-    def take_counts(self, link: Link, counts: LinkCounts) -> None:
-        self.counts[link] = counts
-
     def take_trace(self, trace: LinkTrace) -> None:
         self.traces[trace.src, trace.dst].append(trace)
 
 
 def read_content(path: Path) -> RecordContent:
     """Read the file of a record; raise NotJudgedError if it has no decisions, or is too large for the memory."""
-    file = opened(path)
+    file, t_end = opened(path)
     if (size := path.stat().st_size) > MOST_BYTES:
         raise NotJudgedError(
             f"its record has {size / 1e6:.0f} MB, more than the {MOST_BYTES / 1e6:.0f} MB that are taken into memory"
         )
-    found = RecordContent(info=file.info, t_end=end_of(file))
-    end = read_into(file, found)
-    found.unreadable, found.holes, found.complete = end.unreadable, end.holes, file.complete
+    found = RecordContent(file.info, t_end).read(file)
+    found.complete = file.complete
     for agent, decisions in found.decisions.items():  # a part of a journal may come twice, or late
         known = {(epoch, decision.tick): (epoch, decision) for epoch, decision in decisions}
         in_order = sorted(known.values(), key=lambda each: each[1].tick) if file.info.simulated else known.values()

@@ -10,7 +10,6 @@ import msgspec
 from msgspec.structs import replace
 
 from gridpeers.lab.communication.communication_summary import CommunicationSummary
-from gridpeers.lab.communication.record_pass import read_into
 from gridpeers.netem.ledger import LinkTrace
 from gridpeers.scenarios.emulation.link_data import report_data
 from gridpeers.scenarios.record.record_file import RecordFile, RecordMessage
@@ -58,8 +57,8 @@ def judged(
     parts: Iterable[tuple[str, bytes]], reports: Iterable[LinkReport] = (), *, clock: str
 ) -> tuple[CommunicationSummary, int]:
     file = JournalFile(parts, reports, clock=clock)
-    sums = CommunicationSummary(file.info, file.t_end)
-    return sums, read_into(cast(RecordFile, file), sums).unreadable
+    sums = CommunicationSummary(file.info, file.t_end).read(cast(RecordFile, file))
+    return sums, sums.unreadable
 
 
 def entries(payload: bytes) -> list[list[Any]]:
@@ -89,7 +88,7 @@ class Journals:
         parts = [(rng.choice(("inv1", PLANT)), data[:200_000])]
         reports = [link_report("inv1", _verdicts(rng)) for _ in range(rng.randrange(3))]
         sums, unreadable = judged(parts, reports, clock=rng.choice(("simulated", "wall")))
-        sums.finish(unreadable)
+        sums.finish()
         return "garbled" if unreadable else ""
 
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import msgspec
 
 from gridpeers.lab.communication.record_pass import RecordContent
 from gridpeers.scenarios.checks.checked_case import CheckedCase
+from tests.unit.scenarios.checks.cases import altered
 
 LOSSY = (("case.IV.link", repr([{"on": "* <-> *", "loss": 0.2, "delay": 0.03}])),)
 CUT = (("case.IV.link", repr([{"on": "inv2 <-> *", "cut": True, "from_s": 2.0, "to_s": 2.16}])), ("time.end_s", "5.0"))
@@ -20,4 +19,4 @@ def in_real_time(case: CheckedCase) -> RecordContent:
     content = case.content
     info = msgspec.structs.replace(content.info, plant=msgspec.structs.replace(content.info.plant, clock="wall"))
     heard = {(src, dst): dict.fromkeys(content.states[src], "") for src in content.states for dst in content.states}
-    return replace(content, info=info, heard={link: of for link, of in heard.items() if link[0] != link[1]})
+    return altered(content, info=info, heard={link: of for link, of in heard.items() if link[0] != link[1]})

@@ -110,7 +110,7 @@ def test_the_memory_of_a_pass_does_not_grow_with_the_run(sound: CheckedCase, clo
                         sums.take_heard((other, agent), 1, number, "")
         size, _ = tracemalloc.get_traced_memory()
         tracemalloc.stop()
-        assert sums.finish(0).oldest
+        assert sums.finish().oldest
         return size
 
     memory(300)  # makes what is kept for good

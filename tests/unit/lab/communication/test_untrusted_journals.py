@@ -52,8 +52,8 @@ BAD = {
 def test_what_is_none_of_ours_is_counted_and_the_rest_is_read(bad: str, clock: str) -> None:
     """One bad entry of one agent, between sound ones of it and of another: both have their states."""
     other = packed(["sent", None, "state/inv2", sent(4, 0.08)[3].replace(b"inv1", b"inv2")])
-    sums, unreadable = judged([("inv1", GOOD + BAD[bad]), ("inv2", other)], clock=clock)
-    found = sums.finish(unreadable)
+    sums, _ = judged([("inv1", GOOD + BAD[bad]), ("inv2", other)], clock=clock)
+    found = sums.finish()
 
     assert found.unreadable == 1
     assert {name: of.spoke_at for name, of in found.sent.items()} == {"inv1": 0.08, "inv2": 0.08}
@@ -64,7 +64,7 @@ def test_a_decision_to_come_keeps_no_other_one_out() -> None:
     to_come = packed([*DECISION[:1], 2**60, *DECISION[2:]])
     sums, unreadable = judged([("inv1", to_come + packed(DECISION) + GOOD)], clock="simulated")
 
-    assert (unreadable, bool(sums.finish(unreadable).oldest)) == (1, True)
+    assert (unreadable, bool(sums.finish().oldest)) == (1, True)
 
 
 @pytest.mark.parametrize(("number", "t"), [(MOST_COUNT, 0.02), (2, 1e9)])
@@ -87,7 +87,7 @@ def test_a_new_session_in_a_journal_begins_new_accounts_of_links() -> None:
         for renewed, entries in ((True, [*other[:6], new, *other[6:]]), (False, other))
     }
 
-    (whole,) = found[False][0].finish(0).arrivals["inv1", "inv2"]
+    (whole,) = found[False][0].finish().arrivals["inv1", "inv2"]
     assert sorted(number for _, number in whole.missing) == [5, 6]
-    before, after = found[True][0].finish(0).arrivals["inv1", "inv2"]
+    before, after = found[True][0].finish().arrivals["inv1", "inv2"]
     assert (before.until, [number for _, number in before.missing], after.missing) == (pytest.approx(0.5), [5], {})

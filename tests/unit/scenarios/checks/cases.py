@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import replace
 from functools import cache, partial
 from typing import Any
@@ -38,6 +39,13 @@ def changed(case: CheckedCase, edit: Callable[[dict[str, np.ndarray[Any, Any]]],
     return replace(case, history=History(inverters=case.history.inverters, **arrays))
 
 
+def altered(content: RecordContent, **parts: Any) -> RecordContent:
+    """The content of a record with other parts."""
+    other = copy(content)
+    vars(other).update(parts)
+    return other
+
+
 def with_content(case: CheckedCase, content: RecordContent, *, late: float = 0.0) -> CheckedCase:
     """A case whose record has something else in it, in the order of time; of agents' journals, some time (s) late."""
     other = replace(case)
@@ -63,9 +71,8 @@ def with_content(case: CheckedCase, content: RecordContent, *, late: float = 0.0
         entries += [(trace.t[-1] + late if trace.t else 0.0, 3, partial(sums.take_trace, trace)) for trace in traces]
     for _, _, take in sorted(entries, key=lambda entry: entry[:2]):
         take()
-    for link, counts in content.counts.items():
-        sums.take_counts(link, counts)
-    other.__dict__["communication"] = sums.finish(content.unreadable)
+    sums.counts, sums.unreadable = content.counts, content.unreadable
+    other.__dict__["communication"] = sums.finish()
     return other
 
 
