@@ -41,6 +41,15 @@ class FaultSchedule:
     def __init__(self, spans: Iterable[Span]) -> None:
         self.spans = tuple(span for span in spans if span.to_s > span.from_s)
 
+    @property
+    def begins(self) -> float:
+        """When its first fault begins (s of run time), infinity without one."""
+        return min((span.from_s for span in self.spans), default=math.inf)
+
+    def lately(self, t: float) -> FaultSchedule:
+        """Return the schedule without the faults that had ended long before the time t (s) of a live change."""
+        return FaultSchedule(span for span in self.spans if span.to_s > t - PAST)
+
     def at(self, t: float) -> Segment:
         now = t + INSTANT
         bounds = [bound for span in self.spans for bound in (span.from_s, span.to_s)]
@@ -142,42 +151,15 @@ def schedule_of(link: Link, netem: Netem, changes: Iterable[Change], microgrids:
     return schedule
 
 
-MOST_SPANS, PAST = 16, 60.0
-"""Number of faults of a link above which old ones are forgotten: those that ended so long (s of run time) before the
-present change and before the latest one. A change takes effect at its own time, and commands may arrive slightly out of
-order."""
-
-
-class Horizon:
-    """The time before which no link is looked up any more, as live changes come.
-
-    Examples
-    --------
-    >>> horizon = Horizon()
-    >>> [horizon.after(Heal(on="*", from_s=t)) for t in (100.0, 130.0, 120.0)]
-    [-inf, 40.0, 60.0]
-    """
-
-    def __init__(self) -> None:
-        self._latest = -math.inf
-
-    def after(self, change: Change) -> float:
-        """Return it (s of run time) after one more change."""
-        over = min(self._latest, change.from_s) - PAST
-        self._latest = max(self._latest, change.from_s)
-        return over
-
-
-def without_old(schedule: FaultSchedule, over: float) -> FaultSchedule:
-    """Return a schedule without the faults that had ended by the time `over` (s), if it has many."""
-    many = len(schedule.spans) > MOST_SPANS
-    return FaultSchedule(span for span in schedule.spans if span.to_s > over) if many else schedule
+PAST = 60.0
+"""Time (s of run time) before a live change after which a fault that had ended is forgotten: there may be thousands. A
+change takes effect at its own time, and commands may arrive slightly out of order."""
 
 
 class LinkSchedules:
-    """Schedules of all links of a run as live changes come, each change taken up once: there may be thousands.
+    """Schedules of all links of a run as live changes come, each change taken up once.
 
-    Only the times of changes to come are looked up, so faults that ended long ago are forgotten.
+    Only the times of changes to come are looked up.
 
     Examples
     --------
@@ -189,16 +171,14 @@ class LinkSchedules:
 
     def __init__(self, netem: Netem, microgrids: Mapping[str, str]) -> None:
         self._netem, self._microgrids = netem, microgrids
-        self._horizon = Horizon()
 
     @cached_property
     def _schedules(self) -> dict[Link, FaultSchedule]:
         return {link: schedule_of(link, self._netem, (), self._microgrids) for link in links_among(self._microgrids)}
 
     def apply(self, change: Change) -> None:
-        over = self._horizon.after(change)
         for link, before in self._schedules.items():
-            self._schedules[link] = without_old(changed(before, change, link, self._microgrids), over)
+            self._schedules[link] = changed(before, change, link, self._microgrids).lately(change.from_s)
 
     def of(self, link: Link) -> FaultSchedule:
         """Return the schedule of a link after all changes so far."""

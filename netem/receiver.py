@@ -12,7 +12,7 @@ from typing import NamedTuple
 from zlib import crc32
 
 from gridpeers.netem.channel import FOREVER, NEVER, Channel
-from gridpeers.netem.fault_schedule import Change, FaultSchedule, Horizon, changed, schedule_of, without_old
+from gridpeers.netem.fault_schedule import Change, changed, schedule_of
 from gridpeers.netem.ledger import Ledger, LinkCounts, LinkTrace, combined
 from gridpeers.netem.models import INSTANT
 from gridpeers.netem.models.medium import flip
@@ -46,15 +46,15 @@ no two are compared further, the message, its delay (s). A plain tuple, as it is
 
 
 class _Inbound:
-    __slots__ = ("channel", "due", "forgotten_from", "is_clear", "ledger", "story")
+    __slots__ = ("begins", "channel", "due", "is_clear", "ledger", "story")
 
     def __init__(self, channel: Channel, *, keep: bool) -> None:
         self.channel, self.is_clear = channel, channel.is_clear
         self.ledger = Ledger(keep=keep)
         self.story = self.due = NEVER
         """Latest arrival so far, as netem has it (s), and as it is (ns)."""
-        self.forgotten_from = FOREVER
-        """When the first of the faults began that are forgotten (s of run time)."""
+        self.begins = channel.schedule.begins
+        """When the first fault of the link begins (s of run time)."""
 
 
 class Receiver:
@@ -77,7 +77,6 @@ class Receiver:
         self.name = name
         self._netem, self._microgrids, self._keep = netem, dict(microgrids), keep_trace
         self.changes: list[Change] = []
-        self._horizon = Horizon()
         self._links: dict[str, _Inbound] = {}
         self._heap: list[_Waiting] = []
         self._kept: list[_Waiting] = []
@@ -99,9 +98,7 @@ class Receiver:
 
     def was_impaired(self, src: str, t: float) -> bool:
         """Return whether the link from a sender has had a fault by t (s of run time), the present one included."""
-        inbound = self._link(src)
-        begun = (inbound.forgotten_from, *(span.from_s for span in inbound.channel.schedule.spans))
-        return min(begun) <= t + INSTANT
+        return self._link(src).begins <= t + INSTANT
 
     def offer(self, src: str, seq: int, t: float, at: float, payload: bytes, message: AnyMessage | None = None) -> None:
         """Judge a message, sent at `t` (s of run time) and here without faults at `at` (s, on the receiver's clock).
@@ -144,30 +141,23 @@ class Receiver:
     def apply(self, change: Change) -> tuple[str, ...]:
         """Change links for messages sent at `change.from_s` (s of run time) or later; kept messages are judged anew.
 
-        Of a link with many faults those that were over long ago are forgotten, unless it has messages that a cut keeps:
-        they may be of that time. Returns the senders so far whose links it changes.
+        Faults that were over long ago are forgotten, unless the link has messages that a cut keeps: they may be of that
+        time. Returns the senders so far whose links it changes.
         """
         self.changes.append(change)
-        over, concerned = self._horizon.after(change), list[str]()
+        concerned = list[str]()
         for src, inbound in self._links.items():
             channel = inbound.channel
             schedule = changed(channel.schedule, change, channel.link, self._microgrids)
             if schedule is not channel.schedule:
                 concerned.append(src)
                 kept = self._take_kept(src, change.from_s)
-                channel.reschedule(schedule if kept else self._lately(inbound, schedule, over), rewind=bool(kept))
+                inbound.begins = min(inbound.begins, schedule.begins)
+                channel.reschedule(schedule if kept else schedule.lately(change.from_s), rewind=bool(kept))
                 inbound.is_clear = channel.is_clear
                 for seq, content, special in kept:
                     self._judge(inbound, src, seq, special.t, special.at, content)
         return tuple(concerned)
-
-    def _lately(self, inbound: _Inbound, schedule: FaultSchedule, over: float) -> FaultSchedule:
-        """Return a schedule, if it has many faults without those that had ended by the time `over` (s)."""
-        left = without_old(schedule, over)
-        if left is not schedule:
-            forgotten = (span.from_s for span in schedule.spans if span.to_s <= over)
-            inbound.forgotten_from = min(inbound.forgotten_from, *forgotten, FOREVER)
-        return left
 
     def _take_kept(self, src: str, t: float) -> list[tuple[int, _Content, _Special]]:
         """Take back the messages that a cut keeps beyond t, to be judged anew: number, message and times."""
