@@ -23,7 +23,7 @@ from typing import Annotated
 import msgspec
 
 from gridpeers.netem.draws import Chain, Stream
-from gridpeers.wire.schema.table_schema import Plausible, Problem, Unit, in_percent
+from gridpeers.wire.schema.table_schema import Below, Plausible, Problem, Unit, in_percent
 
 LONGEST_DELAY = 10.0
 """Delays above this (s) are taken for milliseconds by problem: control over such a link is not what netem is for."""
@@ -31,9 +31,6 @@ LONGEST_DELAY = 10.0
 DELAY = Plausible("a delay", 0.0, LONGEST_DELAY)
 
 STANDARD = NormalDist()
-
-MOST_SHOWN = 5
-"""Wrong delays of a trace that are named; a file in milliseconds has thousands."""
 
 Sampler = Callable[[int], float]
 
@@ -81,20 +78,13 @@ class Constant(DelayModel, frozen=True, kw_only=True, tag="constant"):
 class Uniform(RandomDelay, frozen=True, kw_only=True, tag="uniform"):
     """Delay uniform on (low, high): F^-1(u) = low + u (high - low)."""
 
-    low_s: Annotated[float, Unit("s"), DELAY]
+    low_s: Annotated[float, Unit("s"), DELAY, Below("high_s")]
     """Shortest delay (s)."""
     high_s: Annotated[float, Unit("s"), DELAY]
     """Longest delay (s)."""
 
     def quantile(self, u: float) -> float:
         return self.low_s + u * (self.high_s - self.low_s)
-
-    def relations(self) -> list[Problem]:
-        problems = []
-        if self.low_s >= self.high_s:
-            text = f"{self.low_s:g} s must be below high_s = {self.high_s:g} s; swap them, or write one constant delay"
-            problems.append(Problem("low_s", text))
-        return problems
 
 
 class Normal(RandomDelay, frozen=True, kw_only=True, tag="normal"):
@@ -167,23 +157,16 @@ class Trace(DelayModel, frozen=True, kw_only=True, tag="trace"):
     """Whether each link starts at a place of its own, drawn once; else all links have the same delay at once."""
 
     def sampler(self, stream: Stream) -> Sampler:
-        delays, start = self.delays_s, self.start(stream)
+        delays = self.delays_s
+        start = stream.below(len(delays), 0) if self.spread else 0
         return lambda seq: delays[(seq + start) % len(delays)]
-
-    def start(self, stream: Stream) -> int:
-        """Return the index of the delay of message 0."""
-        return stream.below(len(self.delays_s), 0) if self.spread else 0
 
     def relations(self) -> list[Problem]:
         if not self.delays_s:
             return [] if self.file else [Problem("", 'a trace needs delays: write file = "delays.csv"')]
-        wrong = [
-            Problem(f"delays_s[{i}]", text)
-            for i, delay_s in enumerate(self.delays_s)
-            if (text := DELAY.objection(delay_s, "s"))
-        ]
-        more = len(wrong) - MOST_SHOWN
-        return wrong[:MOST_SHOWN] + ([Problem("delays_s", f"{more} more like these")] if more > 0 else [])
+        wrong = ((i, DELAY.objection(delay_s, "s")) for i, delay_s in enumerate(self.delays_s))
+        first = next(((i, text) for i, text in wrong if text), None)  # of a file each row has been told
+        return [Problem(f"delays_s[{first[0]}]", first[1])] if first else []
 
 
 AnyDelay = Constant | Uniform | Normal | Lognormal | Pareto | Trace

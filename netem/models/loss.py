@@ -13,7 +13,7 @@ from typing import Annotated
 import msgspec
 
 from gridpeers.netem.draws import Chain, Stream
-from gridpeers.wire.schema.table_schema import Probability, Problem
+from gridpeers.wire.schema.table_schema import Below, Probability, Problem
 
 Lost = Callable[[int], bool]
 
@@ -108,7 +108,7 @@ class GilbertElliott(LossModel, frozen=True, kw_only=True, tag="gilbert-elliott"
     """Probability of going from good to bad, from one message to the next."""
     r: Annotated[float, Probability("r (bad to good)", above_zero=True)]
     """Probability of going from bad to good; a bad time lasts 1/r messages on average."""
-    loss_good: Annotated[float, Probability("loss_good")] = 0.0
+    loss_good: Annotated[float, Probability("loss_good"), Below("loss_bad", or_equal=True)] = 0.0
     """Probability of loss in the good state (`tc netem`: 1 - k)."""
     loss_bad: Annotated[float, Probability("loss_bad")] = 1.0
     """Probability of loss in the bad state (`tc netem`: 1 - h)."""
@@ -125,13 +125,6 @@ class GilbertElliott(LossModel, frozen=True, kw_only=True, tag="gilbert-elliott"
     @property
     def loss_in_state(self) -> tuple[float, ...]:
         return (self.loss_good, self.loss_bad)
-
-    def relations(self) -> list[Problem]:
-        problems = []
-        if self.loss_good > self.loss_bad:
-            text = f"{self.loss_good:g} is above loss_bad = {self.loss_bad:g}; swap them: the bad state loses more"
-            problems.append(Problem("loss_good", text))
-        return problems
 
 
 class Markov(LossModel, frozen=True, kw_only=True, tag="markov"):

@@ -11,7 +11,7 @@ import msgspec
 from gridpeers.netem.draws import Stream
 from gridpeers.netem.models import INSTANT
 from gridpeers.netem.models.delay import DELAY
-from gridpeers.wire.schema.table_schema import Plausible, Probability, Problem, Unit
+from gridpeers.wire.schema.table_schema import Below, Plausible, Probability, Unit
 
 LONGEST_FLAP = 600.0
 """Longest plausible up or down time (s)."""
@@ -90,9 +90,14 @@ class Slots(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
     period_s: Annotated[float, Unit("s"), Plausible("the period of slots", 0.0, 10.0, above_zero=True)]
     """Distance of the slots' beginnings (s)."""
-    offset_s: Annotated[float, Unit("s"), Plausible("the offset of slots", 0.0, 10.0)] = 0.0
+    offset_s: Annotated[float, Unit("s"), Plausible("the offset of slots", 0.0, 10.0), Below("period_s")] = 0.0
     """Beginning of the first slot (s), below period_s."""
-    length_s: Annotated[float, Unit("s"), Plausible("the length of a slot", 0.0, 10.0, above_zero=True)]
+    length_s: Annotated[
+        float,
+        Unit("s"),
+        Plausible("the length of a slot", 0.0, 10.0, above_zero=True),
+        Below("period_s", or_equal=True),
+    ]
     """Length of a slot (s), up to period_s."""
 
     def opens(self, ready: float) -> float:
@@ -108,15 +113,6 @@ class Slots(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         if ready < self.offset_s + number * self.period_s + self.length_s - INSTANT:
             return ready
         return max(self.offset_s + (number + 1) * self.period_s, ready)
-
-    def relations(self) -> list[Problem]:
-        problems = []
-        for key in ("offset_s", "length_s"):
-            value = getattr(self, key)
-            if value > self.period_s or (key == "offset_s" and value == self.period_s):
-                text = f"{value:g} s does not go with period_s = {self.period_s:g} s: slots repeat with the period"
-                problems.append(Problem(key, text))
-        return problems
 
 
 _WHETHER, _WHICH, _PER_COPY = 0, 1, 2

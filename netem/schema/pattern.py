@@ -97,38 +97,27 @@ def objections(text: str, names: Iterable[str] | None, microgrids: Mapping[str, 
         pattern = parse(text)
     except ValueError as error:
         return [str(error)]
-    if {*pattern.left.names, *pattern.right.names} == {PLANT}:
-        return [_one_end(text, PLANT, ANY)]
-    if names is None:
+    named = dict.fromkeys((*pattern.left.names, *pattern.right.names))
+    if names is None and [*named] != [PLANT]:
         return []
-    agents = list(names)
+    agents = list(names or ())
     groups = list(dict.fromkeys(microgrids[name] for name in agents if name in microgrids))
     known = [*agents, *groups, PLANT, ANY]
-    lower = {group.lower() for group in groups}
-    unknown = [
-        name
-        for side in (pattern.left, pattern.right)
-        for name in side.names
-        if name not in known and name.lower() not in lower
-    ]
-    if unknown:
+    lower = {*agents, PLANT, ANY, *(group.lower() for group in groups)}
+    if unknown := [name for name in named if name not in lower and name.lower() not in lower]:
         return [
             f'"{text}" matches nothing: nobody is called "{name}"; {suggestion(name, known, "names")}'
-            for name in dict.fromkeys(unknown)
+            for name in unknown
         ]
-    if not any(pattern.matches(src, dst, microgrids) for src, dst in links_among(agents)):
-        for name in agents:
-            if pattern.left.holds(name, microgrids):
-                return [_one_end(text, name, ANY if len(agents) > 1 else PLANT)]
+    if any(pattern.matches(src, dst, microgrids) for src, dst in links_among(agents)):
+        return []
+    name = next((name for name in (PLANT, *agents) if pattern.left.holds(name, microgrids)), "")
+    if not name:
         return [f'"{text}" matches nothing: there is no inverter']
-    return []
-
-
-def _one_end(text: str, name: str, others: str) -> str:
-    return (
+    return [
         f'"{text}" matches nothing: both ends are {name} alone, which has no link to itself; write two different ends, '
-        f'e.g. "{name} <-> {others}"'
-    )
+        f'e.g. "{name} <-> {PLANT if agents == [name] else ANY}"'
+    ]
 
 
 def links_among(names: Iterable[str]) -> list[Link]:

@@ -122,9 +122,10 @@ class _Reader:
                 values[field.name] = _fallback(field)
                 if field.required and is_table:
                     self._add(place, f"is missing; {_expected(field)}")
-        wrong = {problem.path for problem in self.problems[noted:]}
-        right = types.SimpleNamespace(**values)
-        self.problems += below(path, contradictions(cls, right, lambda field: _join(path, field.key) not in wrong))
+        if is_table:
+            wrong = {problem.path for problem in self.problems[noted:]}
+            right = types.SimpleNamespace(**values)
+            self.problems += below(path, contradictions(cls, right, lambda field: _join(path, field.key) not in wrong))
         return values
 
     def _value(self, field: Field, raw: Any, path: str, base: Any) -> Any:
