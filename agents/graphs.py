@@ -15,7 +15,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache
-from types import FunctionType
 from typing import Annotated, Any, Protocol
 
 from gridpeers.agents.agent_config import Control
@@ -58,42 +57,27 @@ def natural_order(name: str) -> tuple[tuple[int, int, str], ...]:
     return tuple((0, int(part), part) if part.isascii() and part.isdigit() else (1, 0, part) for part in parts)
 
 
-def full(members: Members) -> Mapping[str, Iterable[str]]:
-    """Let every agent listen to all others."""
-    return _by_pairs(full, members)
+class PairRule:
+    """A rule by pairs: an agent evaluates its own pairs alone, so its cost grows with the roster and not its square."""
+
+    def __init__(self, text: str, linked: Callable[[Member, Member], bool]) -> None:
+        self.__doc__, self._linked = text, linked
+
+    def __call__(self, members: Members) -> Mapping[str, Iterable[str]]:
+        return {name: self.neighbours(name, members) for name in members}
+
+    def neighbours(self, own: str, members: Members) -> tuple[str, ...]:
+        nameplate = members[own]
+        return tuple(name for name, other in members.items() if name != own and self._linked(nameplate, other))
 
 
-def none(members: Members) -> Mapping[str, Iterable[str]]:
-    """Let no agent listen to any other."""
-    return _by_pairs(none, members)
-
-
-def GFM_only(members: Members) -> Mapping[str, Iterable[str]]:
-    """Let the grid-forming inverters listen to each other."""
-    return _by_pairs(GFM_only, members)
-
-
-def clustered(members: Members) -> Mapping[str, Iterable[str]]:
-    """Let the inverters of a microgrid listen to each other, and all grid-forming ones too."""
-    return _by_pairs(clustered, members)
-
-
-_PAIRWISE: dict[Any, Callable[[Member, Member], bool]] = {
-    full: lambda a, b: True,
-    none: lambda a, b: False,
-    GFM_only: lambda a, b: a.kind == b.kind == "GFM",
-    clustered: lambda a, b: a.microgrid == b.microgrid or a.kind == b.kind == "GFM",
-}
-"""Rules by pairs: an agent evaluates its own pairs alone, so that its cost grows with the roster and not its square."""
-
-
-def _by_pairs(rule: Graph, members: Members) -> dict[str, list[str]]:
-    return {name: _linked_to(name, members, _PAIRWISE[rule]) for name in members}
-
-
-def _linked_to(name: str, members: Members, linked: Callable[[Member, Member], bool]) -> list[str]:
-    own = members[name]
-    return [other for other, nameplate in members.items() if other != name and linked(own, nameplate)]
+full = PairRule("Let every agent listen to all others.", lambda a, b: True)
+none = PairRule("Let no agent listen to any other.", lambda a, b: False)
+GFM_only = PairRule("Let the grid-forming inverters listen to each other.", lambda a, b: a.kind == b.kind == "GFM")
+clustered = PairRule(
+    "Let the inverters of a microgrid listen to each other, and all grid-forming ones too.",
+    lambda a, b: a.microgrid == b.microgrid or a.kind == b.kind == "GFM",
+)
 
 
 def ring(members: Members) -> Mapping[str, Iterable[str]]:
@@ -148,15 +132,14 @@ class RosterGraph:
 
     def __init__(self, rule: Graph, members: Members, name: str) -> None:
         self._rule, self._members, self._name = rule, members, name
-        self._linked = _PAIRWISE.get(rule) if isinstance(rule, FunctionType) else None
         self._heard_by: dict[str, frozenset[str]] | None = None
         self._error = ""
         self._place: dict[str, int] = {}
 
     def in_neighbours(self, own: str) -> tuple[str, ...]:
         """Return an agent's in-neighbours, in the order of the members; raise GraphError if the rule fails."""
-        if self._linked is not None:
-            return tuple(_linked_to(own, self._members, self._linked))
+        if isinstance(self._rule, PairRule):
+            return self._rule.neighbours(own, self._members)
         if self._error:
             raise GraphError(self._error)
         if self._heard_by is None:
@@ -195,14 +178,12 @@ def _shown(name: Any) -> str:
     return name if isinstance(name, str) and name.isprintable() else printable(repr(name), 60)
 
 
-_OURS: dict[str, Graph] = {"full": full, "none": none, "GFM-only": GFM_only, "clustered": clustered, "ring": ring}
-
-
 def rule_of(control: Control) -> Graph:
     """Return the rule of a run; raise PluginError if a plugged-in one is missing or cannot be made."""
     if control.own_graph is not None:
         return make_graph(control.own_graph)
-    return EdgeList(control.links) if control.graph == "links" else _OURS[control.graph]
+    rule: Graph = EdgeList(control.links) if control.graph == "links" else GRAPHS.resolve(control.graph)
+    return rule
 
 
 def is_pairwise(control: Control) -> bool:
