@@ -22,18 +22,14 @@ MOST_ROWS = 20
 
 def read_delays(path: Path) -> tuple[tuple[float, ...], list[str]]:
     """Return the delays (s) of a CSV file with a column `delay_s`, one message a row, and its problems by row."""
-    try:
-        if path.exists() and not path.is_file():  # a device or a pipe may never end
-            return (), [f"{path}: cannot be read: it is no file"]
-        return _rows(path.read_bytes(), path.name)
-    except FileNotFoundError:
+    if not path.is_file():  # a device or a pipe may never end
         return (), [f'there is no file "{path}"; the path is seen from the scenario']
+    try:
+        return _rows(path.read_bytes(), path.name)
     except OSError as error:
         return (), [f"{path}: cannot be read: {error.strerror}"]
     except TextFileError as error:
         return (), [f"{path.name}: {error}"]
-    except ValueError:  # a name with a zero byte
-        return (), [f'there is no file "{path}"; the path is seen from the scenario']
 
 
 def _rows(data: bytes, file: str) -> tuple[tuple[float, ...], list[str]]:
