@@ -13,8 +13,7 @@ import traceback
 from collections import Counter
 from collections.abc import Callable
 from functools import lru_cache
-from math import isfinite
-from typing import Any, TypeVar
+from typing import TypeVar
 from zlib import crc32
 
 import msgspec
@@ -33,8 +32,7 @@ KINDS = {
     "corrupt": "changed on its way, or sent without a checksum: its CRC-32 differs",
     "garbled": "not msgpack, or not the fields of its type",
     "unknown": "of an unknown type",
-    "not finite": "a number in it is NaN or infinite",
-    "implausible": "a value in it is beyond its physical bounds, or contradicts another",
+    "implausible": "a value in it is NaN or beyond its physical bounds, or contradicts another",
     "foreign": "on a key of another run, or from another sender than the key names",
     "impostor": "from a process whose link has a certificate of another name",
     "ghost": "from another epoch than the sender's valid one",
@@ -81,7 +79,7 @@ def decode(payload: bytes) -> AnyMessage:
     try:
         message = _decoder.decode(payload[:-CRC])
     except msgspec.ValidationError as error:
-        raise RejectedError(_kind(str(error), payload), str(error)) from None
+        raise RejectedError(_kind(str(error)), str(error)) from None
     except (msgspec.DecodeError, RecursionError, UnicodeDecodeError) as error:
         raise RejectedError("garbled", str(error)) from None
     _latest = payload, message
@@ -113,23 +111,10 @@ _WRONG_TYPE = re.compile(r"^(Expected `[^`]*`, got |Object |Invalid |\w+ value o
 """Start of msgspec's message for a wrong type; for a bound, or a message's own check, it reads otherwise."""
 
 
-def _kind(text: str, payload: bytes) -> str:
+def _kind(text: str) -> str:
     if text.endswith("`$.type`"):
         return "unknown"
-    if _WRONG_TYPE.match(text):
-        return "garbled"
-    try:
-        return "implausible" if _is_finite(msgspec.msgpack.decode(payload[:-CRC])) else "not finite"
-    except (ValueError, TypeError, RecursionError):  # anything may follow the wrong value
-        return "implausible"
-
-
-def _is_finite(value: Any) -> bool:
-    if isinstance(value, float):
-        return isfinite(value)
-    if isinstance(value, dict):
-        return all(map(_is_finite, value.values()))
-    return not isinstance(value, list) or all(map(_is_finite, value))
+    return "garbled" if _WRONG_TYPE.match(text) else "implausible"
 
 
 class RejectedMessages:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import ExitStack
 from itertools import pairwise
-from math import nan
 from pathlib import Path
 
 import msgspec
@@ -200,7 +199,6 @@ def hostile(epoch: int) -> dict[str, bytes]:
         "corrupt": b"\xff" * 100,
         "garbled": sealed(b"\xc1"),
         "unknown": sealed(msgspec.msgpack.encode({"type": "Rumour", "sender": "inv1"})),
-        "not finite": encode(replace(state, P_set=nan)),
         "implausible": encode(replace(state, P_set=1e30)),
         "foreign": encode(replace(state, sender="inv3")),
         "ghost": encode(replace(state, epoch=epoch - 1)),
