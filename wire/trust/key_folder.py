@@ -228,10 +228,6 @@ def key_warnings(folder: Path) -> dict[str, str]:
     return found
 
 
-_EXPIRED = 10
-"""OpenSSL's X509_V_ERR_CERT_HAS_EXPIRED, of either certificate; no member's outlives its authority's."""
-
-
 def tls_refusal(host: str, port: int, credentials: Credentials | None, timeout: float) -> str:
     """Return why the other end and this one do not agree on a link; empty if they do, or if it is not known.
 
@@ -248,24 +244,15 @@ def tls_refusal(host: str, port: int, credentials: Credentials | None, timeout: 
         with socket.create_connection((host, port), timeout) as raw, context.wrap_socket(raw) as secured:
             secured.recv(1)
     except ssl.SSLCertVerificationError as error:
-        assert credentials is not None
-        if error.verify_code == _EXPIRED:
-            return (
-                "shows a certificate that has expired; gridpeers keys issue renews it where the site was made, unless "
-                f"{credentials.ca} has expired too: then gridpeers keys init makes a new site"
-            )
-        return (
-            f"shows a certificate that {credentials.ca} does not accept ({error.verify_message}): is it of this site?"
-        )
+        ca = "" if credentials is None else credentials.ca
+        return f"shows a certificate that {ca} does not accept ({error.verify_message})"
     except ssl.SSLError as error:
         _, alert, name = (error.reason or "").partition("ALERT_")
         if alert and credentials is None:
             return "asks for a certificate"
         if alert and credentials is not None:
-            why = f"by the ca.pem there it is of another site ({name})"
-            if name == "CERTIFICATE_EXPIRED":
-                why = "it has expired by the clock there"
-            return f"does not accept the certificate of {credentials.own.name}: {why}"
+            why = "it has expired by the clock there" if name == "CERTIFICATE_EXPIRED" else f"{name}, of another site"
+            return f"does not accept the certificate of {credentials.own.name} ({why})"
     except OSError:  # nobody is there, or files of ours have gone
         pass
     return ""
