@@ -13,9 +13,8 @@ from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.agents.carriers.law_registry import make_law
-from gridpeers.agents.known_agents import KnownAgents
 from gridpeers.agents.laws.law import Law
-from gridpeers.agents.lockstep_agent import LockstepAgent
+from gridpeers.agents.lockstep_agent import KnownAgents, LockstepAgent
 from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.wire.driver.drive import StoppedError, StoppedOnLeashError, drive, serve
 from gridpeers.wire.driver.machine import schedule_as_batch
@@ -131,7 +130,6 @@ def _realtime(nodes: Sequence[AnyAgent]) -> list[RealtimeAgent]:
 def _opened(config: AgentConfig, credentials: Credentials | None, *, again: bool) -> Session:
     """Open a session; one in place of another is tried again for a while, as its certificate may just be renewed."""
     until = monotonic() + (OPENED_WITHIN if again else 0.0)
-    told = ""
     while True:
         try:
             return Session(
@@ -145,9 +143,7 @@ def _opened(config: AgentConfig, credentials: Credentials | None, *, again: bool
         except SessionError as error:
             if monotonic() >= until:
                 raise
-            if str(error) != told:
-                told = str(error)
-                logging.getLogger(config.name).warning("%s; tries again for up to %g s", told, OPENED_WITHIN)
+            logging.getLogger(config.name).warning("%s; tries again for up to %g s", error, OPENED_WITHIN)
         sleep(OPENED_AGAIN)
 
 

@@ -10,16 +10,15 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from gridpeers.agents.agent import Agent
-from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.agents.agent_config import AgentConfig, Control
 from gridpeers.agents.agent_node import AgentNode
 from gridpeers.agents.decision_journal import DecisionJournal
-from gridpeers.agents.graphs import GraphError, in_neighbours, is_pairwise
-from gridpeers.agents.known_agents import KnownAgents
+from gridpeers.agents.graphs import GraphError, RosterGraph, in_neighbours, is_pairwise, rule_of, without_missing
 from gridpeers.agents.laws.law import Law
 from gridpeers.wire.codec import RejectedError, decode, encode
 from gridpeers.wire.journal import JournalBuffer
 from gridpeers.wire.links import REPORT_TICKS, Links
-from gridpeers.wire.membership import ASKED_AT_ONCE
+from gridpeers.wire.membership import ASKED_AT_ONCE, Admission, Membership
 from gridpeers.wire.messages import PLANT, AnyMessage, Measurement, Nameplate, Prepare, Ready, State, Stop, Waiting
 from gridpeers.wire.node import Route
 from gridpeers.wire.timing import Awaited, TickBarrier, time_of
@@ -32,6 +31,60 @@ JOURNAL_PERIOD = 0.2
 
 DEADLINES = 2.0
 """An agent waits this many deadlines, so that the plant reports the error first."""
+
+
+class KnownAgents:
+    """The other agents as agents know them: tokens, nameplates, the last roster and its graph.
+
+    The agents of one process and one rule share them: else n agents would keep n copies of n nameplates, and evaluate
+    the rule n times for each roster.
+    """
+
+    def __init__(self, control: Control) -> None:
+        self.control = control
+        self.members = Membership(Admission())
+        self._rule = rule_of(control)
+        self._own: dict[str, Nameplate] = {}
+        self._latest: tuple[Prepare | None, dict[str, str]] = None, {}
+        self._taken: Prepare | None = None
+        self._graph: RosterGraph | None = None
+        self._unmet: tuple[int, list[str]] = -1, []
+        """Number of changes of the members by then, and the names on the roster without a nameplate."""
+
+    def add(self, nameplate: Nameplate) -> None:
+        self._own[nameplate.sender] = nameplate
+
+    def processes(self, message: Prepare) -> dict[str, str]:
+        """Return the process of each name on a roster, in the order of the inverters; for one message one object."""
+        if message is not self._latest[0]:
+            self._latest = message, dict(zip(message.roster, message.instances, strict=True))
+        return self._latest[1]
+
+    def take(self, message: Prepare) -> None:
+        if message is self._taken:
+            return
+        self._taken, self._graph, self._unmet = message, None, (-1, [])
+        for name, instance in self.processes(message).items():
+            self.members.prefer(name, instance)
+
+    def unmet(self, own: str) -> list[str]:
+        """Return the members of the roster, but for the own agent, whose nameplates are missing."""
+        changes, names = self._unmet
+        if changes != self.members.changes:
+            met, counts = self.members.nameplates, self.members.instance
+            names = [name for name, instance in self._latest[1].items() if name not in met or counts(name) != instance]
+            self._unmet = self.members.changes, names
+        return [name for name in names if name != own] if names else names
+
+    def nameplate(self, name: str) -> Nameplate:
+        return self.members.nameplates.get(name) or self._own[name]
+
+    def in_neighbours(self, own: str) -> tuple[str, ...]:
+        """Return the in-neighbours of an agent, once all on the roster are met; raise GraphError if the rule fails."""
+        if self._graph is None:
+            roster = {name: self.nameplate(name) for name in self._latest[1]}
+            self._graph = RosterGraph(self._rule, roster, self.control.graph)
+        return without_missing(self.control, own, self._graph.in_neighbours(own))
 
 
 class LockstepAgent(AgentNode):

@@ -1,7 +1,8 @@
 """A law that is a functional mock-up unit for co-simulation, FMI 2 or 3, by the package fmpy (extra `fmu`).
 
 What is compiled cannot be interrupted, and may take its process with it: so an FMU runs in one of its own,
-`gridpeers.agents.carriers.fmu_host`, to which the lines of a law program go.
+to which the lines of a law program go (docs/law-programs.md): `python -m gridpeers.agents.carriers.fmu PATH FOLDER`.
+What the FMU prints goes to standard error.
 
 All its variables are scalar, Real (FMI 2) or Float64 (FMI 3), by these names; an FMU declares those that it uses:
 
@@ -13,21 +14,24 @@ All its variables are scalar, Real (FMI 2) or Float64 (FMI 3), by these names; a
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from tempfile import mkdtemp
 from typing import Any
 
+import msgspec
 from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import LawChoice
 from gridpeers.agents.carriers.program import ProgramLaw, ProgramReady
-from gridpeers.agents.laws.call import LawError
-from gridpeers.agents.laws.law import LIMITS, Law, Neighbour, Own, limits_in
+from gridpeers.agents.laws.call import LawError, decide, start_law
+from gridpeers.agents.laws.law import LIMITS, NOTHING_SHARED, Law, Neighbour, Own, SetPoints, limits_in
+from gridpeers.wire.plugins.registry import ANYTHING, named
 from gridpeers.wire.schema.table_reading import read_parameters
 from gridpeers.wire.wording import printable, suggestion
 
@@ -58,7 +62,7 @@ def fmu_problems(path: Path, parameters: Mapping[str, Any]) -> list[tuple[str, s
     own = {fmpy.platform, fmpy.platform_tuple}
     if not own & set(platforms):
         wrong.append(f"{path.name} is for {', '.join(platforms) or 'no platform'}, and this is {fmpy.platform}")
-    inputs, outputs = named(description, "input"), named(description, "output")
+    inputs, outputs = variables(description, "input"), variables(description, "output")
     for name in inputs:
         match = NEIGHBOUR.fullmatch(name)
         of_neighbour = match is not None and ("_shared_" in name or match[2] in OF_NEIGHBOUR)
@@ -66,7 +70,7 @@ def fmu_problems(path: Path, parameters: Mapping[str, Any]) -> list[tuple[str, s
             known = (*OWN, "T", "neighbours", *(f"neighbour_1_{field}" for field in OF_NEIGHBOUR))
             wrong.append(f"{path.name} has an input {name}; {suggestion(name, known, 'inputs')}")
     wrong += [f"{path.name} has no output {name}" for name in ("P_set", "V_set") if name not in outputs]
-    settable = named(description, "parameter")
+    settable = variables(description, "parameter")
     real = "Float64" if is_fmi3(description) else "Real"
     used = inputs | outputs | {name: variable for name, variable in settable.items() if name in parameters}
     for name, variable in used.items():
@@ -89,7 +93,7 @@ def is_fmi3(description: Any) -> bool:
     return str(description.fmiVersion).startswith("3")
 
 
-def named(description: Any, causality: str) -> dict[str, Any]:
+def variables(description: Any, causality: str) -> dict[str, Any]:
     return {variable.name: variable for variable in description.modelVariables if variable.causality == causality}
 
 
@@ -102,7 +106,7 @@ class FmuLaw(ProgramLaw):
             self._unpacked = mkdtemp(prefix="gridpeers-fmu-")
         except OSError as error:
             raise ValueError(f"law {path.name}: there is nowhere to unpack it: {error.strerror}; set TMPDIR") from None
-        command = (sys.executable, "-P", "-m", "gridpeers.agents.carriers.fmu_host", str(path), self._unpacked)
+        command = (sys.executable, "-P", "-m", "gridpeers.agents.carriers.fmu", str(path), self._unpacked)
         try:
             super().__init__(replace(choice, command=command), path.name, self._unpacked)
         except ValueError:
@@ -141,3 +145,126 @@ def _load_problem(path: str, changed: int, size: int) -> str:
     finally:
         law.close()
     return ""
+
+
+class LoadedFmu(Law):
+    """An FMU in this process, unpacked in a folder, as a law; whatever fmpy or the FMU raises comes through."""
+
+    def __init__(self, path: Path, folder: Path) -> None:
+        super().__init__()
+        import fmpy
+
+        self._name = path.name
+        description = fmpy.read_model_description(str(path))
+        fmpy.extract(str(path), str(folder))
+        self._inputs, self._outputs = variables(description, "input"), variables(description, "output")
+        self._settable = variables(description, "parameter")
+        self._room = max((int(match[1]) for name in self._inputs if (match := NEIGHBOUR.fullmatch(name))), default=0)
+        self._shared = [name.removeprefix("shared_") for name in self._outputs if name.startswith("shared_")]
+        self._given: dict[str, float] = {}
+        self._t = 0.0
+        self._begun = False
+        self._fmi3 = is_fmi3(description)
+        self._fmu = fmu = _instance(description, folder)
+        self._put, self._got = (fmu.setFloat64, fmu.getFloat64) if self._fmi3 else (fmu.setReal, fmu.getReal)
+
+    def take(self, parameters: Mapping[str, Any]) -> None:
+        for name in LIMITS:
+            setattr(self, name, float(parameters.get(name, getattr(Law, name))))
+        self._given = {name: float(value) for name, value in parameters.items() if name in self._settable}
+
+    def start(self, own: Own) -> None:
+        fmu = self._fmu
+        if self._begun:
+            fmu.terminate()
+            fmu.reset()
+        self._begun, self._t = True, 0.0
+        if not self._fmi3:
+            fmu.setupExperiment(startTime=0.0)
+        self._set(self._settable, self._given)
+        fmu.enterInitializationMode()
+        self._set(self._inputs, self._values(own, (), 0.0))
+        fmu.exitInitializationMode()
+
+    def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
+        if len(neighbours) > self._room and self._room:
+            raise LawError(f"it has room for {self._room} neighbours, and {own.name} hears {len(neighbours)}")
+        self._set(self._inputs, self._values(own, neighbours, T))
+        self._fmu.doStep(currentCommunicationPoint=self._t, communicationStepSize=T)
+        self._t += T
+        values = self._got([variable.valueReference for variable in self._outputs.values()])
+        got = dict(zip(self._outputs, map(float, values), strict=True))
+        shared = {name: got[f"shared_{name}"] for name in self._shared} or NOTHING_SHARED
+        return SetPoints(got["P_set"], got["V_set"], shared, got.get("send", 1.0) >= 0.5)
+
+    def close(self) -> None:
+        if self._begun:
+            self._fmu.terminate()
+        self._fmu.freeInstance()
+
+    def _values(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> dict[str, float]:
+        values = {f"own_{name}": float(value) for name, value in own._asdict().items() if name != "name"}
+        values |= {"T": T, "neighbours": float(len(neighbours))}
+        for i, other in enumerate(neighbours, start=1):
+            values |= {f"neighbour_{i}_{name}": float(getattr(other, name)) for name in OF_NEIGHBOUR}
+            values |= {f"neighbour_{i}_shared_{name}": value for name, value in other.shared.items()}
+        return values
+
+    def _set(self, known: Mapping[str, Any], values: Mapping[str, float]) -> None:
+        names = [name for name in known if name in values]
+        if names:
+            self._put([known[name].valueReference for name in names], [values[name] for name in names])
+
+
+def _instance(description: Any, folder: Path) -> Any:
+    if is_fmi3(description):
+        from fmpy.fmi3 import FMU3Slave as Slave
+    else:
+        from fmpy.fmi2 import FMU2Slave as Slave
+    fmu = Slave(
+        guid=description.guid,
+        unzipDirectory=str(folder),
+        modelIdentifier=description.coSimulation.modelIdentifier,
+        instanceName="law",
+    )
+    fmu.instantiate()
+    return fmu
+
+
+def main(path: str, folder: str) -> None:
+    lines, answers = sys.stdin.buffer, os.dup(1)
+    os.dup2(2, 1)
+    law, failed = None, ""
+    try:
+        law = LoadedFmu(Path(path), Path(folder))
+    except ANYTHING as error:  # a file may be anything
+        failed = named(error)
+    for line in lines:
+        asked = msgspec.json.decode(line)
+        try:
+            answer = {"error": failed} if law is None else _answer(law, asked)
+        except LawError as error:
+            answer = {"error": str(error)}
+        os.write(answers, msgspec.json.encode(answer) + b"\n")
+    try:
+        if law is not None:
+            law.close()
+    except ANYTHING as error:  # the run is over
+        print(f"{law}: cannot be freed: {named(error)}", file=sys.stderr)
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+def _answer(law: LoadedFmu, asked: dict[str, Any]) -> dict[str, Any]:
+    if asked["type"] == "load":
+        return {"type": "ready"}
+    own = Own(**asked["own"])
+    if asked["type"] == "start":
+        law.take(asked["parameters"])
+        start_law(law, own)
+        return {"type": "ready"}
+    decision = decide(law, own, [Neighbour(**other) for other in asked["neighbours"]], asked["T"])
+    return decision._asdict() | {"shared": dict(decision.shared)}
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -19,9 +19,8 @@ import msgspec
 from gridpeers.agents.agent_config import AgentConfig, Control
 from gridpeers.agents.agent_group import AgentGroup
 from gridpeers.agents.carriers.law_registry import close_laws, make_law
-from gridpeers.agents.known_agents import KnownAgents
 from gridpeers.agents.laws.law import Law
-from gridpeers.agents.lockstep_agent import LockstepAgent
+from gridpeers.agents.lockstep_agent import KnownAgents, LockstepAgent
 from gridpeers.plant.direct_plant import DirectPlant
 from gridpeers.plant.lockstep_plant import LockstepPlant
 from gridpeers.plant.plant_config import PlantConfig
