@@ -36,11 +36,10 @@ SWING = 0.02  # swing of a frequency (Hz) that is at rest
 
 
 class Unrest(NamedTuple):
-    """The reason why a plant does not come to rest."""
+    """The reason why a plant does not come to rest, in words, and whether leaders reached their current limit."""
 
     text: str
-    """"its frequencies swing by 0.35 Hz, and do not calm down", or what tripped, after which limit of a current."""
-    limited: bool  # whether grid-forming inverters were at their current limit
+    limited: bool
 
 
 def unsteady(scenario: ScenarioModel, feeder: Tables, case: str) -> Unrest | None:
@@ -50,17 +49,16 @@ def unsteady(scenario: ScenarioModel, feeder: Tables, case: str) -> Unrest | Non
     forming = [row.name for row in feeder.inverters if row.kind == "GFM"]
     settings = config.settings
     last = max([*(event.t for event in settings.events), *(event.t for event in settings.loads)], default=0.0)
-    found: list[list[float]] = []
+    f: list[list[float]] = []
     for _ in range(round((last + SETTLE) / config.T_c)):
         plant.advance()
         readings = plant.measure()
-        found.append([readings[name].f if readings[name].island != OFF else np.nan for name in forming])
+        f.append([readings[name].f if readings[name].island != OFF else np.nan for name in forming])
     happened = plant.take_events()
     limits = [event.text for event in happened if LIMITS in event.text][:1]
-    trips = [event.text for event in happened if event.kind == "trip"][:1]
-    if trips:
+    if trips := [event.text for event in happened if event.kind == "trip"][:1]:
         return Unrest(", and ".join([*limits, *trips]), bool(limits))
-    f, window = np.array(found), round(WINDOW / config.T_c)
+    window = round(WINDOW / config.T_c)
     before, after = (float(np.ptp(part, axis=0).max()) for part in (f[-2 * window : -window], f[-window:]))
     if after < SWING or after < 0.5 * before:
         return None
@@ -115,6 +113,7 @@ BETA = """
 beta_GFM = {beta}  # 1 as a rule: here the vars would stay unequal where voltages differ along the feeder
 beta_GFL = {beta}
 """
+VARS = {"var_sharing"}  # check that fails where vars stay unequal
 BETAS = 4.0, 16.0, 64.0  # weights of var sharing, beside that of the voltage error, to try where vars stay unequal
 GRAPHS = {"ring": "agents in a ring", "clustered": "agents of each microgrid and all leaders"}
 """Graphs of a proposed scenario, and their words."""
@@ -136,9 +135,9 @@ class _Project:
         self.part = 1.0
         self.settings = ""
 
-    def write(self, part: float | None = None, settings: str = "") -> tuple[ScenarioModel, Tables]:
-        """Write it with this part of the proposed P_set0, as before if None, and settings; return what a run reads."""
-        self.part, self.settings = self.part if part is None else part, settings
+    def write(self, settings: str = "") -> tuple[ScenarioModel, Tables]:
+        """Write it with `part` of the proposed P_set0, and settings; return what a run reads."""
+        self.settings = settings
         text = SCENARIO.format(
             feeder=self.feeder_name,
             folder=self.tables,
@@ -152,12 +151,24 @@ class _Project:
         self.file.write_text(text, encoding="utf-8")
         return load_scenario(str(self.file))
 
+    def can_start(self) -> bool:
+        """Choose the largest part of P_set0 with which the plant starts; say why there is none."""
+        problems = []
+        for self.part in PARTS:
+            if not (problem := start_problem(*self.write())):
+                return True
+            problems.append(problem)
+        check = command_line("check", str(self.file))
+        typer.echo(f"NOTE  it cannot start yet: {problems[0]}; edit the inverters, then: {check}")
+        return False
+
     def calmed(self) -> bool:
+        """Choose settings with which the plant comes to rest on droop alone; say what was changed, or what fails."""
         if not (found := unsteady(*self.write(), "none")):
             return True
         for settings, words in REMEDIES.items():
             worth_a_try = found.limited or MORE_CURRENT not in settings
-            if worth_a_try and not unsteady(*self.write(settings=settings), "none"):
+            if worth_a_try and not unsteady(*self.write(settings), "none"):
                 typer.echo(f"NOTE  on droop alone, {found.text}: so {words}")
                 return True
         self.write()
@@ -170,35 +181,30 @@ class _Project:
         Where more than var sharing fails and a leader was at its current limit, leaders get more current; where vars
         stay unequal, var sharing weighs more.
         """
-        first, limited = self._failed_checks()
-        if set(first) - {"var_sharing"} and limited and MORE_CURRENT not in self.settings:
-            before = self.settings
-            self.write(settings=before + MORE_CURRENT)
-            found, _ = self._failed_checks()
-            if set(found) <= {"var_sharing"}:
-                check, sentence = next(iter(first.items()))
-                words = REMEDIES[MORE_CURRENT]
-                typer.echo(f"NOTE  case {self.graph} fails its check {check}: {sentence}: so {words}")
-                first = found
-            else:
-                self.write(settings=before)
-        before = self.settings
-        if set(first) == {"var_sharing"}:
-            for beta in BETAS:
-                self.write(settings=before + BETA.format(beta=beta))
-                found, _ = self._failed_checks()
-                if not found:
-                    words = f"so [gains] weighs var sharing more, beta_GFM = beta_GFL = {beta:g}"
-                    typer.echo(f"NOTE  case {self.graph}, {first['var_sharing']}: {words}")
-                    return
-                if set(found) != {"var_sharing"}:
-                    break
-            self.write(settings=before)
-        for check, sentence in first.items():
-            typer.echo(f"NOTE  case {self.graph} fails its check {check}: {sentence}")
+        chosen, case = self.settings, f"NOTE  case {self.graph}"
+        failed, limited = self._failed_checks(chosen)
+        if failed.keys() - VARS and limited and MORE_CURRENT not in chosen:
+            left, _ = self._failed_checks(chosen + MORE_CURRENT)
+            if left.keys() <= VARS:
+                check, sentence = next(iter(failed.items()))
+                typer.echo(f"{case} fails its check {check}: {sentence}: so {REMEDIES[MORE_CURRENT]}")
+                chosen, failed = chosen + MORE_CURRENT, left
+        left = failed
+        for beta in BETAS:
+            if left.keys() != VARS:
+                break
+            left, _ = self._failed_checks(chosen + BETA.format(beta=beta))
+            if not left:
+                words = f"so [gains] weighs var sharing more, beta_GFM = beta_GFL = {beta:g}"
+                typer.echo(f"{case}, {failed['var_sharing']}: {words}")
+                return
+        self.write(chosen)
+        for check, sentence in failed.items():
+            typer.echo(f"{case} fails its check {check}: {sentence}")
 
-    def _failed_checks(self) -> tuple[dict[str, str], bool]:
+    def _failed_checks(self, settings: str) -> tuple[dict[str, str], bool]:
         """Run the agents' case; return what its failed checks say, and whether a leader was at its current limit."""
+        self.write(settings)
         result = load(self.file).run(self.graph)
         failed = [row for row in result.check_verdicts if row.status == "failed"]
         told = {row.check: row.violations[0].sentence if row.violations else row.reason for row in failed}
@@ -226,22 +232,13 @@ def propose_project(folder: Path, script: Path, switches: list[str], leave_out: 
     with_inverters = msgspec.structs.replace(feeder, inverters=proposal.inverters)
     project = _Project(folder, feeder, proposal)
     save_readable(with_inverters, folder / project.tables, script.name)
-    problems: list[str] = []
     with explained(lambda: typer.echo(TRYING)):
-        for part in PARTS:
-            problem = start_problem(*project.write(part))
-            if not problem:
-                break
-            problems.append(problem)
-        if problem:
-            check = command_line("check", str(project.file))
-            typer.echo(f"NOTE  it cannot start yet: {problems[0]}; edit the inverters, then: {check}")
-        elif project.calmed():
+        if project.can_start() and project.calmed():
             settings = project.settings
             try:
                 project.tried_with_agents()
             except BrokenRunError as error:
-                project.write(settings=settings)
+                project.write(settings)
                 typer.echo(f"NOTE  case {project.graph} was not checked, as a run of it broke: {error}")
     if count is not None and len(proposal.inverters) < count:
         typer.echo(f"NOTE  no bus for more than {len(proposal.inverters)} of the {count} inverters of --inverters")
