@@ -16,7 +16,7 @@ from unittest.mock import patch
 import gridpeers as gp
 from bench.harness import DEADLINE, GRIDPEERS, checked, processor_time
 from gridpeers.agents.lockstep_agent import LockstepAgent
-from gridpeers.bridges.gridlabd import gridlabd_process
+from gridpeers.bridges.gridlabd import gridlabd_plant
 from gridpeers.bridges.gridlabd.gridlabd_plant import GridlabdPlant
 from gridpeers.plant.build import build_plant
 from gridpeers.plant.lockstep_plant import LockstepPlant
@@ -62,7 +62,7 @@ class OurCase:
         """
         ours = build_plant(self.plant)
         with (
-            patch.object(gridlabd_process, "KEPT_MEMORY", {}),
+            patch.object(gridlabd_plant, "KEPT_MEMORY", {}),
             closing(GridlabdPlant(ours, self.plant.settings, self.plant.T_c, self.end)) as plant,
         ):
             started = processor_time(plant.process.pid)

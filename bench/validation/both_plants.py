@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from bench.validation.gridlabd_runs import ON_ONE_PHASE, RUNS, SHORT, ComparedRun, Reclosing, shortened
 from bench.validation.validation_part import CaseResult, ToleranceCheck, ValidationPart, inverter_row
 from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.bridges.gridlabd.export_glm import write_tables
+from gridpeers.bridges.gridlabd.glm import write_tables
 from gridpeers.bridges.gridlabd.gridlabd_plant import GridlabdPlant
 from gridpeers.plant.equipment import Feeder, InverterRow
 from gridpeers.plant.feeder import Plant

@@ -1,14 +1,23 @@
-"""A feeder of our tables as a GridLAB-D model (GLM) that steps its inverters in delta mode."""
+"""A feeder as a model for GridLAB-D (GLM): with inverters that it steps in delta mode, or a power flow alone."""
 
 from __future__ import annotations
 
 import csv
+import tempfile
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from math import pi, sqrt
 from pathlib import Path
 
 from gridpeers.bridges.gridlabd.glm_network import F_NOM, TableRow, block, network_blocks
-from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters, InverterParameters
+from gridpeers.bridges.gridlabd.gridlabd_simulator import beyond_gridlabd, unrepresentable
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment.inverter_parameters import GfmParameters, InverterParameters
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import PlantSettings
+from gridpeers.plant.tables import FeederError
+from gridpeers.plant.tables.write import TAP_STEP, write_feeder
 
 
 def node_of(bus: str, phases: str) -> str:
@@ -20,6 +29,18 @@ def node_of(bus: str, phases: str) -> str:
     return f"n{bus}" if phases in ("", "ABC") else f"n{bus}_{phases}"
 
 
+GFM_KEYS = {  # properties of GridLAB-D, and our parameters
+    **{"Rfilter": "R_f", "Xfilter": "X_f", "Tp": "T_p", "Tq": "T_q", "Tv": "T_v", "Imax": "I_max", "w_lim": "w_lim"},
+    **{"Pmax": "P_max", "Pmin": "P_min", "kppmax": "k_pp", "kipmax": "k_ip", "kpv": "k_pv", "kiv": "k_iv"},
+    **{"Qmax": "Q_max", "Qmin": "Q_min", "kpqmax": "k_pq", "kiqmax": "k_iq", "E_min": "E_min", "E_max": "E_max"},
+}
+GFL_KEYS = {
+    **{"kpPLL": "k_pPLL", "kiPLL": "k_iPLL", "F_current": "F_current", "Tif": "T_if", "Tff": "T_ff", "Tpf": "T_pf"},
+    **{"Tvf": "T_vf", "Tqf": "T_qf", "db_UF": "db_UF", "db_OF": "db_OF", "db_UV": "db_UV", "db_OV": "db_OV"},
+}
+GFL_IMPEDANCES = {"Rfilter": "R_f", "Xfilter": "X_f", "kpc": "k_pc", "kic": "k_ic"}
+
+
 def inverter_blocks(
     rows: Sequence[TableRow], start: Mapping[str, complex], parameters: Mapping[str, InverterParameters]
 ) -> list[str]:
@@ -27,7 +48,35 @@ def inverter_blocks(
     blocks = []
     for row in rows:
         S, own = start[row["name"]], parameters[row["name"]]
-        unit = _gfm(row, own) if isinstance(own, GfmParameters) else _gfl(row, own)
+        rated, m_p, m_q = float(row["P_rated_kW"]) * 1e3, float(row["m_p_pu"]), float(row["m_q_pu"])
+        unit: dict[str, str | float]
+        if isinstance(own, GfmParameters):
+            unit = {
+                "control_mode": "GRID_FORMING",
+                "P_f_droop_setting_mode": "PSET_MODE",
+                "rated_power": rated,
+                "mp": m_p * 2 * pi * F_NOM,
+                "mq": m_q,
+                **{key: getattr(own, name) for key, name in GFM_KEYS.items()},
+            }
+        else:
+            # GridLAB-D's limit of apparent power is 1 pu of `rated_power`, ours S_max pu of the rating: so
+            # `rated_power` is S_max ratings, and everything per unit is converted to that base
+            base, i_max = own.S_max, own.i_max / own.S_max
+            unit = {
+                "control_mode": "GRID_FOLLOWING" if own.model == "voltage_source" else "GFL_CURRENT_SOURCE",
+                "grid_following_mode": own.mode.upper(),
+                "rated_power": rated * base,
+                "Rp": m_p * base,
+                "Rq": m_q * base,
+                **{key: getattr(own, name) * base for key, name in GFL_IMPEDANCES.items()},
+                **{key: getattr(own, name) for key, name in GFL_KEYS.items()},
+                "frequency_watt": str(own.frequency_watt).lower(),
+                "volt_var": str(own.volt_var).lower(),
+                "Pref_max": own.P_max / base,
+                "Pref_min": own.P_min / base,
+                **{f"ig{axis}_ref_{end}": sign * i_max for axis in "dq" for end, sign in (("max", 1.0), ("min", -1.0))},
+            }
         blocks.append(
             block(
                 "inverter_dyn",
@@ -43,54 +92,6 @@ def inverter_blocks(
             )
         )
     return blocks
-
-
-GFM_KEYS = (
-    *(("Rfilter", "R_f"), ("Xfilter", "X_f"), ("Tp", "T_p"), ("Tq", "T_q"), ("Tv", "T_v"), ("Imax", "I_max")),
-    *(("Pmax", "P_max"), ("Pmin", "P_min"), ("kppmax", "k_pp"), ("kipmax", "k_ip"), ("w_lim", "w_lim")),
-    *(("Qmax", "Q_max"), ("Qmin", "Q_min"), ("kpqmax", "k_pq"), ("kiqmax", "k_iq"), ("kpv", "k_pv"), ("kiv", "k_iv")),
-    *(("E_min", "E_min"), ("E_max", "E_max")),
-)  # properties of GridLAB-D, and our parameters
-GFL_KEYS = (
-    *(("kpPLL", "k_pPLL"), ("kiPLL", "k_iPLL"), ("F_current", "F_current"), ("Tif", "T_if"), ("Tff", "T_ff")),
-    *(("Tpf", "T_pf"), ("Tvf", "T_vf"), ("Tqf", "T_qf")),
-    *(("db_UF", "db_UF"), ("db_OF", "db_OF"), ("db_UV", "db_UV"), ("db_OV", "db_OV")),
-)
-GFL_IMPEDANCES = (("Rfilter", "R_f"), ("Xfilter", "X_f"), ("kpc", "k_pc"), ("kic", "k_ic"))
-
-
-def _gfm(row: TableRow, gfm: GfmParameters) -> dict[str, str | float]:
-    return {
-        "control_mode": "GRID_FORMING",
-        "P_f_droop_setting_mode": "PSET_MODE",
-        "rated_power": float(row["P_rated_kW"]) * 1e3,
-        "mp": float(row["m_p_pu"]) * 2 * pi * F_NOM,
-        "mq": float(row["m_q_pu"]),
-        **{key: getattr(gfm, own) for key, own in GFM_KEYS},
-    }
-
-
-def _gfl(row: TableRow, gfl: GflParameters) -> dict[str, str | float]:
-    """Parameters of a GFL, on the base that GridLAB-D ties its apparent-power limit to.
-
-    There this limit is 1 pu of `rated_power`. With ours at S_max pu of the rating, `rated_power` is S_max ratings and
-    everything per unit is converted to that base.
-    """
-    base, i_max = gfl.S_max, gfl.i_max / gfl.S_max
-    return {
-        "control_mode": "GRID_FOLLOWING" if gfl.model == "voltage_source" else "GFL_CURRENT_SOURCE",
-        "grid_following_mode": gfl.mode.upper(),
-        "rated_power": float(row["P_rated_kW"]) * 1e3 * base,
-        "Rp": float(row["m_p_pu"]) * base,
-        "Rq": float(row["m_q_pu"]) * base,
-        **{key: getattr(gfl, own) * base for key, own in GFL_IMPEDANCES},
-        **{key: getattr(gfl, own) for key, own in GFL_KEYS},
-        "frequency_watt": str(gfl.frequency_watt).lower(),
-        "volt_var": str(gfl.volt_var).lower(),
-        "Pref_max": gfl.P_max / base,
-        "Pref_min": gfl.P_min / base,
-        **{f"ig{axis}_ref_{end}": sign * i_max for axis in "dq" for end, sign in (("max", 1.0), ("min", -1.0))},
-    }
 
 
 START = "2000-01-01 00:00:00"  # GridLAB-D's clock at the start; delta mode begins one second later
@@ -184,3 +185,68 @@ object recorder {{
 	interval 1;
 	file "/dev/null";
 }}"""
+
+
+POWER_FLOW_HEADER = f"""clock {{
+	timezone UTC0;
+	starttime '{START}';
+	stoptime '{START[:-1]}1';
+}}
+module powerflow {{
+	solver_method NR;
+	line_capacitance true;
+	line_limits false;
+	default_maximum_voltage_error 1e-11;
+}}"""
+"""Head of the model of a feeder without inverters, whose power flow is solved once."""
+
+
+def export_glm(feeder: Feeder, settings: PlantSettings, seconds: int, voltages: str) -> str:
+    """Return a feeder as a GridLAB-D model: with inverters in delta mode, without any as a power flow.
+
+    Each inverter begins with the power of our operating point; GridLAB-D finds the set-points that belong to it. The
+    run lasts 1 to 50 `seconds`, and GridLAB-D writes the voltages of its start to the CSV file `voltages`. FeederError
+    has all that the model cannot represent; without an operating point it is a RuntimeError.
+    """
+    problems = unrepresentable(feeder)
+    for row in feeder.inverters:
+        for key, value in beyond_gridlabd(feeder.parameters_of(row, settings.gfm, settings.gfl)).items():
+            problems.append(f"{row.name} has {key} = {value}, which no {row.kind} of GridLAB-D has; leave it out")
+    if problems:
+        raise FeederError(feeder.name, tuple(problems))
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        write_tables(feeder, folder)
+        if feeder.inverters:
+            parameters = {row.name: feeder.parameters_of(row, settings.gfm, settings.gfl) for row in feeder.inverters}
+            plant = Plant(Network(feeder), settings, settings.h, settings.h)
+            start = {name: complex(reading.P, reading.Q) for name, reading in plant.measure().items()}
+            text = write_glm(folder, feeder.load_set, start, parameters, settings.h, seconds)
+        else:
+            V_nom = {bus.name: bus.V_nom for bus in feeder.buses}
+            text = "\n".join((POWER_FLOW_HEADER, *network_blocks(read_tables(folder), feeder.load_set, V_nom, ())))
+    head = f"// {feeder.name}, load set {feeder.load_set}, by gridpeers. Bus 13 is node n13.\n"
+    return f'{head}{text}\nobject voltdump {{\n\tfilename "{voltages}";\n\tmode RECT;\n}}\n'
+
+
+def write_tables(feeder: Feeder, folder: Path) -> None:
+    """Write the tables of a feeder, for `write_glm`.
+
+    Regulators have whole taps: of the usual step, or one tap of a step of their own.
+    """
+    write_feeder(feeder, folder)
+    if not feeder.regulators:
+        return
+    rows: list[TableRow] = []
+    for each in feeder.regulators:
+        tap, step = (each.ratio - 1.0) / TAP_STEP, TAP_STEP
+        if abs(tap - round(tap)) > 1e-9 or abs(tap) > 16:
+            tap, step = (1, each.ratio - 1.0) if each.ratio > 1.0 else (-1, 1.0 - each.ratio)
+        ends = {"from_bus": each.from_bus, "to_bus": each.to_bus, "phases": each.phases}
+        rows.append({"regulator": each.name, **ends, "tap": str(round(tap)), "tap_step_pu": repr(step)})
+    steps = Counter(name for name, _ in {(row["regulator"], row["tap_step_pu"]) for row in rows})
+    lines = [",".join(rows[0])]
+    for row in rows:
+        name = row["regulator"] if steps[row["regulator"]] == 1 else row["regulator"] + row["phases"]
+        lines.append(",".join([name, *list(row.values())[1:]]))
+    (folder / "regulators.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -1,9 +1,11 @@
-"""The text of a model for GridLAB-D: commands that we do not let run, the lines of objects, and classes of these."""
+"""Texts of GridLAB-D: of a model, with the lines and classes of its objects, and what GridLAB-D complains of."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
+
+from gridpeers.wire.wording import printable
 
 INCLUDE = re.compile(r'^\s*#include\s+["<]([^">]+)[">]', re.IGNORECASE)
 
@@ -61,6 +63,40 @@ class GlmText:
             if included := INCLUDE.match(whole):
                 # GridLAB-D seeks it from its working folder, which is that of the first model
                 self._read(self._path.parent / included[1].replace("\\", "/"), depth + 1)
+
+
+PLACED = re.compile(r"^(?P<file>\S[^()]*)\((?P<line>\d+)\)\s*: (?P<text>.*)$")
+"""A message of the loader: file, line, text."""
+
+LEVELLED = re.compile(r"^(?:ERROR|FATAL)\s+\[[^\]]*\]\s*: (?P<text>.*)$")  # A message of the simulation that ends it
+FOLLOWING = re.compile(  # messages that only repeat that something failed
+    r"load failed at or near|unable to load '|failed to load model file|model initialization failed"
+    r"|run_preparation\(\) returned|shutdown after simulation|last (error|warning) message was repeated"
+    r"|Failed to initialize simulation|initialization failed$|dump complete to|tzinfo\.txt|environment startup failed"
+)
+
+
+def messages(printed: str) -> list[str]:
+    r"""Return what GridLAB-D complains of, each message once; what only repeats that something failed if nothing else.
+
+    >>> messages("x.glm(3): class 'foo' is not known\nx.glm(3): load failed at or near 'object foo'\n")
+    ["x.glm:3: class 'foo' is not known"]
+    >>> messages("ERROR    [INIT] : NR: no swing bus found\nWARNING  [INIT] : slow\n")
+    ['GridLAB-D: NR: no swing bus found']
+    """
+    found: list[str] = []
+    following: list[str] = []
+    for line in printed.replace("\r", "\n").splitlines():
+        placed, levelled = PLACED.match(line), LEVELLED.match(line)
+        if placed:
+            text = f"{Path(placed['file']).name}:{placed['line']}: {printable(placed['text'].strip())}"
+        elif levelled:
+            text = f"GridLAB-D: {printable(levelled['text'].strip())}"
+        else:
+            continue
+        (following if FOLLOWING.search(line) else found).append(text)
+    found.sort(key=lambda text: text.startswith("GridLAB-D: "))  # those with a file and a line come first
+    return list(dict.fromkeys(found or following))
 
 
 CHILD_OF_BUS = ("node", "load", "meter", "triplex_node", "triplex_meter", "triplex_load", "capacitor", "substation")

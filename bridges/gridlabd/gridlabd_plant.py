@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import os
+import sys
+from collections.abc import Sequence
 from math import isfinite
+from pathlib import Path
+from time import monotonic
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gridpeers.bridges.gridlabd.glm import write_glm
-from gridpeers.bridges.gridlabd.gridlabd_process import DeltaModeProcess, GridlabdError
+from gridpeers.bridges.gridlabd.glm_text import messages
 from gridpeers.plant.dynamics.reduction import Reduction
 from gridpeers.plant.equipment.inverter_parameters import GflParameters
 from gridpeers.plant.feeder import Plant
@@ -20,9 +25,11 @@ from gridpeers.plant.feeder.protection import Relays
 from gridpeers.plant.feeder.switchboard import Switchboard
 from gridpeers.plant.plant_config import PlantSettings, PowerLimit
 from gridpeers.plant.plant_interface import Reading, RecordedPlant
+from gridpeers.plant.request_process import ProcessEndedError, RequestProcess, TransientFolder
 from gridpeers.plant.tables.read import DATA
 from gridpeers.wire.messages import LoadSetting, PlantEvent
 from gridpeers.wire.timing import time_of
+from gridpeers.wire.wording import damaged
 
 REST = 0.5
 """Time (s) that GridLAB-D rests before t = 0, holding the set-points of the start: its own equilibrium, not ours."""
@@ -223,3 +230,64 @@ class GridlabdPlant(RecordedPlant):
                 f"plant at t = {time_of(step, self._h):g} s: protection trips {names}. GridLAB-D's inverter has none, "
                 'so the run ends here; write [protection] category = "off", or simulator = "gridpeers"'
             )
+
+
+SHOWN = 2  # so many of GridLAB-D's own errors are in an error of ours; the first ones are the cause, the others follow
+LONGEST = 600.0  # longest time (s) until a model is loaded and its first step done
+KEPT_MEMORY = {"MALLOC_MMAP_THRESHOLD_": str(32 * 2**20), "MALLOC_TRIM_THRESHOLD_": str(2**30)}
+"""Lets glibc keep the memory of one power flow for the next: GridLAB-D's solver takes and returns its matrices in every
+iteration. Returned to the system each time, they take a quarter of the processor time. No number depends on it."""
+
+
+class GridlabdError(RuntimeError):
+    """GridLAB-D is missing, refuses its model, diverges, or has ended."""
+
+
+class DeltaModeProcess:
+    """GridLAB-D in a process of its own, which ends with this one; `deadline` is the longest wait for an answer (s)."""
+
+    def __init__(self, deadline: float) -> None:
+        self._deadline = deadline
+        self._folder = TransientFolder("gridpeers-gridlabd-")  # GridLAB-D writes files of its own where it stands
+        command = [sys.executable, "-P", str(Path(__file__).with_name("delta_mode.py")), str(os.getpid())]
+        self._process = RequestProcess(command, self._folder, KEPT_MEMORY)
+
+    @property
+    def pid(self) -> int:
+        return self._process.pid
+
+    def load(self, model: str, inverters: Sequence[tuple[str, str, str, str]]) -> None:
+        """Load the text of a model, and take its first step.
+
+        `inverters` has the name, node, kind and phases of each inverter to read.
+        """
+        path = self._folder.path / "feeder.glm"
+        path.write_text(model, encoding="utf-8")
+        self._answer({"load": str(path), "inverters": inverters}, LONGEST)
+
+    def ask(self, **request: Any) -> dict[str, Any]:
+        """Return the answer to a request (`delta_mode`); GridlabdError has GridLAB-D's own errors."""
+        return self._answer(request, self._deadline)
+
+    def close(self) -> None:
+        self._process.close()
+        self._folder.close()
+
+    def _answer(self, request: dict[str, Any], deadline: float) -> dict[str, Any]:
+        self._process.send(request)
+        try:
+            answer = self._process.answer(monotonic() + deadline)
+        except ProcessEndedError as how:
+            raise GridlabdError(f"GridLAB-D's process {how}{self._complaints()}") from None
+        if answer is None:
+            raise GridlabdError(f"GridLAB-D has not answered for {deadline:g} s, so it was ended{self._complaints()}")
+        if "not_importable" in answer:
+            raise GridlabdError(damaged("gridlabd", answer["not_importable"], "GridLAB-D as the plant"))
+        if "error" in answer:
+            raise GridlabdError(f"GridLAB-D: {answer['error']}{self._complaints()}")
+        return answer
+
+    def _complaints(self) -> str:
+        """Return GridLAB-D's first errors as the end of a sentence, on one line as all that goes over the wire."""
+        first = [text.removeprefix("GridLAB-D: ").rstrip(".") for text in messages(self._process.printed())[:SHOWN]]
+        return f"; its own words: {'; '.join(first)}" if first else "; it has printed no error"

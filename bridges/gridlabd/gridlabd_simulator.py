@@ -27,7 +27,7 @@ class GridlabdSimulator(Simulator):
     words = 'the plant of simulator "gridlabd"'
 
     def start(self, config: PlantConfig, feeder: Feeder) -> LivePlant:
-        from gridpeers.bridges.gridlabd.export_glm import write_tables
+        from gridpeers.bridges.gridlabd.glm import write_tables
         from gridpeers.bridges.gridlabd.gridlabd_plant import GridlabdPlant  # scenarios are checked without it
         from gridpeers.plant.feeder import Plant
         from gridpeers.plant.network import Network

@@ -29,9 +29,9 @@ from gridpeers.bridges.gridlabd.glm_text import (
     SWITCHES,
     WATCHING,
     GlmText,
+    messages,
 )
 from gridpeers.bridges.gridlabd.gridlabd_power_flow import PV, SWING
-from gridpeers.bridges.gridlabd.gridlabd_process import messages
 from gridpeers.plant.equipment import Feeder, Source
 from gridpeers.plant.tables.read import FeederError
 from gridpeers.wire.wording import printable, suggestion

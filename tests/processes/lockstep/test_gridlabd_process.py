@@ -14,7 +14,7 @@ import pytest
 from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.bridges.gridlabd.gridlabd_process import DeltaModeProcess, GridlabdError
+from gridpeers.bridges.gridlabd.gridlabd_plant import DeltaModeProcess, GridlabdError
 from gridpeers.plant.plant_config import PlantConfig, Protection
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.run_request import Outcome

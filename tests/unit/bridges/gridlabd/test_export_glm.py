@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from gridpeers.bridges.gridlabd.export_glm import export_glm
+from gridpeers.bridges.gridlabd.glm import export_glm
 from gridpeers.plant.equipment import Feeder, Load
 from gridpeers.plant.equipment.inverter_parameters import REGFM_A1, GfmParameters
 from gridpeers.plant.feeder import Plant

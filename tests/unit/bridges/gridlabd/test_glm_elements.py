@@ -7,7 +7,7 @@ import pytest
 from msgspec.structs import replace
 
 from bench.validation.kirchhoff import kirchhoff_residual
-from gridpeers.bridges.gridlabd.export_glm import export_glm
+from gridpeers.bridges.gridlabd.glm import export_glm
 from gridpeers.bridges.gridlabd.glm_elements import V_MIN
 from gridpeers.bridges.gridlabd.read_glm import read_glm
 from gridpeers.plant.dynamics import Dynamics
