@@ -88,3 +88,21 @@ class RecordedPlant:
     def take_events(self) -> tuple[PlantEvent, ...]:
         events, self._events = tuple(self._events), []
         return events
+
+
+class SimulatedPlant(RecordedPlant):
+    """The plant of another simulator, which runs in simulated time alone: by hand nobody operates or sets anything."""
+
+    @property
+    def switches(self) -> Mapping[str, bool]:
+        return {}
+
+    def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
+        raise ValueError(f"switch {name}: only the events of the scenario operate the switches of this simulator")
+
+    @property
+    def loads(self) -> Mapping[str, complex]:
+        return {}
+
+    def set_load(self, name: str, setting: LoadSetting) -> str:
+        raise ValueError(f"load {name}: nothing sets the loads of this simulator")

@@ -24,10 +24,10 @@ from gridpeers.plant.feeder.limit_events import SetPointLimits
 from gridpeers.plant.feeder.protection import Relays
 from gridpeers.plant.feeder.switchboard import Switchboard
 from gridpeers.plant.plant_config import PlantSettings, PowerLimit
-from gridpeers.plant.plant_interface import Reading, RecordedPlant
+from gridpeers.plant.plant_interface import Reading, SimulatedPlant
 from gridpeers.plant.request_process import ProcessEndedError, RequestProcess, TransientFolder
 from gridpeers.plant.tables.read import DATA
-from gridpeers.wire.messages import LoadSetting, PlantEvent
+from gridpeers.wire.messages import PlantEvent
 from gridpeers.wire.timing import time_of
 from gridpeers.wire.wording import damaged
 
@@ -35,7 +35,7 @@ REST = 0.5
 """Time (s) that GridLAB-D rests before t = 0, holding the set-points of the start: its own equilibrium, not ours."""
 
 
-class GridlabdPlant(RecordedPlant):
+class GridlabdPlant(SimulatedPlant):
     """A plant with GridLAB-D's numbers, controlled by the same agents (`gridpeers.plant.plant_interface.PlantLike`).
 
     GridLAB-D's initialisation takes the powers of the inverters and chooses set-points that give them; a scenario gives
@@ -126,24 +126,6 @@ class GridlabdPlant(RecordedPlant):
         else:  # GridLAB-D bounds it at S_max itself
             self._writes.append((name, "Pref", P_set if own.P_set_lim == own.S_max else P * unit.P_rated))
         self._writes.append((name, "Vset", V))
-
-    @property
-    def switches(self) -> dict[str, bool]:
-        return self._switchboard.positions
-
-    def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
-        if synchronised:
-            raise ValueError("GridLAB-D as the plant has no synchronism check; close without it")
-        known = self._network.switch_name(name)
-        self._switchboard.put(self.tick * self._steps, known, action)
-        return (known in self._switchboard.closed) == (action == "close")
-
-    @property
-    def loads(self) -> dict[str, complex]:
-        return {}  # they stay as in the model
-
-    def set_load(self, name: str, setting: LoadSetting) -> str:
-        raise ValueError(f"load {name}: GridLAB-D as the plant keeps the loads of its model; use our own plant")
 
     def connect(self, name: str, on: bool) -> None:
         """Do nothing if an inverter comes that is there; RuntimeError if it goes: GridLAB-D's inverters stay."""

@@ -4,26 +4,59 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import pairwise
 
 import msgspec
 
 from gridpeers.bridges.helics.federate import HelicsError, HelicsFederate
 from gridpeers.bridges.helics.helics_simulator import settings_of
-from gridpeers.bridges.helics.topics import ACT, HELD, SENSORS, SET_POINTS, WHERE, Value, events, number, topics
+from gridpeers.bridges.helics.topics import (
+    ACT,
+    HELD,
+    SENSORS,
+    SET_POINTS,
+    WHERE,
+    Topic,
+    Value,
+    events,
+    number,
+    topics,
+)
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.plant_config import PlantConfig
-from gridpeers.plant.plant_interface import LivePlant, Reading, RecordedPlant
+from gridpeers.plant.plant_interface import PlantLike, Reading, SimulatedPlant
 from gridpeers.wire.codec import decode_foreign
-from gridpeers.wire.messages import NAME, LoadSetting, PlantEvent
+from gridpeers.wire.messages import NAME, PlantEvent
 from gridpeers.wire.timing import time_of
 from gridpeers.wire.wording import first_of
 
 SHOWN = 4  # topics that an error names
 
 
-class HelicsPlant(RecordedPlant):
+class FederatePlant(SimulatedPlant):
+    """A plant with a federate, which it gets before all else: others give up to connect while a plant is compiled."""
+
+    def __init__(self, config: PlantConfig) -> None:
+        helics = settings_of(config.settings)
+        self.tick = 0
+        self._T_c, self._record = config.T_c, config.record_step
+        self._end_tick = None if config.end is None else round(config.end / config.T_c)
+        self._prefix, self._events_key = helics.prefix, events(helics.prefix).key
+        self._outgoing: dict[str, Value] = {}  # values to publish with the next step
+        self._federate = HelicsFederate(helics, config.deadline)
+
+    def close(self) -> None:
+        if self.tick == self._end_tick:
+            self._federate.end(self._outgoing)
+        else:
+            self._federate.abort(f"the run ended at t = {time_of(self.tick, self._T_c):g} s, before its end")
+
+    def _keys(self, inverters: Iterable[str], *groups: Sequence[Topic]) -> list[str]:
+        return [topic.key for topic in topics(self._prefix, inverters, *groups)]
+
+
+class HelicsPlant(FederatePlant):
     """The plant's side of our agents, and a controller in the federation.
 
     At record time t it asks for t + `ACT` and reads what was published until t; at a tick it publishes there the
@@ -32,28 +65,22 @@ class HelicsPlant(RecordedPlant):
     """
 
     def __init__(self, config: PlantConfig, feeder: Feeder) -> None:
-        settings, helics = config.settings, settings_of(config.settings)
-        prefix = self._prefix = helics.prefix
+        super().__init__(config)
+        settings = config.settings
         self.inverters = tuple(row.name for row in feeder.inverters)
-        self.tick = 0
-        self._T_c, self._record = config.T_c, config.record_step
         self._rows_a_tick = round(config.T_c / config.record_step)
-        self._end_tick = None if config.end is None else round(config.end / config.T_c)
-        self._row_keys = [topic.key for topic in topics(prefix, self.inverters, SENSORS, HELD)]
-        self._events_key = events(prefix).key
-        needed = topics(prefix, self.inverters, SENSORS)
-        self._needed = [topic.key for topic in needed]
+        self._row_keys = self._keys(self.inverters, SENSORS, HELD)
+        self._needed = self._keys(self.inverters, SENSORS)
         self._values: dict[str, Value] = {}
         self._came: set[str] = set()  # topics that the outside plant has published
         for row in feeder.inverters:  # held until somebody says otherwise
             self._hold(row.name, settings.P_set0 * row.P_rated, settings.V_set0 * row.V_nom)
-        self._outgoing: dict[str, Value] = {}
         self._rows: list[tuple[float, ...]] = []
         self._events: list[PlantEvent] = []
-        self._federate = HelicsFederate(helics, config.deadline)
         try:
-            asked = [*needed, *topics(prefix, self.inverters, HELD, WHERE), events(prefix)]
-            federation = self._federate.begin(topics(prefix, config.agents, SET_POINTS), asked, {})
+            asked = topics(self._prefix, self.inverters, SENSORS)
+            asked += [*topics(self._prefix, self.inverters, HELD, WHERE), events(self._prefix)]
+            federation = self._federate.begin(topics(self._prefix, config.agents, SET_POINTS), asked, {})
             if lacking := [key for key in self._needed if key in federation["missing"]]:
                 raise HelicsError(
                     f"HELICS: nobody publishes {first_of(lacking, SHOWN)} ({_others(federation)}); "
@@ -67,9 +94,7 @@ class HelicsPlant(RecordedPlant):
     def measure(self) -> dict[str, Reading]:
         readings = {}
         for name in self.inverters:
-            f, P, Q, V, P_set, V_set = (
-                float(self._values[topic.key]) for topic in topics(self._prefix, [name], SENSORS, HELD)
-            )
+            f, P, Q, V, P_set, V_set = (float(self._values[key]) for key in self._keys([name], SENSORS, HELD))
             fed = bool(self._values.get(f"{self._prefix}/{name}/grid_connected", False))
             island = str(self._values.get(f"{self._prefix}/{name}/island", "grid" if fed else self.inverters[0]))
             readings[name] = Reading(P, Q, V, f, P_set, V_set, fed, island)
@@ -79,25 +104,10 @@ class HelicsPlant(RecordedPlant):
         """Publish set-points (W, V) with the next step; one that is not finite is ignored."""
         if math.isfinite(P_set) and math.isfinite(V_set):
             self._hold(name, P_set, V_set)
-            keys = (topic.key for topic in topics(self._prefix, [name], SET_POINTS))
-            self._outgoing |= dict(zip(keys, (P_set, V_set), strict=True))
+            self._outgoing |= dict(zip(self._keys([name], SET_POINTS), (P_set, V_set), strict=True))
 
     def connect(self, name: str, on: bool) -> None:
         raise HelicsError(f"{name} cannot {'join' if on else 'leave'}: a HELICS plant has its inverters all the time")
-
-    @property
-    def switches(self) -> dict[str, bool]:
-        return {}
-
-    def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
-        raise ValueError(f"{name}: the outside plant has the switches, and HELICS no topic for them")
-
-    @property
-    def loads(self) -> Mapping[str, complex]:
-        return {}
-
-    def set_load(self, name: str, setting: LoadSetting) -> str:
-        raise ValueError(f"load {name}: the outside plant has the loads, and HELICS no topic for them")
 
     def advance(self) -> None:
         try:
@@ -109,12 +119,13 @@ class HelicsPlant(RecordedPlant):
         self.tick += 1
 
     def close(self) -> None:
-        _leave(self._federate, self.tick, self._end_tick, self._T_c, {})
+        self._outgoing = {}  # set-points of a time that does not come
+        super().close()
 
     def _hold(self, name: str, *set_points: float) -> None:
         """Keep the set-points that an inverter was given as those that it follows."""
-        keys = (topic.key for topic in topics(self._prefix, [name], HELD))
-        self._values |= {key: value for key, value in zip(keys, set_points, strict=True) if key not in self._came}
+        held = zip(self._keys([name], HELD), set_points, strict=True)
+        self._values |= {key: value for key, value in held if key not in self._came}
 
     def _hear(self, row: int) -> None:
         t = time_of(row, self._record)
@@ -140,41 +151,32 @@ class HelicsPlant(RecordedPlant):
                 self._events.append(PlantEvent(t=t, kind="warning", subject=self._events_key, text=told))
 
 
-class BridgedPlant(RecordedPlant):
+class BridgedPlant(FederatePlant):
     """A plant whose inverters without an agent of ours follow set-points of outside federates.
 
     At each record time t it publishes what it has at t. It asks for the first record time after a tick before it
     computes that tick: so set-points that are published between are in force from the tick on, as an agent's are.
     """
 
-    def __init__(self, build: Callable[[], LivePlant], config: PlantConfig) -> None:
-        helics = settings_of(config.settings)
-        # its broker must be there at once: others give up to connect while a plant is compiled for the first time
-        self._federate = HelicsFederate(helics, config.deadline)
+    def __init__(self, build: Callable[[], PlantLike], config: PlantConfig) -> None:
+        super().__init__(config)
         try:
             plant = self._plant = build()
         except BaseException as error:
             self._federate.abort(f"its plant cannot start: {error}")
             raise
-        self._T_c, self._record = config.T_c, config.record_step
-        self._end_tick = None if config.end is None else round(config.end / config.T_c)
-        self._prefix = prefix = helics.prefix
         self.inverters = plant.inverters
         outside = [name for name in plant.inverters if name not in config.agents]
         readings = plant.measure()
         self._held = {name: (readings[name].P_set, readings[name].V_set) for name in outside}
         """Set-points of the inverters that outside federates control."""
-        self._tick = 0
         self._rows, self._events = list(plant.take_rows()), list(plant.take_events())
-        own = topics(prefix, plant.inverters, SENSORS, HELD)
-        where = topics(prefix, plant.inverters, WHERE)
-        self._row_keys, self._where_keys = [topic.key for topic in own], [topic.key for topic in where]
+        self._row_keys = self._keys(plant.inverters, SENSORS, HELD)
         self._where: dict[str, Value] = {}  # flags and names that were published last: they go out when they change
-        self._outgoing: dict[str, Value] = {}  # values to publish with the next step
         try:
-            asked = topics(prefix, outside, SET_POINTS)
-            publish = self._measured() | self._as_value(self._events)
-            federation = self._federate.begin([*own, *where, events(prefix)], asked, publish)
+            asked = topics(self._prefix, outside, SET_POINTS)
+            own = [*topics(self._prefix, plant.inverters, SENSORS, HELD), *topics(self._prefix, plant.inverters, WHERE)]
+            federation = self._federate.begin([*own, events(self._prefix)], asked, self._values(self._events))
             self._note_absent(federation)
         except HelicsError as error:
             self._federate.abort(str(error))
@@ -190,61 +192,44 @@ class BridgedPlant(RecordedPlant):
     def connect(self, name: str, on: bool) -> None:
         self._plant.connect(name, on)
 
-    @property
-    def switches(self) -> Mapping[str, bool]:
-        return self._plant.switches
-
-    def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
-        return self._plant.switch(name, action, synchronised=synchronised)
-
-    @property
-    def loads(self) -> Mapping[str, complex]:
-        return self._plant.loads
-
-    def set_load(self, name: str, setting: LoadSetting) -> str:
-        return self._plant.set_load(name, setting)
-
     def advance(self) -> None:
-        first = time_of(self._tick * round(self._T_c / self._record) + 1, self._record)
+        first = time_of(self.tick * round(self._T_c / self._record) + 1, self._record)
         self._take(self._federate.step(self._outgoing, first, needed=bool(self._held)))
         for name, (P_set, V_set) in self._held.items():
             self._plant.hold(name, P_set, V_set)
         self._plant.advance()
-        self._tick += 1
+        self.tick += 1
         rows, happened = self._plant.take_rows(), self._plant.take_events()
         self._rows += rows
         self._events += happened
         for row, following in pairwise(rows):
             values = dict(zip(self._row_keys, row[1:], strict=True))
             self._take(self._federate.step(values, following[0], needed=False))
-        self._outgoing = self._measured() | self._as_value(happened)
+        self._outgoing = self._values(happened)
 
     def close(self) -> None:
-        _leave(self._federate, self._tick, self._end_tick, self._T_c, self._outgoing)
+        super().close()
         self._plant.close()
 
     def _take(self, came: Mapping[str, Value]) -> None:
         for name, held in self._held.items():
-            keys = [topic.key for topic in topics(self._prefix, [name], SET_POINTS)]
+            keys = self._keys([name], SET_POINTS)
             P_set, V_set = (number(came.get(key, own)) for key, own in zip(keys, held, strict=True))
             self._held[name] = P_set, V_set
 
-    def _measured(self) -> dict[str, Value]:
-        """Return the readings as values, flags and names only if they have changed."""
+    def _values(self, happened: Sequence[PlantEvent]) -> dict[str, Value]:
+        """Return readings and events as values; flags, names and events only where there is something new."""
         readings = self._plant.measure().values()
         numbers = [float(x) for r in readings for x in (r.f, r.P, r.Q, r.V, r.P_set, r.V_set)]
         before = self._where
-        where: list[Value] = [x for r in readings for x in (r.grid_connected, r.island)]
-        self._where = dict(zip(self._where_keys, where, strict=True))
+        flags: list[Value] = [x for r in readings for x in (r.grid_connected, r.island)]
+        self._where = dict(zip(self._keys(self.inverters, WHERE), flags, strict=True))
         changed = {key: value for key, value in self._where.items() if before.get(key) != value}
-        return {**dict(zip(self._row_keys, numbers, strict=True)), **changed}
-
-    def _as_value(self, happened: Iterable[PlantEvent]) -> dict[str, Value]:
-        text = msgspec.json.encode(tuple(happened)).decode()
-        return {events(self._prefix).key: text} if text != "[]" else {}
+        told = {self._events_key: msgspec.json.encode(tuple(happened)).decode()} if happened else {}
+        return {**dict(zip(self._row_keys, numbers, strict=True)), **changed, **told}
 
     def _note_absent(self, federation: Mapping[str, list[str]]) -> None:
-        asked = {name: [topic.key for topic in topics(self._prefix, [name], SET_POINTS)] for name in self._held}
+        asked = {name: self._keys([name], SET_POINTS) for name in self._held}
         absent = [name for name, keys in asked.items() if set(keys) <= set(federation["missing"])]
         if absent and len(absent) == len(asked):
             raise HelicsError(
@@ -258,10 +243,3 @@ class BridgedPlant(RecordedPlant):
 
 def _others(federation: Mapping[str, list[str]]) -> str:
     return f"in the federation: {', '.join(federation['others']) or 'nobody else'}"
-
-
-def _leave(federate: HelicsFederate, tick: int, end_tick: int | None, T_c: float, publish: Mapping[str, Value]) -> None:
-    if tick == end_tick:
-        federate.end(publish)
-    else:
-        federate.abort(f"the run ended at t = {time_of(tick, T_c):g} s, before its end")
