@@ -14,32 +14,17 @@ from typing import Any
 import msgspec
 
 from gridpeers.agents import graphs
-from gridpeers.agents.agent_config import DegradedCommunication, Gains
 from gridpeers.agents.carriers.law_registry import LAWS
 from gridpeers.agents.graphs import GRAPHS
 from gridpeers.netem.models import own_fault
 from gridpeers.netem.models.own_fault import FAULTS
-from gridpeers.netem.schema.fault import Fault
-from gridpeers.netem.schema.netem import NodeFault
-from gridpeers.netem.schema.partition import Partition
-from gridpeers.plant import simulators
-from gridpeers.plant.plant_config import GflParameters, GfmParameters, Protection, SyncCheck
 from gridpeers.plant.tables.feeder_columns import TABLES, LoadColumns, Manifest
 from gridpeers.scenarios.checks import check_registry
 from gridpeers.scenarios.checks.check_registry import CHECKS
 from gridpeers.scenarios.results import claims, metric
 from gridpeers.scenarios.results.claims import CLAIMS
 from gridpeers.scenarios.results.metric import METRICS
-from gridpeers.scenarios.schema.scenario_model import (
-    Case,
-    Event,
-    InverterTable,
-    LoadChange,
-    PlantTable,
-    Processes,
-    ScenarioModel,
-    Time,
-)
+from gridpeers.scenarios.schema.scenario_model import Case, ScenarioModel
 from gridpeers.wire import keys, messages
 from gridpeers.wire import messages as bounds
 from gridpeers.wire.codec import KINDS
@@ -148,26 +133,6 @@ _REGISTRIES: dict[str, tuple[Registry[Any], str, str]] = {
 
 TOPICS = ("keys", "messages", "scenario", "feeder", *_REGISTRIES)
 
-_SCENARIO_TABLES: tuple[tuple[str, type[msgspec.Struct]], ...] = (
-    ("Top of the file", ScenarioModel),
-    ("[time]", Time),
-    ("[plant]", PlantTable),
-    ("[plant.inverter.NAME]", InverterTable),
-    ("[plant.gfm]", GfmParameters),
-    ("[plant.gfl]", GflParameters),
-    ("[plant.sync_check]", SyncCheck),
-    ("[protection]", Protection),
-    ("[gains]", Gains),
-    ("[degraded_communication]", DegradedCommunication),
-    ("[processes]", Processes),
-    ("[[event]]", Event),
-    ("[[event]], load.NAME", LoadChange),
-    ("[case.NAME]", Case),
-    ("[[link]], [[case.NAME.link]]", Fault),
-    ("[[partition]], [[case.NAME.partition]]", Partition),
-    ("[[node]], [[case.NAME.node]]", NodeFault),
-)
-
 
 def page(topic: str) -> str:
     """Return markdown of the page of one of `TOPICS`."""
@@ -212,12 +177,36 @@ def _scenario() -> Iterator[str]:
     yield "TOML. A key that is a time, a frequency or a per-unit value ends in its unit: `_s`, `_Hz`, `_pu` (of the"
     yield "inverter's own rating or nominal voltage); parameters of laws alone have no suffix. What has no default"
     yield "must be given. A value out of its range is an error, and so is an unknown key."
-    own = [(f"[plant.{name}]", table) for name, table in simulators.tables().items()]
-    after = 1 + [title for title, _ in _SCENARIO_TABLES].index("[plant.sync_check]")
-    for title, cls in (*_SCENARIO_TABLES[:after], *own, *_SCENARIO_TABLES[after:]):
-        yield from ("", f"## {title}", "", _one_line(inspect.getdoc(cls)), "")
-        elsewhere = [field.name for field in fields_of(cls) if _has_section(field.type)] if cls is not Case else []
+    titles: dict[type, list[str]] = {ScenarioModel: ["Top of the file"]}
+    for title, cls in _tables_in(ScenarioModel, ""):
+        titles.setdefault(cls, []).append(title)
+    for cls, places in titles.items():
+        yield from ("", f"## {', '.join(places)}", "", _one_line(inspect.getdoc(cls)), "")
+        elsewhere = [field.name for field in fields_of(cls) if _table_of(field) and cls is not Case]
         yield from field_table(cls, left_out=elsewhere)
+
+
+def _tables_in(cls: type, path: str) -> Iterator[tuple[str, type]]:
+    """Yield the tables below a table with their headers."""
+    for field in fields_of(cls):
+        key = f"{path}.{field.key}" if path else field.key
+        if INLINE in field.marks:
+            yield from _tables_in(field.type, path)
+        elif named := field.mark(NamedTables):
+            yield from ((f"[{path}.{name}]", table) for name, table in named.known().items())
+        elif table := _table_of(field):
+            container = typing.get_origin(field.type)
+            name = f"{key}.NAME" if container is dict else key
+            yield f"[[{key}]]" if container is tuple else f"[{name}]", table
+            yield from _tables_in(table, name)
+
+
+def _table_of(field: Field) -> type | None:
+    """Return the struct of a field that is a table with a section of its own, or has such tables."""
+    inner = [field.type] if typing.get_origin(field.type) is None else typing.get_args(field.type)
+    if field.mark(OtherKeys) or typing.get_origin(field.type) not in (None, tuple, dict):
+        return None
+    return next((kind for kind in inner if isinstance(kind, type) and issubclass(kind, msgspec.Struct)), None)
 
 
 def _feeder() -> Iterator[str]:
@@ -241,12 +230,6 @@ def _section(title: str, cls: type[msgspec.Struct], text: str, leave_out: Iterab
         yield from (text, "")
     if rows:
         yield from markdown_table(("field", "type", "meaning"), rows)
-
-
-def _has_section(kind: Any) -> bool:
-    """Return True if a field is a table, or a list of tables, with a section of its own."""
-    tables = {cls for _, cls in _SCENARIO_TABLES}
-    return kind in tables or any(_has_section(part) for part in typing.get_args(kind))
 
 
 def _registry(topic: str) -> Iterator[str]:
