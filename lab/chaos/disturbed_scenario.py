@@ -25,9 +25,9 @@ from gridpeers.netem.schema.partition import Partition
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.tables import read_feeder
 from gridpeers.scenarios.checks.check_registry import ALWAYS, RETURNS, check_name
-from gridpeers.scenarios.schema.checks import check_switches, check_times
+from gridpeers.scenarios.schema.checks import check_moves, check_times
 from gridpeers.scenarios.schema.loading import check_tables, read_tables
-from gridpeers.scenarios.schema.participants import check_agentless, check_netem, check_schedule, netem_of
+from gridpeers.scenarios.schema.participants import check_agentless, check_netem, netem_of
 from gridpeers.scenarios.schema.scenario_errors import Problems
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.scenarios.schema.scenario_writing import to_toml
@@ -176,7 +176,7 @@ class ChaosBase:
         scenario = read_tables(tree, problems)
         check_times(scenario, problems)
         check_netem(scenario, self.feeder, problems)
-        for check in (check_agentless, check_switches, check_loads, check_schedule):
+        for check in (check_agentless, check_moves, check_loads):
             check(scenario, self.feeder, problems)
         return not problems.any and not self.supply.objection(scenario, self.case)
 

@@ -135,6 +135,48 @@ def check_events(scenario: ScenarioModel, problems: Problems) -> None:
             problems.unknown(f"case.{name}.P_max_kW", "event", label, labels)
 
 
+_MOVES = {
+    "open": (False, "is open already", "close it before"),
+    "close": (True, "is closed already", "open it before"),
+    "leave": (False, "is not there", "let it join before"),
+    "join": (True, "is there already", "let it leave before"),
+}
+"""Keys of an event that move switches or agents: the state after it, words for that state before it, and the remedy."""
+
+
+def check_moves(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
+    """Note unknown switches and agents in events, and those that are already where an event moves them."""
+    switches = {name: switch.name for switch in feeder.switches for name in switch.names}
+    names_shown = [switch.alias or switch.name for switch in feeder.switches]
+    buses = {bus.name for bus in feeder.buses}
+    inverters = [row.name for row in (*feeder.inverters, *feeder.spares)]
+    there = {("switch", switch.name) for switch in feeder.switches if switch.closed}
+    there |= {("agent", row.name) for row in feeder.inverters}
+    for i, event in enumerate(scenario.events):
+        if event.leave or event.join:
+            rule = "the period at which agents leave and join"
+            multiple(f"event[{i}].t_s", event.t_s, "time.T_c_s", scenario.time.T_c_s, rule, problems)
+        moved: set[tuple[str, str]] = set()
+        for key, (into, state, remedy) in _MOVES.items():
+            path, is_switch = f"event[{i}].{key}", key in ("open", "close")
+            for name in getattr(event, key):
+                if is_switch and name not in switches:
+                    strange = [end for end in name.split("-") if end[:1].isdigit() and end not in buses]
+                    why = f" (there is no bus {' and no bus '.join(strange)})" if strange else ""
+                    problems.add(path, f'no switch "{name}"{why}; {suggestion(name, names_shown, "switches")}')
+                    continue
+                if not is_switch and problems.unknown(path, "inverter", name, inverters):
+                    continue
+                which = ("switch", switches[name]) if is_switch else ("agent", name)
+                word = f'switch "{name}"' if is_switch else f'"{name}"'
+                if which in moved:
+                    problems.add(path, f'{word} is named twice in event "{event.label}"; name it once')
+                elif (which in there) == into:
+                    problems.add(path, f"{word} {state} at {event.t_s:g} s; leave it out, or {remedy}")
+                moved.add(which)
+                (there.add if into else there.discard)(which)
+
+
 def check_limits(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
     """Note limits of available power that are not of a GFL, or beyond its rating."""
     rows, plant = {row.name: row for row in inverters_of(scenario, feeder)}, scenario.plant
@@ -178,35 +220,6 @@ def check_changes(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -
                 problems.add(f"{path}.parameters", f'set "{table.parameters}" has {key}, which a {kind} has not')
     for row in rows.values():
         _check_own(row, scenario, feeder, problems)
-
-
-def check_switches(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
-    """Note unknown switches, and those that are in the position already into which an event brings them."""
-    position = {switch.name: switch.closed for switch in feeder.switches}
-    canonical = {name: switch.name for switch in feeder.switches for name in switch.names}
-    buses = {bus.name for bus in feeder.buses}
-    names_shown = [switch.alias or switch.name for switch in feeder.switches]
-    for i, event in enumerate(scenario.events):
-        named: set[str] = set()
-        for action, closed, names in (("open", False, event.open), ("close", True, event.close)):
-            for name in names:
-                path = f"event[{i}].{action}"
-                if name not in canonical:
-                    strange = [end for end in name.split("-") if end[:1].isdigit() and end not in buses]
-                    why = f" (there is no bus {' and no bus '.join(strange)})" if strange else ""
-                    problems.add(path, f'no switch "{name}"{why}; {suggestion(name, names_shown, "switches")}')
-                    continue
-                switch = canonical[name]
-                if switch in named:
-                    problems.add(path, f'switch "{name}" is named twice in event "{event.label}"; name it once')
-                elif position[switch] == closed:
-                    problems.add(
-                        path,
-                        f'switch "{name}" is {"closed" if closed else "open"} already at {event.t_s:g} s; '
-                        f"leave it out, or {'open' if closed else 'close'} it before",
-                    )
-                named.add(switch)
-                position[switch] = closed
 
 
 def check_protection(scenario: ScenarioModel, f_nom: float, problems: Problems) -> None:

@@ -19,11 +19,11 @@ from gridpeers.scenarios.schema.checks import (
     check_changes,
     check_events,
     check_limits,
+    check_moves,
     check_names,
     check_protection,
     check_start,
     check_step,
-    check_switches,
     check_times,
     name_of,
 )
@@ -31,18 +31,11 @@ from gridpeers.scenarios.schema.configs import as_in
 from gridpeers.scenarios.schema.participants import (
     check_agentless,
     check_netem,
-    check_schedule,
     check_simulator,
     inverters_of,
     with_delays,
 )
-from gridpeers.scenarios.schema.plugin_keys import (
-    check_benchmark,
-    check_graphs,
-    check_laws,
-    check_measures,
-    with_folders,
-)
+from gridpeers.scenarios.schema.plugin_keys import check_plugins, with_folders
 from gridpeers.scenarios.schema.scenario_errors import Problems, ScenarioError
 from gridpeers.scenarios.schema.scenario_model import AS_RUN, ScenarioModel
 from gridpeers.scenarios.schema.supply import check_loads, check_supply
@@ -124,9 +117,6 @@ def check_tables(
     check_times(scenario, problems)
     check_names(scenario, problems)
     scenario = with_folders(scenario, path.parent)
-    check_benchmark(scenario, problems)
-    check_measures(scenario, problems)
-    check_laws(scenario, problems)
     feeder_path = scenario.plant.feeder
     if feeder_path not in feeders() and is_folder(path.parent / feeder_path):  # processes may start elsewhere
         plant = replace(scenario.plant, feeder=str((path.parent / feeder_path).resolve()))
@@ -136,15 +126,14 @@ def check_tables(
     check_step(scenario, feeder, problems)
     check_protection(scenario, feeder.f_nom if feeder else F_NOM, problems)
     check_cases(scenario, tuple(row.name for row in inverters_of(scenario, feeder)) if feeder else (), problems)
-    check_graphs(scenario, feeder, problems)
+    check_plugins(scenario, feeder, problems)
     check_events(scenario, problems)
     check_simulator(scenario, problems)
     check_netem(scenario, feeder, problems)
     if feeder:
         check_changes(scenario, feeder, problems)
         check_agentless(scenario, feeder, problems)
-        check_switches(scenario, feeder, problems)
-        check_schedule(scenario, feeder, problems)
+        check_moves(scenario, feeder, problems)
         check_limits(scenario, feeder, problems)
         check_loads(scenario, feeder, problems)
         check_start(scenario, feeder, problems)

@@ -15,7 +15,7 @@ from gridpeers.plant.equipment.connectivity import SwitchOperations, islands_aft
 from gridpeers.plant.plant_config import ScheduledAction
 from gridpeers.plant.simulators import OURS, SIMULATORS
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
-from gridpeers.scenarios.schema.scenario_errors import Problems, multiple
+from gridpeers.scenarios.schema.scenario_errors import Problems
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.wire.schema.table_reading import shown
 from gridpeers.wire.schema.table_schema import NO_KEY, Problem, fields_of
@@ -44,32 +44,6 @@ def with_agent(scenario: ScenarioModel, feeder: Feeder, case: str) -> tuple[Inve
     """Return the inverters that have an agent in a case, those that join later last."""
     without = without_agent(scenario, case)
     return tuple(row for row in inverters_of(scenario, feeder) if row.name not in without)
-
-
-def check_schedule(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
-    """Note agents that leave while absent or join while present, and times that are no ticks."""
-    present = {row.name for row in feeder.inverters}
-    known = [row.name for row in (*feeder.inverters, *feeder.spares)]
-    for i, event in enumerate(scenario.events):
-        if event.leave or event.join:
-            rule = "the period at which agents leave and join"
-            multiple(f"event[{i}].t_s", event.t_s, "time.T_c_s", scenario.time.T_c_s, rule, problems)
-        named: set[str] = set()
-        for key, names in (("leave", event.leave), ("join", event.join)):
-            path = f"event[{i}].{key}"
-            for name in names:
-                if problems.unknown(path, "inverter", name, known):
-                    continue
-                if name in named:
-                    problems.add(path, f'"{name}" is named twice in event "{event.label}"; name it once')
-                elif key == "leave" and name not in present:
-                    problems.add(path, f'"{name}" is not there at {event.t_s:g} s; leave it out, or let it join before')
-                elif key == "join" and name in present:
-                    problems.add(
-                        path, f'"{name}" is there already at {event.t_s:g} s; leave it out, or let it leave before'
-                    )
-                named.add(name)
-        present = (present - set(event.leave)) | set(event.join)
 
 
 def check_simulator(scenario: ScenarioModel, problems: Problems) -> None:

@@ -120,17 +120,16 @@ def _labelled(key: PluginKey, registry: Registry[Any]) -> PluginKey:
     return table | {"name": use} if registry.reference(use) != use and "name" not in table and good_name(use) else key
 
 
-def check_benchmark(scenario: ScenarioModel, problems: Problems) -> None:
+def check_plugins(scenario: ScenarioModel, feeder: Feeder | None, problems: Problems) -> None:
     key = scenario.paper  # one known by name is not imported before a run is judged: to read a scenario takes no numpy
     if not problems.touch("paper") and key and not (isinstance(key, str) and key in BENCHMARKS.names):
         _check("paper", key, BENCHMARKS, problems)
-
-
-def check_measures(scenario: ScenarioModel, problems: Problems) -> None:
     _check_named("metrics", scenario.metrics, METRICS, ALWAYS, problems)
     for i, key in enumerate(scenario.claims):
         _check(f"claims[{i}]", key, CLAIMS, problems)
     _check_named("checks", scenario.checks, CHECKS, ALWAYS_CHECKED, problems)
+    _check_laws(scenario, problems)
+    _check_graphs(scenario, feeder, problems)
 
 
 def _check_named(
@@ -161,7 +160,7 @@ def _check_named(
         names.append(name)
 
 
-def check_laws(scenario: ScenarioModel, problems: Problems) -> None:
+def _check_laws(scenario: ScenarioModel, problems: Problems) -> None:
     _check_law("law", scenario.law, problems)
     for name, case in scenario.cases.items():
         path = f"case.{name}.law"
@@ -178,7 +177,7 @@ def check_laws(scenario: ScenarioModel, problems: Problems) -> None:
             problems.add(f"case.{name}.degraded_communication.weights", text)
 
 
-def check_graphs(scenario: ScenarioModel, feeder: Feeder | None, problems: Problems) -> None:
+def _check_graphs(scenario: ScenarioModel, feeder: Feeder | None, problems: Problems) -> None:
     for name, case in scenario.cases.items():
         path = f"case.{name}.graph"
         if problems.touch(path):

@@ -126,7 +126,7 @@ def supply_states(scenario: ScenarioModel, feeder: Feeder) -> Iterator[SupplySta
     source = (feeder.source.bus, "A") if feeder.source else None
     before: frozenset[Node] = frozenset()
     for event in (None, *scenario.events):
-        if event is not None:  # `check_switches` notes unknown names
+        if event is not None:  # `check_moves` notes unknown names
             closed = closed - {names.get(name, "") for name in event.open}
             closed = closed | {names[name] for name in event.close if name in names}
             present = (present - set(event.leave)) | set(event.join)
