@@ -15,6 +15,7 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 from numba import njit
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
+from numba.core.runtime.nrt import rtsys
 from numpy.typing import NDArray
 
 _P = ParamSpec("_P")
@@ -80,7 +81,9 @@ class _Cache(FunctionCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         with suppress(OSError):
-            found = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+            # The base class imports all that a compilation may need (0.3 s); kept code needs the allocator alone.
+            rtsys.initialize(target_context)
+            found = self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
             # Two processes that compile a function for two types at a time may both give their code the same file.
             return found if found is not None and tuple(found.signature.args) == tuple(sig) else None
         return None
