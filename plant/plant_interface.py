@@ -90,7 +90,7 @@ class RecordedPlant:
         return events
 
 
-class SimulatedPlant(RecordedPlant):
+class SimulatedPlant:
     """The plant of another simulator, which runs in simulated time alone: by hand nobody operates or sets anything."""
 
     @property

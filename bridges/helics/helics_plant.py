@@ -25,7 +25,7 @@ from gridpeers.bridges.helics.topics import (
 )
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.plant_config import PlantConfig
-from gridpeers.plant.plant_interface import PlantLike, Reading, SimulatedPlant
+from gridpeers.plant.plant_interface import PlantLike, Reading, RecordedPlant, SimulatedPlant
 from gridpeers.wire.codec import decode_foreign
 from gridpeers.wire.messages import NAME, PlantEvent
 from gridpeers.wire.timing import time_of
@@ -34,7 +34,7 @@ from gridpeers.wire.wording import first_of
 SHOWN = 4  # topics that an error names
 
 
-class FederatePlant(SimulatedPlant):
+class FederatePlant(SimulatedPlant, RecordedPlant):
     """A plant with a federate, which it gets before all else: others give up to connect while a plant is compiled."""
 
     def __init__(self, config: PlantConfig) -> None:
