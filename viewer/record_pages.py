@@ -80,7 +80,14 @@ class RecordPages:
 
     async def _tell(self, socket: WebSocket, answer: Callable[[], Iterable[str]]) -> None:
         """Send an answer; a page that waits for it knows that its server is there."""
-        future = asyncio.get_running_loop().run_in_executor(self._worker, lambda: list(answer()))
+
+        def texts_of() -> list[str]:
+            try:
+                return list(answer())
+            except RecordFileError as error:  # nothing there yet, or its folder is gone
+                return [as_json({"problem": str(error)})]
+
+        future = asyncio.get_running_loop().run_in_executor(self._worker, texts_of)
         while not (await asyncio.wait({future}, timeout=HEARTBEAT))[0]:
             await send(socket, as_json({"beat": True}))
         for text in future.result():
@@ -91,32 +98,23 @@ class RecordPages:
             with contextlib.suppress(msgspec.DecodeError):
                 await page.questions.put(decode_foreign(msgspec.json.Decoder(RecordQuestion).decode, text))
 
-    def news(self, page: RecordPage) -> list[str]:
-        """Return what is new of the record that a page shows, after the record itself if it is another one."""
-        try:
-            news = self._run.news(page.wanted, page.events if page.case else 0)
-            if news.case != page.case:
-                news = self._run.news(news.case, 0)
-                view = self._run.view(news.case)
-                page.case, page.links = news.case, {}
-                page.events = len(news.events)
-                return [as_json({"record": _of(view)}), as_json({"map": view.map}), as_json({"news": news})]
-        except RecordFileError as error:
-            return [as_json({"problem": str(error)})]
+    def news(self, page: RecordPage) -> Iterator[str]:
+        """Yield what is new of the record that a page shows, after the record itself if it is another one."""
+        news = self._run.news(page.wanted, page.events if page.case else 0)
+        if news.case != page.case:
+            news = self._run.news(news.case, 0)
+            view = self._run.view(news.case)
+            page.case, page.links, page.events = news.case, {}, 0
+            yield from (as_json({"record": _of(view)}), as_json({"map": view.map}))
         page.events += len(news.events)
-        return [as_json({"news": news})]
+        yield as_json({"news": news})
 
     def frame(self, page: RecordPage, question: RecordQuestion) -> Iterator[str]:
         if question.case != page.wanted:
             page.wanted = question.case
             yield from self.news(page)
-        try:
-            view = self._run.view(page.case)
-            t = _time_of(question, view)
-            frame = view.frame(t, question.since)
-        except RecordFileError as error:
-            yield as_json({"problem": str(error)})
-            return
+        view = self._run.view(page.case)
+        frame = view.frame(_time_of(question, view), question.since)
         known = {} if frame.reset else page.links
         page.links = dict(frame.links)
         links = {name: links for name, links in frame.links.items() if known.get(name) != links}
@@ -125,11 +123,7 @@ class RecordPages:
     def decision(self, page: RecordPage, question: RecordQuestion) -> Iterator[str]:
         if not question.agent:
             return
-        try:
-            view = self._run.view(page.case)
-        except RecordFileError as error:  # its folder is gone
-            yield as_json({"problem": str(error)})
-            return
+        view = self._run.view(page.case)
         t = _time_of(question, view)
         try:
             ok, text = True, view.decision(question.agent, t)

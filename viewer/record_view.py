@@ -21,10 +21,8 @@ from gridpeers.scenarios.live.feeder_map import FeederMap, MapInverter, feeder_m
 from gridpeers.scenarios.live.run_monitor import InverterStatus, PlantStatus
 from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.viewer.agent_moments import AgentMoment, AgentMoments
-from gridpeers.viewer.link_faults import LinkFaults
 from gridpeers.viewer.link_states import LinkView
-from gridpeers.viewer.plant_rows import PlantRows
+from gridpeers.viewer.record_moments import AgentMoment, AgentMoments, LinkFaults, PlantRows
 from gridpeers.viewer.run_view import Cursor, EventView, Frame, LivenessView, RunView
 from gridpeers.viewer.strips import LENGTH
 from gridpeers.wire.messages import PLANT, AgentStatus, Pacing, PlantEvent, Telemetry
@@ -119,8 +117,7 @@ class RecordView:
         )
 
     def decision(self, agent: str, t: float) -> str:
-        self._read_events()
-        return str(ROOMS.resolve("explain")(self.record, agent, t, tuple(self._plant_events)))
+        return str(ROOMS.resolve("explain")(self.record, agent, t))
 
     def _present(self, t: float, agents: Mapping[str, AgentMoment]) -> list[str]:
         """Return the agents that were there: by their decisions, or by the schedule if the record has none.
