@@ -20,10 +20,10 @@ from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import AgentConfig, nameplate_of
 from gridpeers.agents.carriers.law_registry import close_laws
-from gridpeers.agents.graphs import GraphError, in_neighbours, rule_of
+from gridpeers.agents.graphs import in_neighbours, rule_of
 from gridpeers.agents.laws.law import Law
 from gridpeers.agents.realtime_agent import RealtimeAgent
-from gridpeers.lab.replay.changes import ChangedRule
+from gridpeers.lab.replay.changes import ChangedRule, Changes
 from gridpeers.lab.replay.recorded_process import (
     MakePlant,
     Message,
@@ -34,6 +34,7 @@ from gridpeers.lab.replay.recorded_process import (
     agent_again,
     agent_as_run,
     law_again,
+    made_here,
     plant_again,
     processes_of,
     recorded_links,
@@ -115,8 +116,10 @@ class ClosedLoop:
         take: Callable[[Telemetry | LinkReport], None],
         make_plant: MakePlant,
     ) -> None:
-        self._record, self._rule, self._take, self._make_plant = record, rule, take, make_plant
-        self._changed = rule is not None and rule.changes.since <= 0.0
+        self._record, self._take, self._make_plant = record, take, make_plant
+        self._changes = Changes() if rule is None else rule.changes
+        self._control, self._netem = (None, None) if rule is None else (rule.control, rule.links)
+        self._changed = bool(self._changes) and self._changes.since <= 0.0
         self._laws: list[Law] = []
         self._processes: dict[tuple[str, int], LoopProcess] = {}
         self._due: list[tuple[float, int, int, LoopProcess, Message | None]] = []
@@ -127,7 +130,7 @@ class ClosedLoop:
         self._delays = LinkDelays()
         self._statuses: dict[str, deque[Message]] = {}
         self._listens = _listeners(record)
-        self._lost = frozenset(_lost(record)) if rule is not None and rule.changes.without_loss else frozenset()
+        self._lost = frozenset(_lost(record)) if self._changes.without_loss else frozenset()
         self._number = -1
         self._t = 0.0
         self.notes: list[str] = []
@@ -202,23 +205,25 @@ class ClosedLoop:
         if config is None or not step.instance:
             self._note(f"the record lacks the start of {process.name}, so that its states are as recorded")
             return
-        if self._changed and self._rule is not None and self._rule.control is not None:
-            config = replace(config, control=self._rule.control)
+        if self._changed and self._control is not None:
+            config = replace(config, control=self._control)
         process.config, links = config, self._links(process.name, config.links)
         process.again = agent_again(process.recorded, config, step.instance, self._laws, links)
 
     def _links(self, name: str, recorded: dict[str, Any]) -> Links | None:
-        if self._rule is None or self._rule.links is None or not (recorded or self._changed):
+        if self._netem is None or not (recorded or self._changed):
             return recorded_links(self._record.info, name)
-        return links_of(name, self._rule.links)
+        return links_of(name, self._netem)
 
     def _settle(self, process: LoopProcess, step: RecordedStep) -> None:
-        rule = self._rule
-        if isinstance(step.entry, ReceivedMessage) and kind_of(step.entry.key) in TO_LINKS and rule and self._changed:
-            for pattern in rule.changes.without:  # the command may have healed them
-                if process.again is not None and process.again.links is not None:
-                    cut = LinkCommand(fault=Fault(on=pattern, cut=True))
-                    process.again.links.command(cut.to_tree(), max(self._t, rule.changes.since))
+        again, commanded = (
+            process.again,
+            isinstance(step.entry, ReceivedMessage) and kind_of(step.entry.key) in TO_LINKS,
+        )
+        if commanded and self._changed and again is not None and again.links is not None:
+            for pattern in self._changes.without:  # the command may have healed them
+                cut = LinkCommand(fault=Fault(on=pattern, cut=True))
+                again.links.command(cut.to_tree(), max(self._t, self._changes.since))
         node, head = process.agent, process.head
         if node is None or head is None or not node.session_broken:
             return
@@ -233,31 +238,30 @@ class ClosedLoop:
     # ---------------------------------------------------------------- the change
 
     def _change_if_due(self, plant: RealtimePlant, step: RecordedStep) -> None:
-        rule = self._rule
-        if rule is None or self._changed or not isinstance(step.entry, WakeUp) or step.entry.work:
+        if self._changed or not self._changes or not isinstance(step.entry, WakeUp) or step.entry.work:
             return
-        if plant.phase != "running" or plant.t < rule.changes.since - 1e-9:
+        if plant.phase != "running" or plant.t < self._changes.since - 1e-9:
             return
         self._changed = True
         for process in self._processes.values():
             again = process.again
             if again is None or again.node.finished:
                 continue
-            if rule.links is not None and again.links is None:
-                links = links_of(process.name, rule.links)
+            if self._netem is not None and again.links is None:
+                links = links_of(process.name, self._netem)
                 assert links is not None
                 again.use_links(links)
-            if rule.changes.without_loss and again.links is not None:  # losses that people commanded
+            if self._changes.without_loss and again.links is not None:  # losses that people commanded
                 heal = LinkCommand(heal=Heal(on=EVERYTHING, from_s=0.0, kinds=("loss",)))
-                again.links.command(heal.to_tree(), rule.changes.since)
-            if rule.control is not None and process.config is not None and process.agent is not None:
-                config = replace(agent_as_run(process.config, process.recorded.epoch), control=rule.control)
+                again.links.command(heal.to_tree(), self._changes.since)
+            if self._control is not None and process.config is not None and process.agent is not None:
+                config = replace(agent_as_run(process.config, process.recorded.epoch), control=self._control)
                 self._laws.append(law_again(config))
                 process.agent.change(config, self._laws[-1])
 
     def _command(self, message: Message) -> Message | None:
         """Return a command to links as it is under the change; None if it is left out."""
-        if self._rule is None or not self._changed or not self._rule.changes.without_link_commands:
+        if not (self._changed and self._changes.without_link_commands):
             return message
         decoded = decode(message.payload)
         return None if isinstance(decoded, LinkRequest | Command) and decoded.link_command else message
@@ -345,10 +349,8 @@ def _listeners(record: RunRecord) -> dict[str, frozenset[str]]:
     nameplates = {config.name: nameplate_of(config) for config in record.info.agents}
     found = {}
     for config in record.info.agents:
-        try:
+        with made_here(f"{config.name}: its graph cannot be made here"):
             names = in_neighbours(config.control, config.name, nameplates, rule_of(config.control))
-        except (GraphError, ValueError) as error:
-            raise ReplayError(f"{config.name}: its graph cannot be made here: {error}") from None
         found[config.name] = frozenset(names)
     return found
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from math import inf
 from typing import NamedTuple
@@ -20,7 +21,7 @@ from gridpeers.scenarios.drivers.telemetry_client import with_recorder
 from gridpeers.scenarios.emulation.emulated_links import links_of
 from gridpeers.scenarios.record.message_index import MessageIndex
 from gridpeers.scenarios.record.record_info import LIVE, RecordInfo
-from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
 from gridpeers.wire.codec import KINDS, encode, sound
 from gridpeers.wire.journal import (
     EACH_TICK,
@@ -261,21 +262,28 @@ class ReplayedProcess:
         return sent
 
 
+@contextmanager
+def made_here(failing: str) -> Iterator[None]:
+    """Make a part of a recorded run again; ReplayError, which begins with `failing`, if it cannot be made here."""
+    try:
+        yield
+    except (RecordFileError, ReplayError):
+        raise
+    except (ValueError, RuntimeError, OSError) as error:
+        raise ReplayError(f"{failing}: {error}") from None
+
+
 def agent_again(
     recorded: RecordedProcess, config: AgentConfig, instance: str, laws: list[Law], links: Links | None
 ) -> ReplayedProcess:
     laws.append(law_again(config))
-    try:
+    with made_here(f"{config.name}: cannot be made again here"):
         return ReplayedProcess(RealtimeAgent(agent_as_run(config, recorded.epoch), instance, links, laws[-1]), links)
-    except ValueError as error:
-        raise ReplayError(f"{config.name}: cannot be made again here: {error}") from None
 
 
 def law_again(config: AgentConfig) -> Law:
-    try:
+    with made_here(f"{config.name}: its law cannot be made here"):
         return make_law(config.control)
-    except ValueError as error:
-        raise ReplayError(f"{config.name}: its law cannot be made here: {error}") from None
 
 
 def agent_as_run(config: AgentConfig, epoch: int) -> AgentConfig:
@@ -292,14 +300,10 @@ def plant_again(recorded: RecordedProcess, info: RecordInfo, plant: LivePlant, l
 def recorded_links(info: RecordInfo, name: str) -> Links | None:
     config = info.agent(name)
     tree = info.plant.links if name == PLANT else {} if config is None else config.links
-    try:
+    with made_here(f"{name}: its emulated links cannot be made here"):
         return links_of(name, tree)
-    except ValueError as error:
-        raise ReplayError(f"{name}: its emulated links cannot be made here: {error}") from None
 
 
 def start_plant_of(info: RecordInfo, make_plant: MakePlant) -> LivePlant:
-    try:
+    with made_here("the plant of the record cannot be started here"):
         return make_plant(info.plant)
-    except (ValueError, RuntimeError, OSError) as error:
-        raise ReplayError(f"the plant of the record cannot be started here: {error}") from None

@@ -10,6 +10,7 @@ of each agent from the states that it had heard by its record.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing
 from dataclasses import dataclass
 from heapq import merge
 from itertools import zip_longest
@@ -29,8 +30,8 @@ from gridpeers.lab.replay.recorded_process import (
     RecordedProcess,
     RecordedStep,
     ReplayedProcess,
-    ReplayError,
     agent_again,
+    made_here,
     plant_again,
     processes_of,
     recorded_links,
@@ -40,7 +41,7 @@ from gridpeers.lab.replay.recorded_process import (
 )
 from gridpeers.plant.build import start_plant
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
-from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
+from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.results.record import QUANTITIES
 from gridpeers.scenarios.short_texts import in_order
 from gridpeers.wire.codec import decode
@@ -316,36 +317,27 @@ def run_again(
     **of_plant: Any,
 ) -> str:
     """Run a scenario in simulated time again, with other values of configurations; return why it broke, if it did."""
-    info, plant = record.info, start_plant_of(record.info, make_plant)
-    try:
-        outcome = run_inprocess(
+    info = record.info
+    with closing(start_plant_of(info, make_plant)) as plant, made_here("the run cannot be made again here"):
+        return run_inprocess(
             replace(info.plant, record="physics", **of_plant),
             [replace(agent, record="physics", **of_agents) for agent in info.agents],
             take,
             on_other=take,
             plant=plant,
-        )
-    except ValueError as error:
-        raise ReplayError(f"the run cannot be made again here: {error}") from None
-    finally:
-        plant.close()
-    return outcome.broke
+        ).broke
 
 
 def _decisions(record: RunRecord, agent: str) -> ReplayedPart:
     part = ReplayedPart(agent)
     hole = min((since for since, _ in record.holes(agent)), default=inf)
-    try:
+    with made_here(f"{agent}: its law cannot be made here"):
         for each in recomputed(record, agent):
             if each.decision.t > hole:  # its law may have a memory, of which nothing is known behind a hole
                 break
             part.compare(each.decision.t, message_difference(each.decision.state, each.state))
             if part.difference is not None:
                 return part
-    except RecordFileError:
-        raise
-    except ValueError as error:
-        raise ReplayError(f"{agent}: its law cannot be made here: {error}") from None
     if record.damage and part.t_end < record.t_end - 1.5 * record.info.T_c:
         part.note = "the record lacks later decisions of some agents, so that these were not compared"
     return part

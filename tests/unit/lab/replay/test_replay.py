@@ -11,12 +11,7 @@ from msgspec.structs import replace
 
 from gridpeers.lab.replay.changes import lossless, spliced, without_loss
 from gridpeers.lab.replay.recorded_process import JournalParts, RecordedProcess, RecordedStep, agent_again, processes_of
-from gridpeers.lab.replay.replay import (
-    ComparedRows,
-    ReplayedPart,
-    message_difference,
-    replay,
-)
+from gridpeers.lab.replay.replay import ComparedRows, ReplayedPart, message_difference, replay
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.netem.schema.partition import Partition
