@@ -209,7 +209,6 @@ def _tail(count: int, probabilities: npt.NDArray[np.float64]) -> float:
 
 
 def _delay_tests(met: _Sent, model: Constant | Trace | RandomDelay, stream: Stream) -> list[Finding]:
-    """Compare the delays of the first copies; `stream` says where a trace starts."""
     if not isinstance(model, RandomDelay):
         sampler = model.sampler(stream)
         off = np.abs(met.delay - np.array([sampler(int(seq)) for seq in met.seq])).max(initial=0.0)

@@ -127,7 +127,6 @@ class PerfettoTrace:
         self._tracks: dict[tuple[str, ...], int] = {}
 
     def track(self, *path: str, unit: str = "", process: int | None = None) -> int:
-        """Return the id of a track, by its process and its name; it is described when it is first asked for."""
         known = self._tracks.get(path)
         if known is not None:
             return known
@@ -163,7 +162,6 @@ class PerfettoTrace:
             event.double_counter_value = value
 
     def write(self, path: Path) -> None:
-        """Write the file, at once or not at all; raise OSError if that fails."""
         self._packets.sort(key=lambda item: item[:2])
         if self._packets:
             self._packets[0][2].sequence_flags = self._protos.TracePacket.SEQ_INCREMENTAL_STATE_CLEARED

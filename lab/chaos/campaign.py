@@ -87,7 +87,6 @@ class Campaign:
     dask: str = ""
     """Address of a Dask scheduler to use instead; its workers have their own folders for temporary files."""
     path: Path | None = None
-    """Its folder; None until it is made."""
     command: str = ""
     rows: dict[int, ChaosRow] = field(default_factory=dict)
     failures: dict[str, Failure] = field(default_factory=dict)
@@ -222,7 +221,6 @@ class Campaign:
         write_whole(self._file("chaos.csv"), text.getvalue())
 
     def write_failure(self, violated: str, row: ChaosRow, simplest: ChaosRow) -> Path:
-        """Write the scenario of a failure of a run, as it is or as it was shrunk; return its file."""
         file = self._file("failures") / f"{violated}.toml"
         file.parent.mkdir(exist_ok=True)
         seed, schedule = seed_of(self.seed, row.number), simplest.schedule

@@ -113,7 +113,6 @@ def compared(row: ChaosRow, other: ChaosRow, asked: str) -> ChaosRow:
 
 
 def run_scenario(base: ChaosBase, driver: Driver = "inprocess") -> ChaosRow:
-    """Run the scenario of a base as it stands, and judge it by its own checks."""
     return _judged(base, base.scenario, ChaosRow(number=0, schedule=()), driver).row
 
 

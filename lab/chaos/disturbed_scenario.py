@@ -98,7 +98,6 @@ class Disturbance(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
 
     @property
     def settled_s(self) -> float:
-        """Run time (s) of its last change: its end, or its beginning if it stays."""
         return self.begins_s if self.ends_s == inf else self.ends_s
 
     @property
@@ -245,7 +244,6 @@ _read_feeder = lru_cache(maxsize=8)(read_feeder)
 
 @lru_cache(maxsize=4)
 def base_of(text: str) -> ChaosBase:
-    """Return the base with a text; a process makes it once."""
     problems = Problems("chaos")
     scenario, feeder = check_tables(tomllib.loads(text), Path("chaos.toml"), problems, _read_feeder)
     problems.raise_if_any()

@@ -38,8 +38,6 @@ class _State(NamedTuple):
 
 
 class FeasibleSupply:
-    """Judges the islands of scenarios on one feeder; the parts of each state of the switches are found once."""
-
     def __init__(self, feeder: Feeder) -> None:
         self._feeder, self._graph = feeder, Connectivity(feeder)
         self._rows = (*feeder.inverters, *feeder.spares)

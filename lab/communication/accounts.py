@@ -140,7 +140,6 @@ class ArrivalAccounts:
         before.until = t
 
     def listens(self, link: Link) -> None:
-        """Note that the receiver of a link has its sender for a neighbour, even if nothing comes."""
         if link not in self._arrived:
             self._arrived[link], self.accounts[link] = {}, []
             self._links_of[link[0]].append(link)
@@ -201,8 +200,6 @@ still. Its numbers have no gap then. Shorter pauses are those of a busy host, an
 
 @dataclass
 class Heal:
-    """The end of a cut of one link."""
-
     link: Link
     t: float
     took: float | None = None
@@ -243,7 +240,6 @@ class Heals:
                     self._add(Heal(link, t, lost_again=again))
 
     def trace(self, trace: LinkTrace) -> None:
-        """Take verdicts of a link: the first message that gets through again is the end of a cut."""
         link = trace.src, trace.dst
         for t, outcome in zip(trace.t, trace.outcome, strict=True):
             if outcome in CUTS:
@@ -294,7 +290,6 @@ class Heals:
             heal.waited = max(heal.waited, min(state.t, heal.lost_again) - heal.at_work_since)
 
     def _is_lossy(self, link: Link, t: float) -> bool:
-        """Return whether a link is to be cut or lossy at a time (s): a cut may hold a message and give it later."""
         return any(span.from_s - 1e-9 <= t < span.to_s - 1e-9 for span in self._losses.get(link, ()))
 
     def found(self) -> list[Heal]:

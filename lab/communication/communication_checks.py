@@ -64,7 +64,6 @@ class MessageAccount(Check):
             require_longer(found.t_end, "in_flight_s", self.in_flight_s)
 
     def _without_account(self, found: CommunicationSummary) -> dict[Link, Missing]:
-        """Return the missing states of each link whose receiver keeps no account of it."""
         if found.info.simulated:
             return {link: missing for link, missing in found.unheard.items() if link not in found.counts}
         links: dict[Link, Missing] = {}

@@ -226,7 +226,6 @@ class RecordContent(RecordPass):
         """The record was closed properly."""
 
     def of_agent(self, agent: str) -> list[SentState]:
-        """Return the states of an agent in the order of time."""
         return sorted(self.states[agent].values(), key=lambda state: state.t)
 
     def take_state(self, agent: str, state: SentState) -> None:

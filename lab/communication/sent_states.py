@@ -58,7 +58,6 @@ class StateWindow:
         return number >= 0 and self._numbers[number % KEPT] == number
 
     def spoke(self, number: int) -> bool:
-        """Return whether a state of this number was sent to the neighbours."""
         return self.has(number) and not self._flags[number % KEPT]
 
     def decided(self, number: int) -> bool:
@@ -130,10 +129,7 @@ MOST = 20_000  # States of an agent that wait for its journal at most: it may be
 
 
 class NeighbourUse(NamedTuple):
-    """A neighbour at one decision, or at several that treat it alike."""
-
     link: Link
-    """The neighbour, and the agent."""
     ticks: int | None
     """Simulated time: age of its state; None if there was none."""
     number: int | None

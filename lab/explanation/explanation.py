@@ -28,7 +28,6 @@ class NeighbourAccount:
     input: NeighbourInput | None
     """Its last state as heard; None if the agent had not met it."""
     seen: Neighbour | None
-    """It as the law saw it (pu); None if it was left out."""
     why: str
     """Why it was left out, or why its state is old; empty if neither."""
 
@@ -51,7 +50,6 @@ class Explanation:
     step: LawStep | None
     events: tuple[PlantEvent, ...]
     aftermath: tuple[str, ...]
-    """Sentences on the time between the decision and the one that was asked for; none if it was made then."""
     damage: tuple[str, ...]
 
     @property
@@ -148,7 +146,6 @@ def aftermath(
 
 
 def _row(record: RunRecord, inverter: str, t: float) -> tuple[float, ...] | None:
-    """Return f, P, Q, V, P_set and V_set of an inverter in the last row up to a run time (s)."""
     found: tuple[float, ...] | None = None
     for message in record.telemetry(since=max(0.0, t - 1.0), until=t):
         if inverter in message.inverters:

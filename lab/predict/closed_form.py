@@ -61,7 +61,6 @@ class Modes:
     frequency_rate: float
     """kappa n_L / N (1/s): how fast the frequency comes back when all that run the law share at once."""
     sharing_rate: float
-    """kappa lambda_2 (1/s): how fast set-points come together."""
     slowest_rate: float
     """Smallest real part of an eigenvalue of K (L + g w^T) (1/s), zeros left out: the exact slower one of the two."""
     fastest_rate: float

@@ -80,7 +80,6 @@ class InverterGroup:
         return np.asarray(self.heard.sum(axis=1))
 
     def part(self, which: NDArray[np.bool_]) -> InverterGroup:
-        """Return some of the inverters, e.g. those of an island; the others are not heard."""
         at = np.flatnonzero(which)
         arrays = {name: getattr(self, name)[at] for name in ("GFM", "acts", "shares", "s", "m_p", "m_q")}
         return replace(

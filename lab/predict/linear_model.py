@@ -61,8 +61,6 @@ class Path:
 
 
 class _Delays(NamedTuple):
-    """Delays of links (ticks) and losses, spread out; rows are receivers."""
-
     link: NDArray[np.int64]
     loss: Floats
     lossy: list[tuple[int, int]]

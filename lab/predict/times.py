@@ -107,7 +107,6 @@ def _for_good(t: Floats, holds: Flags) -> float | None:
 
 
 def _beyond_limits(inverters: InverterGroup, path: Path) -> str:
-    """Return the final load of those that run the law, in words, if it is beyond their limits; else empty."""
     acts, s, gains = inverters.acts, inverters.s, inverters.gains
     if not acts.any():
         return ""

@@ -51,7 +51,6 @@ class Changes:
         return bool(self.without or self.without_loss or self.without_link_commands or self.law or self.keys)
 
     def __str__(self) -> str:
-        """Return them in words: "without inv4 -> inv7, gains.k_p = 0.001, from 2 s on"."""
         parts = [f"without {pattern}" for pattern in self.without]
         parts += ["without loss"] * self.without_loss + ["without link commands"] * self.without_link_commands
         parts += [f"law {self.law}"] * bool(self.law)
@@ -67,7 +66,6 @@ class ChangedRule:
     scenario: ScenarioModel
     """The scenario as changed, links too; the title of its case says what is changed."""
     links_written: bool
-    """It has the changes of links, as far as a scenario can say them."""
     feeder: Feeder
     case: str
     control: Control | None

@@ -157,7 +157,6 @@ class ClosedLoop:
             plant.close()
 
     def _until(self, found: list[LoopProcess]) -> float:
-        """Return the run time (s) up to which all journals of a record reach; infinite for a complete one."""
         record = self._record
         if record.complete:
             return inf
@@ -260,7 +259,6 @@ class ClosedLoop:
                 process.agent.change(config, self._laws[-1])
 
     def _command(self, message: Message) -> Message | None:
-        """Return a command to links as it is under the change; None if it is left out."""
         if not (self._changed and self._changes.without_link_commands):
             return message
         decoded = decode(message.payload)

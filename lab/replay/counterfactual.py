@@ -87,7 +87,6 @@ def counterfactual(
 def counterfactual_in(
     record: RunRecord, rule: ChangedRule, folder: Path | None, tell: Progress | None = None
 ) -> Counterfactual:
-    """Run a counterfactual into an empty folder, or into a temporary one that lives as long as the result."""
     would_be = RunFolder(folder or _temporary(), temporary=folder is None)
     was = RunFolder(_temporary(), temporary=True)
     with broken_if_ended(would_be.path):
@@ -154,7 +153,6 @@ class Counterfactual:
         return counterfactual_figure(self.was.drawing(), self.would_be.drawing(), str(self.changes), since)
 
     def __str__(self) -> str:
-        """Return the table as text; above it a line for each of both in which a law failed."""
         text: str = self.table.to_string(float_format=lambda value: f"{value:.5g}", na_rep="-")
         missing = [MISSING] if self.table.isna().any(axis=None) else []
         return "\n".join((*self._comparison.failures(), text, *missing))

@@ -142,8 +142,6 @@ class RecordedProcess:
 
 
 class JournalParts:
-    """The journals of a record by process, a part of the file at a time."""
-
     def __init__(self, index: MessageIndex) -> None:
         self.index, self.count = index, len(index.file.spans)
         self.of = lru_cache(maxsize=16)(self._of)
@@ -179,7 +177,6 @@ def processes_of(record: RunRecord) -> tuple[RecordedProcess, ...]:
 
 
 def require_arrivals(record: RunRecord) -> None:
-    """Raise ReplayError unless all inputs of the cores were recorded."""
     level = record.info.level
     if level != "all":
         has = "the physics alone" if level == "physics" else "decisions, but not what else arrived and when"
@@ -196,8 +193,6 @@ MakePlant = Callable[[PlantConfig], LivePlant]
 
 
 class _Outbox(Traffic):
-    """Takes the messages of a node; the record has all else."""
-
     def __init__(self, cut: int) -> None:
         self._cut = cut
         self.messages: list[Message] = []

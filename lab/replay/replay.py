@@ -70,7 +70,6 @@ class ReplayedPart:
         return bool(self.note) or self.difference is not None
 
     def compare(self, t: float, difference: Difference | None) -> None:
-        """Note that a state, or a row, of a run time (s) was compared."""
         self.difference = difference
         if difference is None:
             self.count, self.t_end = self.count + 1, t
@@ -120,8 +119,6 @@ def record_of(run: Result | RunRecord | str | Path) -> RunRecord:
 
 
 class Difference(NamedTuple):
-    """Two values that are not the same, of an agent, an inverter or the plant, at a run time (s)."""
-
     name: str
     t: float
     quantity: str
@@ -211,8 +208,6 @@ def _by_time(number: int, replay: _PlantReplay | _AgentReplay) -> Iterator[tuple
 
 
 class _AgentReplay:
-    """An agent, given the calls of its journal; its states are compared."""
-
     def __init__(self, record: RunRecord, process: RecordedProcess, laws: list[Law]) -> None:
         self.process, self.part, self._info, self._laws = process, ReplayedPart(process.name), record.info, laws
         self._again: ReplayedProcess | None = None
@@ -242,8 +237,6 @@ class _AgentReplay:
 
 
 class _PlantReplay:
-    """The plant, given the calls of its journal; its rows are compared."""
-
     def __init__(self, record: RunRecord, process: RecordedProcess, again: ReplayedProcess) -> None:
         self.process, self._again, self._rows = process, again, ComparedRows(record)
         self.part = self._rows.part
