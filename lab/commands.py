@@ -116,9 +116,6 @@ def _tell_notes(notes: Iterable[str]) -> None:
 # -------------------------------------------------------------------- gridpeers trace
 
 
-MOST = 20_000
-
-
 def trace(
     run: RecordedRun,
     out: Annotated[
@@ -202,8 +199,6 @@ def _draw(record: RunRecord, file: Path, since: float, until: float, agents: str
     T_c = record.info.T_c
     found = [flow for flow in flows(record, max(0.0, since - 1.0), until) if flow.src in nodes and flow.dst in nodes]
     found = [flow for flow in found if since <= (flow.sent + T_c if flow.arrived is None else flow.arrived)]
-    if len(found) > MOST:
-        fail([f"--from {since:g} --to {until:g}: {len(found)} messages; at most {MOST} can be told apart"], BAD_INPUT)
     title = f"{record.info.scenario}{', case ' + record.info.case if record.info.case else ''}: messages"
     figure = space_time_diagram(found, nodes, since, until, T_c, title)
     save(figure, file.parent, file.stem, (file.suffix[1:],))  # type: ignore[arg-type]  # checked above
