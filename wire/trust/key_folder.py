@@ -128,10 +128,8 @@ def open_credentials(
             f"{folder}/{member.name}.pem: was revoked; gridpeers keys issue {member.name} gives {member.name} a new one"
         )
     certificate, key = folder / f"{member.name}.pem", folder / f"{member.name}.key"
-    own = read_certificate(certificate)
-    ends = _end_of(own, certificate, folder, member, now)
-    if load_key(key).public_key() != own.public_key():
-        raise KeysError(f"{key}: is not the key of {certificate.name}; copy both from the same site")
+    ends = _end_of(read_certificate(certificate), certificate, folder, member, now)
+    load_pair(key)
     soon = (
         f"the certificate of {member.name} ends on {ends:{DATE_AND_TIME}}; gridpeers keys issue {member.name} renews it"
     )
@@ -187,6 +185,15 @@ def read_certificate(path: Path) -> x509.Certificate:
         raise KeysError(f"{path}: is no certificate in PEM; copy it anew from the site") from None
 
 
+def load_pair(path: Path) -> tuple[x509.Certificate, Any]:
+    """Return a private key and the certificate beside it, which must belong together."""
+    key, beside = load_key(path), path.with_suffix(".pem")
+    certificate = read_certificate(beside)
+    if key.public_key() != certificate.public_key():
+        raise KeysError(f"{path}: is not the key of {beside.name}; copy both from the same site")
+    return certificate, key
+
+
 def load_key(path: Path) -> Any:
     """Return the private key in a file that nobody but its owner may read or write."""
     from cryptography.exceptions import UnsupportedAlgorithm
@@ -218,11 +225,8 @@ def key_warnings(folder: Path) -> dict[str, str]:
     """Return a sentence for each private key, by its file, that is not private, or not of the certificate beside it."""
     found = {}
     for path in sorted(folder.glob("*.key")):
-        certificate = path.with_suffix(".pem")
         try:
-            key = load_key(path)
-            if certificate.exists() and key.public_key() != read_certificate(certificate).public_key():
-                found[path.name] = f"{path}: is not the key of {certificate.name}; copy both from the same site"
+            load_pair(path)
         except KeysError as error:
             found[path.name] = str(error)
     return found

@@ -24,8 +24,7 @@ from gridpeers.wire.trust.key_folder import (
     KeysError,
     MemberList,
     SignedList,
-    load_key,
-    read_certificate,
+    load_pair,
     read_list,
 )
 from gridpeers.wire.wording import printable
@@ -172,10 +171,7 @@ def _authority(folder: Path) -> tuple[MemberList, x509.Certificate, EllipticCurv
     known, path = read_list(folder), folder / CA_KEY
     if not path.is_file():
         raise KeysError(f"{path}: is missing; certificates are issued and revoked where the site was made")
-    ca, key = read_certificate(folder / CA), load_key(path)
-    if key.public_key() != ca.public_key():
-        raise KeysError(f"{path}: is not the key of {CA} beside it; copy both from the same site")
-    return known, ca, key
+    return known, *load_pair(path)
 
 
 def _certificate(
