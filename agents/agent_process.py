@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
-from contextlib import ExitStack, closing, suppress
+from contextlib import ExitStack, closing
 from functools import partial
-from threading import Timer
 from time import monotonic, sleep
 
 from msgspec.structs import replace
@@ -16,7 +15,7 @@ from gridpeers.agents.carriers.law_registry import make_law
 from gridpeers.agents.laws.law import Law
 from gridpeers.agents.lockstep_agent import KnownAgents, LockstepAgent
 from gridpeers.agents.realtime_agent import RealtimeAgent
-from gridpeers.wire.driver.drive import StoppedError, StoppedOnLeashError, drive, serve
+from gridpeers.wire.driver.drive import StoppedError, drive, serve
 from gridpeers.wire.driver.machine import schedule_as_batch
 from gridpeers.wire.driver.process import ConfigurationError, MakeLinks, new_epoch, no_links
 from gridpeers.wire.driver.session import Session, SessionError
@@ -34,10 +33,6 @@ AnyAgent = RealtimeAgent | LockstepAgent
 OPENED_AGAIN, OPENED_WITHIN = 1.0, 60.0
 """Time (s) between two tries to open a session in place of a broken one, and time (s) for all of them: meanwhile keys
 are copied, or files closed."""
-
-RUN_ENDS = 0.1
-"""Time (s) for which an agent that was started with its run goes on once it is asked to end: if the run ends, its plant
-does so first, and an agent that was still there has not left."""
 
 
 def run_agents(process: AgentProcess, make_links: MakeLinks = no_links) -> str:
@@ -171,19 +166,8 @@ def take_part(core: AnyAgent | NodeGroup, nodes: Sequence[AnyAgent], session: Se
         drive(core, session, log)
     except (StoppedError, KeyboardInterrupt) as stop:
         leaving = _realtime(nodes)
-        if leaving and isinstance(stop, StoppedOnLeashError):
-            _go_on(core, session, log)
         for node in leaving:
             node.asked_to_leave(f"asked to leave: {stop}")
         if leaving:
             serve(core, session, log)  # until the plant has acknowledged
         raise
-
-
-def _go_on(core: AnyAgent | NodeGroup, session: Session, log: logging.Logger) -> None:
-    over = Timer(RUN_ENDS, session.inbox.put, (("word", "the run goes on", b""),))
-    over.daemon = True
-    over.start()
-    with suppress(StoppedError):
-        serve(core, session, log)
-    over.cancel()

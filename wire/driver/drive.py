@@ -40,10 +40,6 @@ class StoppedError(BaseException):
     """
 
 
-class StoppedOnLeashError(StoppedError):
-    """The same to a process that ends with its parent: perhaps all processes of its run are asked to end."""
-
-
 def perform(actions: Sequence[Action | Log], session: Session, log: logging.Logger) -> None:
     for action in actions:
         if isinstance(action, Publish):

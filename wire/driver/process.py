@@ -20,7 +20,7 @@ from typing import Any, TypeVar, get_args
 import msgspec
 
 from gridpeers.wire.codec import decode_foreign
-from gridpeers.wire.driver.drive import StoppedError, StoppedOnLeashError
+from gridpeers.wire.driver.drive import StoppedError
 from gridpeers.wire.driver.ending import leave, stop_at_signals, watch_readers
 from gridpeers.wire.driver.machine import raise_limit
 from gridpeers.wire.driver.session import SessionError
@@ -88,7 +88,7 @@ def _main(module: str, what: str, config_type: type[C] | UnionType, run: Callabl
         return OK if options in (["-h"], ["--help"]) else BAD_CONFIG
     logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(asctime)s %(levelname)s %(message)s")
     log = logging.getLogger(module)
-    stop_at_signals(StoppedOnLeashError if options else StoppedError)
+    stop_at_signals(StoppedError)
     try:
         text = _read_line() if options else sys.stdin.buffer.read()
         config = decode_foreign(msgspec.json.Decoder(config_type).decode, text)

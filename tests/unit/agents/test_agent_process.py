@@ -14,7 +14,7 @@ from gridpeers.agents import agent_process
 from gridpeers.agents.agent_process import _opened, take_part
 from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.wire.codec import encode
-from gridpeers.wire.driver.drive import StoppedError, StoppedOnLeashError
+from gridpeers.wire.driver.drive import StoppedError
 from gridpeers.wire.driver.inbox import Inbox, Stamped
 from gridpeers.wire.driver.session import Session, SessionError
 from gridpeers.wire.keys import Keys
@@ -27,7 +27,7 @@ LEAVE = KEYS.leave("inv1")
 
 
 class Played:
-    """A session whose events the test plays; once there are none left, the time is over in which a run may end."""
+    """A session whose events the test plays."""
 
     def __init__(self, *events: Stamped | BaseException) -> None:
         self._events = list(events)
@@ -63,15 +63,10 @@ def ended(*events: Stamped | BaseException) -> Played:
     return session
 
 
-def test_an_agent_whose_run_ends_has_not_left() -> None:
-    """All processes of a run are asked to end: the plant goes first, and there is nobody to be left."""
-    assert ended(StoppedOnLeashError("SIGTERM"), ("vanished", PLANT_TOKEN, b"", monotonic())).left == 0
-
-
-@pytest.mark.parametrize("stop", [StoppedError("SIGTERM"), StoppedOnLeashError("SIGTERM")])
-def test_an_agent_whose_run_goes_on_leaves(stop: StoppedError) -> None:
-    """One that a person started at once, one that its run started when the plant is still there after a moment."""
-    assert ended(stop).left == 1
+def test_an_agent_that_is_asked_to_end_leaves() -> None:
+    """The plant takes its inverter off the network; an agent without a plant just ends."""
+    assert ended(StoppedError("SIGTERM")).left == 1
+    assert ended(("vanished", PLANT_TOKEN, b"", monotonic()), StoppedError("SIGTERM")).left == 0
 
 
 def test_a_session_in_place_of_a_broken_one_is_tried_again(
