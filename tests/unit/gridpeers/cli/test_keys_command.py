@@ -93,10 +93,11 @@ def test_show_warns_of_a_key_that_is_not_that_of_the_certificate_beside_it(elsew
     assert rows[0].endswith("; ca.key is here, but cannot be used: no certificates can be issued here")
     ends = {row.split()[1]: row.rpartition("UTC")[2] for row in rows[1:6]}
     here, wrong = ", key here", ", key here, but see below"
-    assert ends == {"inv1": wrong, "inv2": here, "operator": here, "plant": here, "viewer": wrong}
+    assert ends == {"inv1": wrong, "inv2": here, "operator": wrong, "plant": here, "viewer": wrong}
     assert sorted(rows[6:]) == [
         "WARNING  lab/ca.key: is not the key of ca.pem; copy both from the same site",
         "WARNING  lab/inv1.key: is not the key of inv1.pem; copy both from the same site",
+        next(row for row in rows if row.startswith("WARNING  lab/operator.pem: is missing; copy it ")),
         next(row for row in rows if row.startswith("WARNING  lab/viewer.key: is no private key: ")),
     ]
 
