@@ -1,16 +1,16 @@
 """The figures of a run, as PNG files: those of all experiments, and those that belong to what happens in this one.
 
-Each is a page of panels over time: `Panel` says what is in one.
+Each is a `Page`, a table of panels over time.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from textwrap import wrap
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
@@ -61,18 +61,34 @@ class PanelCurve(NamedTuple):
     t: Floats
     y: Floats
     style: Style
-    label: str
+    label: str = ""
+    """Its words in the legend; "" for a curve that has none."""
 
 
 class Panel(NamedTuple):
     title: str
     label: str
     """Label of the axis, with the unit."""
-    curves: Sequence[PanelCurve]
+    curves: list[PanelCurve]
     nominal: float | None = None
     """Value at which the axis has a line."""
     bounds: Bounds | None = None
     """End of an axis that starts at 0."""
+    lost: float | None = None
+    """Distance from nominal at which curves that do not come back leave the frame; None: they do not."""
+
+
+class Page(NamedTuple):
+    """Panels in rows, of which the last may be shorter; the first panel has the curves of the legend."""
+
+    rows: Sequence[Sequence[Panel]]
+    size: tuple[float, float]
+    """Width and height (inches)."""
+    share_y: bool | Literal["none", "row"] = "none"
+    title: str = ""
+    """Title of a page whose panels each say what happens at the events, not those of the first row alone."""
+    one_row: bool = False
+    """True if the legend has one row."""
 
 
 def _fill(axes: Axes, panel: Panel) -> None:
@@ -83,22 +99,40 @@ def _fill(axes: Axes, panel: Panel) -> None:
         nominal_line(axes, panel.nominal)
     if panel.bounds is not None:
         from_zero(axes, [curve.y for curve in panel.curves], panel.bounds)
+    if panel.nominal is not None and panel.lost is not None:
+        _keep_in_view(axes, panel.curves, panel.nominal, panel.lost)
 
 
-def _page(
-    drawing: Drawing, rows: Sequence[Sequence[Panel]], size: tuple[float, float], **shared: Any
-) -> tuple[Figure, Any]:
-    """Draw panels with words on events above the top row, and the time below the bottom row."""
-    figure = Figure(figsize=size, layout="constrained")
-    grid = figure.subplots(len(rows), len(rows[0]), sharex=True, squeeze=False, **shared)
-    for row, (places, panels) in enumerate(zip(grid, rows, strict=True)):
-        for axes, panel in zip(places, panels, strict=True):
-            _fill(axes, panel)
-            time_axis(axes, drawing)
-            mark_events(axes, drawing, labelled=row == 0)
-            if row < len(rows) - 1:
-                axes.set_xlabel("")
-    return figure, grid
+def _keep_in_view(axes: Axes, curves: Sequence[PanelCurve], nominal: float, most: float) -> None:
+    lost = [curve for curve in curves if abs(curve.y[-1] - nominal) > most]
+    if lost and len(lost) < len(curves):
+        low, high = axes.get_ylim()
+        axes.set_ylim(max(low, nominal - most), min(high, nominal + most))
+        for curve in lost:
+            text = f"{curve.label.partition(':')[0]}: {curve.y[-1]:.2f} Hz at the end"
+            note_above(axes, text, 1.0, "axes fraction", "right")
+
+
+def _drawn(page: Page, drawing: Drawing) -> Figure:
+    figure = Figure(figsize=page.size, layout="constrained")
+    columns = len(page.rows[0])
+    grid = figure.subplots(len(page.rows), columns, sharex=True, sharey=page.share_y, squeeze=False)
+    panels = [panel for row in page.rows for panel in row]
+    for place, axes in enumerate(grid.flat):
+        if place >= len(panels):
+            axes.set_visible(False)
+            continue
+        _fill(axes, panels[place])
+        time_axis(axes, drawing)
+        mark_events(axes, drawing, labelled=place < columns or bool(page.title))
+        lowest = place + columns >= len(panels)
+        axes.tick_params(labelbottom=lowest)
+        if not lowest:
+            axes.set_xlabel("")
+    if page.title:
+        figure.suptitle(page.title, fontsize=10)
+    legend_below(figure, grid[0, 0], one_row=page.one_row)
+    return figure
 
 
 def _where_shared(index: RowMeasure, power: str) -> RowMeasure:
@@ -174,80 +208,66 @@ def _measure_panel(drawing: Drawing, name: str) -> Panel:
     return Panel(measure.title, label, curves, None if measure.bounds else nominal, measure.bounds)
 
 
-def overview(drawing: Drawing) -> Figure:
+def overview(drawing: Drawing) -> Page:
     panels = [_measure_panel(drawing, name) for name in JUDGED]
-    figure, grid = _page(drawing, [panels[:2], panels[2:]], (WIDTH, 4.6))
-    legend_below(figure, grid[0, 0])
-    return figure
+    return Page([panels[:2], panels[2:]], (WIDTH, 4.6))
 
 
-def single(drawing: Drawing, name: str) -> Figure:
-    figure, grid = _page(drawing, [[_measure_panel(drawing, name)]], (6.4, 3.2))
-    legend_below(figure, grid[0, 0])
-    return figure
+def single(drawing: Drawing, name: str) -> Page:
+    return Page([[_measure_panel(drawing, name)]], (6.4, 3.2))
 
 
 def _case_title(drawing: Drawing, case: str) -> str:
     return "\n".join(wrap(f"Case {drawing.words(case)}", TITLE_LENGTH))
 
 
-def plug_and_play(drawing: Drawing) -> Figure:
-    """Draw P of every inverter, frequency and voltage below each other, a column for each case: the paper's figure."""
+def plug_and_play(drawing: Drawing) -> Page:
+    """Return P of every inverter, f and V below each other, a column for each case: the paper's figure."""
     nameplates = drawing.nameplates
     stays = np.all([history.present.all(axis=0) for history in drawing.histories.values()], axis=0)
     styles = [STAYERS[bool(GFM)] if stay else MOVER for GFM, stay in zip(nameplates.GFM, stays, strict=True)]
-    rows: list[list[Panel]] = [[], [], []]
-    for number, (case, history) in enumerate(drawing.histories.items()):
-        shares = (history.P / nameplates.s).T
-        powers = [PanelCurve(history.t, *each) for each in zip(shares, styles, nameplates.names, strict=True)]
-        labels = (P_LABEL, "f, mean of the GFM (Hz)", "mean V (pu)") if number == 0 else ("", "", "")
-        f, V = (of(history, nameplates) for of in (metrics.mean_frequency, metrics.mean_voltage))
-        style = stacked_styles(len(drawing.histories))[number]
-        rows[0].append(Panel(_case_title(drawing, case), labels[0], powers))
-        rows[1].append(Panel("", labels[1], [PanelCurve(history.t, f, style, case)], drawing.f_nom))
-        rows[2].append(Panel("", labels[2], [PanelCurve(history.t, V, style, case)]))
-    figure, grid = _page(drawing, rows, (max(3.7 * len(drawing.histories), 5.2), 5.4), sharey="row")
     movers = ", ".join(name for name, stay in zip(nameplates.names, stays, strict=True) if not stay)
     words = {MOVER: movers, STAYERS[True]: "grid-forming", STAYERS[False]: "grid-following"}
-    lines = dict(zip(styles, grid[0, 0].get_lines(), strict=False))
-    kinds = [style for style in words if style in lines]
-    handles, meanings = [lines[style] for style in kinds], [words[style] for style in kinds]
-    figure.legend(handles, meanings, loc="outside lower center", ncols=len(kinds))
-    return figure
+    labels = [words.pop(style, "") for style in styles]  # the first curve of a style is in the legend
+    rows: list[list[Panel]] = [[], [], []]
+    for (case, history), style in zip(drawing.histories.items(), stacked_styles(len(drawing.histories)), strict=True):
+        powers = zip((history.P / nameplates.s).T, styles, labels, strict=True)
+        f, V = (of(history, nameplates) for of in (metrics.mean_frequency, metrics.mean_voltage))
+        of_rows = (
+            Panel(_case_title(drawing, case), P_LABEL, [PanelCurve(history.t, *each) for each in powers]),
+            Panel("", "f, mean of the GFM (Hz)", [PanelCurve(history.t, f, style)], drawing.f_nom),
+            Panel("", "mean V (pu)", [PanelCurve(history.t, V, style)]),
+        )
+        for row, panel in zip(rows, of_rows, strict=True):
+            row.append(panel._replace(label="") if row else panel)
+    return Page(rows, (max(3.7 * len(drawing.histories), 5.2), 5.4), share_y="row", one_row=True)
 
 
-def powers(drawing: Drawing, *, GFM: bool) -> Figure:
-    """Draw P of each inverter of one kind (pu of its rating), one panel per case."""
+def powers(drawing: Drawing, *, GFM: bool) -> Page:
+    """Return P of each inverter of one kind (pu of its rating), one panel per case."""
     count, nameplates = len(drawing.histories), drawing.nameplates
     columns = 2 if count > 1 else 1
-    rows = -(-count // columns)
-    size = (3.7 * columns + (2.0 if count == 1 else 0.0), 2.0 * rows + 0.6)
-    figure = Figure(figsize=size, layout="constrained")
-    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     chosen = np.flatnonzero(nameplates.GFM == GFM)
     widths = np.linspace(2.4, 0.9, len(chosen))  # wide below narrow: where curves coincide all of them are seen
-    for place, (axes, (case, history)) in enumerate(zip(grid.flat, drawing.histories.items(), strict=False)):
+    panels = []
+    for place, (case, history) in enumerate(drawing.histories.items()):
         curves = []
         for number, i in enumerate(chosen):
             again, of = divmod(number, len(STYLES))  # more inverters than colours: those of a later round dashed
             style = (STYLES[of][0], ROUNDS[again % len(ROUNDS)], widths[number])
             curves.append(PanelCurve(history.t, history.P[:, i] / nameplates.s[i], style, nameplates.names[i]))
-        _fill(axes, Panel(_case_title(drawing, case), "" if place % columns else P_LABEL, curves))
-        time_axis(axes, drawing)
-        mark_events(axes, drawing, labelled=True)
-        lowest = place + columns >= count
-        axes.tick_params(labelbottom=lowest)
-        if not lowest:
-            axes.set_xlabel("")
-    for axes in grid.flat[count:]:
-        axes.set_visible(False)
-    figure.suptitle(f"Real power of the {'grid-forming' if GFM else 'grid-following'} inverters", fontsize=10)
-    legend_below(figure, grid[0, 0], one_row=True)
-    return figure
+        panels.append(Panel(_case_title(drawing, case), "" if place % columns else P_LABEL, curves))
+    rows = [panels[i : i + columns] for i in range(0, count, columns)]
+    size = (3.7 * columns + (2.0 if count == 1 else 0.0), 2.0 * len(rows) + 0.6)
+    title = f"Real power of the {'grid-forming' if GFM else 'grid-following'} inverters"
+    return Page(rows, size, share_y=True, title=title, one_row=True)
 
 
-def available_power(drawing: Drawing) -> Figure:
-    """Draw P of the first limited inverter and the mean of the others, f, and P_set - P of the limited one, by case."""
+def available_power(drawing: Drawing) -> Page:
+    """Return P of the first limited inverter and the mean of the others, f, and P_set - P of the limited one, by case.
+
+    A frequency that falls for good leaves the frame instead of flattening all others.
+    """
     first, s = drawing.limited[0], drawing.nameplates.s
     at = drawing.nameplates.names.index(first)
     others = np.array([name not in drawing.limited for name in drawing.nameplates.names])
@@ -260,51 +280,28 @@ def available_power(drawing: Drawing) -> Figure:
         Panel("Power of the inverters that are not limited", f"their mean, {P_LABEL}", rest, 1.0),
     ]
     bottom = [
-        _measure_panel(drawing, "frequency"),
+        _measure_panel(drawing, "frequency")._replace(lost=LOST),
         Panel(f"Set-point of {first} ahead of its power", "P_set - P (pu of rating)", ahead),
     ]
-    figure, grid = _page(drawing, [top, bottom], (WIDTH, 4.8))
-    _keep_in_view(grid[1, 0], drawing)
-    legend_below(figure, grid[1, 0])
-    return figure
+    return Page([top, bottom], (WIDTH, 4.8))
 
 
-def _keep_in_view(axes: Axes, drawing: Drawing) -> None:
-    """Let a frequency that falls for good leave the frame instead of flattening all others."""
-    ends = {case: float(history.f[-1, drawing.nameplates.GFM].mean()) for case, history in drawing.histories.items()}
-    lost = [case for case, f in ends.items() if abs(f - drawing.f_nom) > LOST]
-    if lost and len(lost) < len(ends):
-        low, high = axes.get_ylim()
-        axes.set_ylim(max(low, drawing.f_nom - LOST), min(high, drawing.f_nom + LOST))
-        for case in lost:
-            note_above(axes, f"{case}: {ends[case]:.2f} Hz at the end", 1.0, "axes fraction", "right")
-
-
-def microgrids(drawing: Drawing, case: str) -> Figure:
-    """Draw P and Q in total, f and mean V over time of each part that is an island when there are most."""
+def microgrids(drawing: Drawing, case: str) -> Page:
+    """Return P and Q in total, f and mean V over time of each part that is an island when there are most."""
+    panels = [
+        Panel("Real power", "P in total (kW)", []),
+        Panel("Reactive power", "Q in total (kvar)", []),
+        Panel("Frequency", "mean of its GFM, f (Hz)", [], drawing.f_nom),
+        Panel("Voltage", "mean of its inverters, V (pu)", [], 1.0),
+    ]
     islands = drawing.most_islands(case).values()
-    of: list[list[PanelCurve]] = [[], [], [], []]
     for island, style in zip(islands, stacked_styles(len(islands)), strict=True):
         history, nameplates = part_of(drawing.histories[case], drawing.nameplates, island.inverters)
-        for curves, y in zip(
-            of,
-            (
-                history.P.sum(axis=1) / 1e3,
-                history.Q.sum(axis=1) / 1e3,
-                metrics.mean_frequency(history, nameplates),
-                metrics.mean_voltage(history, nameplates),
-            ),
-            strict=True,
-        ):
-            curves.append(PanelCurve(history.t, y, style, drawing.island_title(island)))
-    top = [Panel("Real power", "P in total (kW)", of[0]), Panel("Reactive power", "Q in total (kvar)", of[1])]
-    bottom = [
-        Panel("Frequency", "mean of its GFM, f (Hz)", of[2], drawing.f_nom),
-        Panel("Voltage", "mean of its inverters, V (pu)", of[3], 1.0),
-    ]
-    figure, grid = _page(drawing, [top, bottom], (WIDTH, 4.6))
-    legend_below(figure, grid[0, 0], one_row=True)
-    return figure
+        total = (power.sum(axis=1) / 1e3 for power in (history.P, history.Q))
+        means = (of(history, nameplates) for of in (metrics.mean_frequency, metrics.mean_voltage))
+        for panel, y in zip(panels, (*total, *means), strict=True):
+            panel.curves.append(PanelCurve(history.t, y, style, drawing.island_title(island)))
+    return Page([panels[:2], panels[2:]], (WIDTH, 4.6), one_row=True)
 
 
 def comparison(pairs: Sequence[tuple[str, Mapping[str, Drawing]]]) -> Figure:
@@ -333,8 +330,8 @@ def comparison(pairs: Sequence[tuple[str, Mapping[str, Drawing]]]) -> Figure:
     return figure
 
 
-def figures_of(drawing: Drawing) -> dict[str, Callable[[], Figure]]:
-    figures: dict[str, Callable[[], Figure]] = {name: partial(single, drawing, name) for name in MEASURES}
+def figures_of(drawing: Drawing) -> dict[str, Callable[[], Page]]:
+    figures: dict[str, Callable[[], Page]] = {name: partial(single, drawing, name) for name in MEASURES}
     figures |= {f"power_{kind}": partial(powers, drawing, GFM=kind == "GFM") for kind in ("GFM", "GFL")}
     figures["overview"] = partial(overview, drawing)
     if drawing.moves:
@@ -350,21 +347,13 @@ def draw(drawing: Drawing, name: str) -> Figure:
     if name not in figures:
         raise ValueError(f'there is no figure "{name}" of this run; {suggestion(name, figures, "figures")}')
     with mpl.rc_context(PAGE):
-        return figures[name]()
+        return _drawn(figures[name](), drawing)
 
 
 def draw_all(drawing: Drawing, folder: Path, number: int = 0, of: int = 1) -> tuple[Path, ...]:
     """Draw every figure of a run into a folder, or one of so many shares of them that take about the same time."""
     folder.mkdir(parents=True, exist_ok=True)
-    figures = figures_of(drawing)
-    with mpl.rc_context(PAGE):
-        return tuple(file for name in _share(figures, number, of) for file in save(figures[name](), folder, name))
-
-
-def _share(figures: Iterable[str], number: int, of: int) -> Iterator[str]:
-    times = [0.0] * of
-    for name in sorted(figures, key=lambda name: name != "overview"):  # which takes as long as two others
-        least = times.index(min(times))
-        times[least] += 2.5 if name == "overview" else 1.0
-        if least == number:
-            yield name
+    names = [*figures_of(drawing)]
+    names.insert(0, names.pop(names.index("overview")))
+    names.insert(of, "")  # the overview takes as long as two others, so that its share has one less
+    return tuple(file for name in names[number::of] if name for file in save(draw(drawing, name), folder, name))

@@ -7,7 +7,6 @@ curves can be told in a black-and-white print too.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import accumulate
 from math import inf
 from pathlib import Path
 from types import MappingProxyType
@@ -127,12 +126,11 @@ TextSide = Literal["left", "center", "right"]  # Which part of a text stands at 
 LETTER = 0.056  # Width of a letter of these texts (inches), a little more than the mean of DejaVu Sans at 7 pt
 LONGEST = 20  # Letters of a word that is written whole
 GAP = 0.06  # Least distance between two texts (inches)
-ROUNDING = 1e-9  # Tolerance of a distance (inches): rounding may bring an edge at GAP nearer by the last bit
 MOST = 12.0  # Lines in an inch of a frame that leave its curves to be seen
 FRAME = 0.78  # Part of a column of panels that is the frame of one; the rest are its axis and margins
 
-_SIDES: tuple[tuple[TextSide, float, float], ...] = (("center", 0.5, 0.0), ("left", 0.0, 1.0), ("right", 1.0, 1.0))
-"""Sides, with the part of a text that stands before its line, and their price."""
+_SIDES: dict[TextSide, float] = {"center": 0.5, "left": 0.0, "right": 1.0}
+"""Sides, the preferred one first, with the part of a text that stands before its line."""
 
 
 class EventText(NamedTuple):
@@ -170,50 +168,29 @@ def note_above(axes: Axes, text: str, x: float, of: str, side: TextSide, *, colo
     axes.annotate(text, (x, 1.0), **at, ha=side, fontsize=7, color=colour)
 
 
-class _Option(NamedTuple):
-    """One way to write at a mark, or to leave it out; its edges (inches) are infinite then."""
-
-    price: float
-    texts: tuple[EventText, ...] = ()
-    start: float = inf
-    end: float = -inf
-
-
 def place_texts(marks: Sequence[Mark], inches_per_s: float) -> list[EventText]:
-    """Place texts so that none covers another: beside its line where need be, shorter, and at last left out."""
-    options = [_options(mark, inches_per_s) for mark in sorted(marks, key=lambda mark: mark.t)]
-    first = [*accumulate((min(one.start for one in each) for each in reversed(options)), min)][::-1]
-    best: dict[float, tuple[float, tuple[EventText, ...]]] = {-inf: (0.0, ())}
-    """Cost and texts by the right edge (inches): those that no other beats in both edge and cost, sorted by edge."""
-    for each, leftmost in zip(options, first, strict=True):
-        found: dict[float, tuple[float, tuple[EventText, ...]]] = {}
-        for right, (cost, texts) in best.items():
-            edge = max(right, leftmost - GAP)  # no later text begins further left, so these edges are alike
-            for option in each:
-                if option.start >= edge + GAP - ROUNDING:
-                    end, total = max(edge, option.end), cost + option.price
-                    if end not in found or total < found[end][0]:
-                        found[end] = total, (*texts, *option.texts)
-        best, least = {}, inf
-        for end, (cost, texts) in sorted(found.items()):
-            if cost < least:
-                best[end], least = (cost, texts), cost
-    return list([*best.values()][-1][1])
+    """Place texts so that none covers another: first all labels that have room, then more words where there is more."""
+    placed: dict[int, tuple[float, float, EventText]] = {}
+    """Left and right edge (inches) and text, by the number of the mark."""
+    for kind in range(3):
+        for number, mark in enumerate(marks):
+            text = _texts(mark)[kind]
+            width = LETTER * max(map(len, text.split("\n")))
+            around = [edges for other, (*edges, _) in placed.items() if other != number]
+            for side, before in _SIDES.items() if text else ():
+                start = mark.t * inches_per_s - before * width
+                end = start + width
+                if all(start >= right + GAP or end <= left - GAP for left, right in around):
+                    placed[number] = start, end, EventText(text, mark, side)
+                    break
+    return [text for *_, text in sorted(placed.values(), key=lambda each: each[0])]
 
 
-def _options(mark: Mark, inches_per_s: float) -> list[_Option]:
+def _texts(mark: Mark) -> tuple[str, str, str]:
+    """Return what can be written at a mark: its label, the event below it in two lines, the event in one."""
     what = " ".join(word if len(word) <= LONGEST else f"{word[:9]}...{word[-8:]}" for word in mark.what.split(" "))
-    both = "\n".join(text for text in (mark.label, what) if text)
-    narrow = "\n".join(text for text in (mark.label, what.replace(" ", "\n", 1)) if text)
-    prices = {mark.label: 10.0, narrow: 5.0} | {both: 0.0}  # of equal texts the last, cheapest price counts
-    found = [_Option(30.0 if both else 0.0)]
-    for text, price in prices.items():
-        width = LETTER * max(map(len, text.split("\n")))
-        for side, before, more in _SIDES:
-            start = mark.t * inches_per_s - before * width
-            if text:
-                found.append(_Option(price + more, (EventText(text, mark, side),), start, start + width))
-    return found
+    narrow, both = ("\n".join(filter(None, (mark.label, text))) for text in (what.replace(" ", "\n", 1), what))
+    return mark.label, narrow, both
 
 
 Format = Literal["png", "pdf", "svg"]  # Kind of file, as its name ends
