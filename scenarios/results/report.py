@@ -106,32 +106,43 @@ def show(report: RunReport, console: Console) -> None:
 
 
 def _print(report: RunReport, console: Console) -> None:
-    failed: list[RenderableType] = [
-        Text(f"FAILED  case {case}: {first_of(of)}", "bold red") for case, of in report.failures.items() if of
+    blocks: list[list[RenderableType]] = [
+        [Text(f"FAILED  case {case}: {first_of(of)}", "bold red") for case, of in report.failures.items() if of],
+        *([*_rendered(grid, min(console.width, _TABLE))] for grid in grids(report)),
+        [*_claims(report)],
+        [_checks(case, verdicts) for case, verdicts in report.checks.items()],
     ]
-    blocks = [failed] if failed else []
-    blocks += [[*_rendered(grid, min(console.width, _TABLE))] for grid in grids(report)]
-    if report.verdicts:
-        width = max(len(verdict.claim.text) for verdict in report.verdicts)
-        lines: list[RenderableType] = []
-        for verdict in report.verdicts:
-            status = (f"{verdict.status:7}", _COLOURS[verdict.status])
-            lines.append(Text.assemble(status, f"  {verdict.claim.text:{width}}  ", (verdict.found, "dim")))
-            if verdict.status == "MISS":
-                lines.append(Text(f"{'':7}  {verdict.claim.known_miss}", style="dim"))
-        blocks.append([*lines, _count(report.verdicts), *report.benchmark.lines(report.findings)])
-    if report.checks:
-        blocks.append([_verdict_of(case, verdicts) for case, verdicts in report.checks.items()])
-    blocks += [[Text.assemble(("NOTE", "yellow"), f"  {note}")] for note in _all_notes(report)]
+    notes = [
+        f"case {case}: {', '.join(names)} without an agent: MPSI, MQSI and the time to restore leave "
+        f"{'it' if len(names) == 1 else 'them'} out; frequency and voltage do not"
+        for case, names in report.findings.without_agent.items()
+    ]
+    blocks += [[Text.assemble(("NOTE", "yellow"), f"  {note}")] for note in (*notes, *report.notes)]
     blocks += [[Text.assemble("Results: ", (report.folder, "bold"))]] if report.folder else []
-    for number, block in enumerate(blocks):
+    for number, block in enumerate(filter(None, blocks)):
         if number:
             console.print()
         for line in block:
             console.print(line, soft_wrap=not isinstance(line, Table))
 
 
-def _verdict_of(case: str, verdicts: tuple[CheckVerdict, ...]) -> Text:
+def _claims(report: RunReport) -> Iterator[Text]:
+    """Yield a line for each claim, how many of them hold, and the distance from the publication."""
+    width = max((len(verdict.claim.text) for verdict in report.verdicts), default=0)
+    for verdict in report.verdicts:
+        status = (f"{verdict.status:7}", _COLOURS[verdict.status])
+        yield Text.assemble(status, f"  {verdict.claim.text:{width}}  ", (verdict.found, "dim"))
+        if verdict.status == "MISS":
+            yield Text(f"{'':7}  {verdict.claim.known_miss}", style="dim")
+    if report.verdicts:
+        of = Counter(verdict.status for verdict in report.verdicts)
+        rest = f", {of['MISS']} missed for a known reason" if of["MISS"] else ""
+        rest += f", {of['NOT RUN']} not run" if of["NOT RUN"] else ""
+        yield Text(f"{of['PASS']} of {len(report.verdicts) - of['NOT RUN']} claims hold{rest}.")
+        yield from map(Text, report.benchmark.lines(report.findings))
+
+
+def _checks(case: str, verdicts: tuple[CheckVerdict, ...]) -> Text:
     failed = any(verdict.status == "failed" for verdict in verdicts)
     return Text.assemble(("CHECKS", "yellow" if failed else "green"), f"  case {case}: {summary(verdicts)}")
 
@@ -149,39 +160,69 @@ def _rendered(grid: Grid, width: int) -> Iterator[RenderableType]:
         yield Text(grid.legend, style="dim")
 
 
-def _all_notes(report: RunReport) -> list[str]:
-    agentless = [
-        f"case {case}: {', '.join(names)} without an agent: MPSI, MQSI and the time to restore leave "
-        f"{'it' if len(names) == 1 else 'them'} out; frequency and voltage do not"
-        for case, names in report.findings.without_agent.items()
-    ]
-    return [*agentless, *report.notes]
-
-
 def _grid(report: RunReport, title: str, quantities: tuple[Quantity, ...]) -> Grid:
-    findings = report.findings
-    events = list(dict.fromkeys(event for steady in findings.results.values() for event in steady))
-    header, rows = ["case"], []
-    for event in events:
-        header += [f"{event}\n{heading(quantity, findings.f_nom)}" for quantity in quantities]
-        header += [f"{event}\nrestored in"] if "f_error_Hz" in quantities else []
-    for case in findings.results:
-        islands = dict.fromkeys(name for parts in findings.islands.get(case, {}).values() for name in parts)
-        for island in ("", *islands):
-            words = f"  island of {island}" if island else _case(report, case)
-            cells = (cell for event in events for cell in _cells(report, case, event, island, quantities))
-            rows.append((words, *cells))
-    beside = [one for one in report.benchmark.numbers if one.quantity in quantities and findings.has(one)]
+    """Return a table of some quantities; what is shared means nothing over several islands, and is a dash there.
+
+    A value that is not steady is no number: the first words of its reason stand there, and all of it below the table.
+    """
+    found, timed = report.findings, "f_error_Hz" in quantities
+    events = list(dict.fromkeys(event for steady in found.results.values() for event in steady))
+    columns = [*(heading(quantity, found.f_nom) for quantity in quantities), *["restored in"] * timed]
+    header = ("case", *(f"{event}\n{column}" for event in events for column in columns))
+    rows, legend = [], []
+    for case, results in found.results.items():
+        for island in ("", *dict.fromkeys(name for parts in found.islands.get(case, {}).values() for name in parts)):
+            row = [f"  island of {island}" if island else _case(report, case)]
+            for event in events:
+                islands = found.apart(case, event)
+                values = islands.get(island) if island else results.get(event)
+                if values is None:
+                    row += [""] * len(columns)
+                    continue
+                mixed = bool(islands) and not island
+                for name in quantities:
+                    dash = mixed and name in SHARING
+                    row.append("-" if dash else _cell(report, case, event, name, values, island))
+                    if name in values.reasons and not dash:
+                        where = f"{event}, island of {island}" if island else event
+                        legend.append(f"case {case}, {where}: {_why(values, name, found.f_nom)}")
+                if timed:
+                    restored = "never" if values.t_restore_s is None else f"{values.t_restore_s:.2f} s"
+                    row.append("-" if mixed or _nothing_shared(values, "MPSI") else restored)
+            rows.append(tuple(row))
+    beside = [one for one in report.benchmark.numbers if one.quantity in quantities and found.has(one)]
     sources = dict.fromkeys(one.source for one in beside)
     against = f", ours | paper's {' and '.join(sources)}" if sources else ""
-    legend = list(_reasons(report, quantities))
-    if any(findings.islands.values()):
+    if any(found.islands.values()):
         legend.insert(0, "-: where there are several islands, each shares for itself; see its own row")
-    return Grid(f"{title} after each event{against}", tuple(header), tuple(rows), "\n".join(legend))
+    return Grid(f"{title} after each event{against}", header, tuple(rows), "\n".join(legend))
 
 
 def _case(report: RunReport, case: str) -> str:
     return f"{case} {report.titles.get(case, '')}".strip()
+
+
+def _cell(report: RunReport, case: str, event: str, quantity: Quantity, values: Steady, island: str) -> str:
+    """Write a number beside the paper's; one digit more than it prints, and "!" where it is not near enough."""
+    paper = report.benchmark.number(case, event, quantity, island)
+    ours, reason = getattr(values, quantity), values.reasons.get(quantity, "")
+    text = reason.partition(":")[0] or f"{ours:.{(paper.digits if paper else DIGITS[quantity]) + 1}f}"
+    if paper is None:
+        return text
+    return f"{text} | {paper.paper:.{paper.digits}f}{' !' if report.findings.within(paper) is False else ''}"
+
+
+def _why(values: Steady, name: Quantity, f_nom: float) -> str:
+    """Return why a number is not shown, with the mean of the last 0.2 s."""
+    mean = getattr(values, name)
+    dust = math.isnan(mean) or _nothing_shared(values, name)
+    last = "" if dust else f" (mean of the last {STEADY:g} s: {mean:.3f}{UNITS[name]})"
+    return f"{label(name, f_nom)} {values.reasons[name]}{last}"
+
+
+def _nothing_shared(values: Steady, name: str) -> bool:
+    """Return True if there is too little power for a sharing index to mean anything."""
+    return values.reasons.get(name, "").startswith("nothing shared")
 
 
 def _own_grid(report: RunReport) -> Grid:
@@ -194,59 +235,3 @@ def _own_grid(report: RunReport) -> Grid:
         reasons += [f"case {case}, {event}: {name} {text}" for event in of for name, text in of[event].reasons.items()]
     header = ("case", *(f"{event}\n{name}" for event, name in places))
     return Grid("Metrics of the scenario", header, tuple(rows), "\n".join(reasons))
-
-
-def _cells(report: RunReport, case: str, event: str, island: str, quantities: tuple[Quantity, ...]) -> Iterator[str]:
-    """Yield the cells of an event in a row; one that means nothing over several islands is a dash."""
-    islands, timed = report.findings.apart(case, event), "f_error_Hz" in quantities
-    values = islands.get(island) if island else report.findings.results[case].get(event)
-    if values is None:
-        yield from [""] * (len(quantities) + timed)
-        return
-    mixed = bool(islands) and not island
-    for name in quantities:
-        yield "-" if mixed and name in SHARING else _cell(report, case, event, name, values, island)
-    if timed:
-        restored = "never" if values.t_restore_s is None else f"{values.t_restore_s:.2f} s"
-        yield "-" if mixed or _nothing_shared(values, "MPSI") else restored
-
-
-def _nothing_shared(values: Steady, name: str) -> bool:
-    """Return True if there is too little power for a sharing index to mean anything."""
-    return values.reasons.get(name, "").startswith("nothing shared")
-
-
-def _cell(report: RunReport, case: str, event: str, quantity: Quantity, values: Steady, island: str) -> str:
-    """Write a number beside the paper's; one digit more than it prints, and "!" where it is not near enough.
-
-    A value that is not steady is no number: the first words of its reason stand there, and all of it below the table.
-    """
-    paper = report.benchmark.number(case, event, quantity, island)
-    ours, reason = getattr(values, quantity), values.reasons.get(quantity, "")
-    text = reason.partition(":")[0] or f"{ours:.{(paper.digits if paper else DIGITS[quantity]) + 1}f}"
-    if paper is None:
-        return text
-    return f"{text} | {paper.paper:.{paper.digits}f}{' !' if report.findings.within(paper) is False else ''}"
-
-
-def _reasons(report: RunReport, quantities: tuple[Quantity, ...]) -> Iterator[str]:
-    """Yield a line for every number that is not shown, with the mean of the last 0.2 s."""
-    findings = report.findings
-    for case, steady in findings.results.items():
-        for event in steady:
-            for where, values in findings.parts(case, event).items():
-                mixed = bool(findings.apart(case, event)) and not where
-                for name in quantities:
-                    if name not in values.reasons or (mixed and name in SHARING):
-                        continue
-                    mean, measure = getattr(values, name), label(name, findings.f_nom)
-                    dust = math.isnan(mean) or _nothing_shared(values, name)
-                    last = "" if dust else f" (mean of the last {STEADY:g} s: {mean:.3f}{UNITS[name]})"
-                    yield f"case {case}, {event}{where}: {measure} {values.reasons[name]}{last}"
-
-
-def _count(verdicts: Sequence[Verdict]) -> str:
-    of = Counter(verdict.status for verdict in verdicts)
-    rest = f", {of['MISS']} missed for a known reason" if of["MISS"] else ""
-    rest += f", {of['NOT RUN']} not run" if of["NOT RUN"] else ""
-    return f"{of['PASS']} of {len(verdicts) - of['NOT RUN']} claims hold{rest}."
