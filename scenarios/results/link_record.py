@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import nullcontext
+from io import SEEK_END, BytesIO
 from itertools import chain
 from pathlib import Path
+from typing import BinaryIO
 
 import msgspec
 
@@ -30,9 +31,10 @@ class LinkRecord:
     """
 
     def __init__(self, folder: Path | None = None) -> None:
-        self._file = None if folder is None else folder / PARTIAL
-        self._parts: dict[tuple[str, str], list[LinkTrace | int]] = {}
-        """Verdicts of each link as they were reported, or their places in the file."""
+        self._path = None if folder is None else folder / PARTIAL
+        self._file: BinaryIO = BytesIO()
+        self._parts: dict[tuple[str, str], list[int]] = {}
+        """Places in the file of the verdicts of each link, as they were reported."""
         self.counts: dict[tuple[str, str], LinkCounts] = {}
         """Counts of the messages of each link (src, dst)."""
         self.garbled = 0
@@ -54,13 +56,12 @@ class LinkRecord:
             self._sha256[report.sender] = data.sha256
 
     def _keep(self, traces: tuple[LinkTrace, ...]) -> None:
-        with nullcontext() if self._file is None or not traces else self._file.open("ab") as file:
-            for trace in traces:
-                part: LinkTrace | int = trace
-                if file is not None:
-                    encoded, part = _encode(trace), file.tell()
-                    file.write(len(encoded).to_bytes(_SIZE, "little") + encoded)
-                self._parts.setdefault((trace.src, trace.dst), []).append(part)
+        if traces and self._path is not None and not self._parts:
+            self._file = self._path.open("w+b")
+        for trace in traces:
+            self._parts.setdefault((trace.src, trace.dst), []).append(self._file.seek(0, SEEK_END))
+            encoded = _encode(trace)
+            self._file.write(len(encoded).to_bytes(_SIZE, "little") + encoded)
 
     @property
     def sent(self) -> int:
@@ -78,15 +79,11 @@ class LinkRecord:
         return tuple(f"{src} -> {dst}: the account does not close: {counts}" for (src, dst), counts in open_)
 
     def traces(self) -> Iterator[LinkTrace]:
-        """Yield the verdicts in parts, link by link; of those in the file only one part at a time is in memory."""
-        with nullcontext() if self._file is None or not self._parts else self._file.open("rb") as file:
-            for link in sorted(self._parts):
-                for part in self._parts[link]:
-                    if isinstance(part, LinkTrace):
-                        yield part
-                    elif file is not None:
-                        file.seek(part)
-                        yield _decode(file.read(int.from_bytes(file.read(_SIZE), "little")))
+        """Yield the verdicts in parts, link by link; only one part at a time is decoded."""
+        for link in sorted(self._parts):
+            for part in self._parts[link]:
+                self._file.seek(part)
+                yield _decode(self._file.read(int.from_bytes(self._file.read(_SIZE), "little")))
 
     def write(self, folder: Path) -> list[str]:
         """Write links.csv and links.json, and return the lines for the report; nothing if no message was sent."""
@@ -95,9 +92,9 @@ class LinkRecord:
         parts = chain([[COLUMNS]], map(_rows, self.traces()))
         write_whole(folder / "links.csv", map(csv_text, parts))  # part by part: an hour has hundreds of megabytes
         write_whole(folder / "links.json", self._json())
-        if self._file is not None:
-            self._file.unlink(missing_ok=True)
-            self._file = None
+        if self._path is not None:
+            self._file.close()
+            self._path.unlink(missing_ok=True)
         return list(self._lines())
 
     def _json(self) -> str:
