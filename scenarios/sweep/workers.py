@@ -38,17 +38,26 @@ def cores() -> int:
 
 
 def on_workers(runs: Calls, jobs: int, task: Task[T], dask: str = "") -> Generator[T, None, None]:
-    """Do the runs on the Dask cluster of a scheduler, if its address is given, else in `jobs` processes here."""
-    return on_dask(runs, dask, task) if dask else on_this_machine(runs, jobs, task)
+    """Do the runs on the Dask cluster of a scheduler, if its address is given, else in `jobs` processes here.
 
-
-def on_this_machine(runs: Calls, jobs: int, task: Task[T]) -> Generator[T, None, None]:
-    """Do the runs in `jobs` processes, in whatever order; close the generator to end the workers early."""
-    if jobs == 1:
+    Results come in whatever order; close the generator to end the workers early. Workers of Dask need the same
+    gridpeers and the feeders' folders.
+    """
+    if not dask and jobs == 1:
         for call in runs:
             yield task(*call)
         return
     from joblib import parallel_config
+
+    if dask:
+        client = _client(dask)
+        with client, parallel_config(backend="dask", client=client, wait_for_workers_timeout=DASK_PATIENCE):
+            try:
+                yield from _parallel(runs, task)
+            except TimeoutError:
+                text = f"--dask {dask}: the scheduler has no worker; start some by `dask worker`"
+                raise WorkersError(text) from None
+        return
     from joblib.externals.loky import get_reusable_executor
 
     with parallel_config(backend="loky", n_jobs=jobs, initializer=_prepare, initargs=(os.getpid(),)):
@@ -58,25 +67,17 @@ def on_this_machine(runs: Calls, jobs: int, task: Task[T]) -> Generator[T, None,
             get_reusable_executor(reuse=True).shutdown(wait=True, kill_workers=True)
 
 
-def on_dask(runs: Calls, address: str, task: Task[T]) -> Generator[T, None, None]:
-    """Do the runs on a Dask cluster, whose workers need the same gridpeers and the feeders' folders."""
-    from distributed import Client
-    from joblib import parallel_config
+def _client(address: str) -> Any:
+    import distributed
 
-    connect: Any = Client  # it has no types
-
+    connect: Any = distributed.Client  # it has no types
     try:
-        client: Any = connect(address, timeout=DASK_PATIENCE, set_as_default=False)
+        return connect(address, timeout=DASK_PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:
         raise WorkersError(
             f"--dask {address}: no Dask scheduler answers there ({type(error).__name__}); start one by `dask "
             "scheduler`, workers by `dask worker ADDRESS`, and give its address, e.g. tcp://127.0.0.1:8786"
         ) from None
-    with client, parallel_config(backend="dask", client=client, wait_for_workers_timeout=DASK_PATIENCE):
-        try:
-            yield from _parallel(runs, task)
-        except TimeoutError:
-            raise WorkersError(f"--dask {address}: the scheduler has no worker; start some by `dask worker`") from None
 
 
 def _parallel(runs: Calls, task: Task[T]) -> Generator[T, None, None]:
