@@ -255,7 +255,7 @@ class Campaign:
         try:
             if (folder / SCENARIO).read_text(encoding="utf-8") != self.base.text:
                 raise FolderError(f"{where}: its {SCENARIO} is not the scenario and case to disturb; take a new folder")
-            rows = rows_in(folder, ChaosRow, lambda row: "")
+            rows = rows_in(folder, ChaosRow)
         except OSError as error:
             raise FolderError(f"{where}: no folder of a campaign: {error.strerror}") from None
         if seed != self.seed:

@@ -7,7 +7,7 @@ import csv
 import errno
 import fcntl
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from datetime import datetime
 from io import StringIO
@@ -23,12 +23,14 @@ from gridpeers.wire.driver.ending import OutputLostError
 RUNS = Path("runs")  # Parent of the run folders that the user does not name, seen from the working directory
 STATUS = "status.txt"  # File that says how far a folder's run is
 
-_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
-"""Errors of a system that takes no more bytes, whatever is done to the file."""
-
-_GONE = (errno.ENOENT, errno.ENOTDIR, errno.ESTALE, errno.EACCES, errno.EPERM)
-"""Errors of a folder that was removed, or closed to us, while it was written to."""
-
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)  # The system takes no more bytes
+_GONE = (
+    errno.ENOENT,
+    errno.ENOTDIR,
+    errno.ESTALE,
+    errno.EACCES,
+    errno.EPERM,
+)  # The folder was removed, or closed to us
 
 _NOT_EMPTY = "the folder is not empty; give a new or an empty one"
 
@@ -44,7 +46,15 @@ def new_folder(out: Path | None, scenario: str, now: datetime) -> Path:
     """
     if out is not None:
         return empty_folder(out, "--out", "running")
-    folder = empty_folder(_made(RUNS / scenario, now), "--out", "running")
+    parent, stem = RUNS / scenario, now.strftime("%Y-%m-%dT%H-%M-%S")
+    for number in count(1):  # further folders of the same second have a number too
+        folder = parent / (stem if number == 1 else f"{stem}-{number}")
+        try:
+            empty_folder(folder, "--out", "running")
+            break
+        except FolderError:
+            if not folder.is_dir():  # what is in the way is above
+                raise
     latest, new = folder.parent / "latest", folder.parent / f".latest-{os.getpid()}"
     with contextlib.suppress(OSError):  # a file system without links goes without
         new.symlink_to(folder.name)
@@ -106,7 +116,6 @@ def set_complete(folder: Path, missing: Iterable[str] = ()) -> None:
 
 
 def is_complete(status: str) -> bool:
-    """Return True if a status says that the run has ended and has its results."""
     return status.partition(":")[0] == "complete"
 
 
@@ -161,24 +170,9 @@ def csv_text(rows: Iterable[Iterable[object]]) -> str:
 
 
 def shown(folder: Path) -> str:
-    """Return the folder as short as it can be named from here."""
     with contextlib.suppress(ValueError):
         return str(folder.resolve().relative_to(Path.cwd().resolve()))
     return str(folder)
-
-
-def _made(parent: Path, now: datetime) -> Path:
-    """Make a folder that is named by a time, and return it; further ones of the same second have a number too."""
-    stem = now.strftime("%Y-%m-%dT%H-%M-%S")
-    for number in count(1):
-        folder = parent / (stem if number == 1 else f"{stem}-{number}")
-        try:
-            folder.mkdir(parents=True)
-            return folder
-        except OSError as error:
-            if not (isinstance(error, FileExistsError) and os.path.lexists(folder)):  # else what is in the way is above
-                raise FolderError(_unmade(folder, error.strerror, "--out")) from None
-    raise AssertionError
 
 
 LOCK = ".lock"
@@ -233,21 +227,22 @@ def journal_line(row: JournalRow) -> bytes:
     return msgspec.json.encode(row) + b"\n"
 
 
-def rows_in(folder: Path, kind: type[Row], problem: Callable[[Row], str]) -> dict[int, Row]:
+def rows_in(folder: Path, kind: type[Row], runs: int | None = None) -> dict[int, Row]:
     """Return the runs in the journal of a folder, by their numbers; of two lines of one run the later one counts.
 
-    `problem` says why the study has no such run, as people edit journals; "" of a run that it has. A last line that a
-    kill cut off counts as not done. Raise FolderError if a line is damaged, or the study has no such run.
+    A last line that a kill cut off counts as not done. Raise FolderError if a line is damaged, or the study has not so
+    many runs: people edit journals.
     """
     rows, decoder = dict[int, Row](), msgspec.json.Decoder(kind)
     for place, line in enumerate((folder / JOURNAL).read_bytes().split(b"\n")[:-1], start=1):
+        where = f"{shown(folder / JOURNAL)}:{place}"
         try:
             row = decode_foreign(decoder.decode, line)
-            text = problem(row)
         except msgspec.DecodeError as error:
-            text = f"this line is damaged ({error}); remove it, and its run is done again"
-        if text:
-            raise FolderError(f"{shown(folder / JOURNAL)}:{place}: {text}")
+            text = f"{where}: this line is damaged ({error}); remove it, and its run is done again"
+            raise FolderError(text) from None
+        if runs is not None and row.number not in range(runs):
+            raise FolderError(f"{where}: this study has runs 0 to {runs - 1}, none {row.number}; remove the line")
         rows[row.number] = row
     return rows
 

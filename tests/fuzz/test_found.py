@@ -75,7 +75,7 @@ def test_brackets_a_thousand_deep_are_refused_like_anything_else(tmp_path: Path)
     """In the journal of a study, in what an agent or a plant answers, in what a process reads of its configuration."""
     (tmp_path / JOURNAL).write_bytes(DEEP + b"\n")
     with pytest.raises(FolderError, match=r"runs\.jsonl:1: this line is damaged"):
-        rows_in(tmp_path, SweepRow, lambda row: "")
+        rows_in(tmp_path, SweepRow)
     assert read_config(DEEP) is None
     assert read_feeder_map(DEEP) is None
     done = subprocess.run([sys.executable, "-m", "gridpeers.agents"], input=DEEP, capture_output=True, check=False)

@@ -78,7 +78,7 @@ def test_a_law_that_fails_ends_the_run_where_the_scenario_wants_that(mine: str) 
     stopping = gp.load("islanding").replace({"case.IV.law": law, **SHORT, "on_law_failure": "stop"})
 
     with pytest.raises(gp.BrokenRunError, match=r"at t = 1.22 s, .* inv1: law early_laws:Mine \(early_laws.py:8\): st"):
-        stopping.run("IV", driver="processes")
+        stopping.run("IV")
 
 
 def test_a_sweep_whose_law_fails_has_no_numbers(mine: str) -> None:
