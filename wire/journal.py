@@ -46,7 +46,7 @@ AT_ONCE = 64
 """Most messages in one entry: of the longest there are, they fit into a part."""
 
 
-class Entry(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+class Entry(msgspec.Struct, frozen=True, array_like=True):
     """One entry; its tag is the first value of the array."""
 
 

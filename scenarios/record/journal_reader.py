@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
 from typing import Any
 
 import msgpack
@@ -10,15 +11,13 @@ import msgspec
 
 from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.wire.codec import CRC, sound
-from gridpeers.wire.journal import ENTRIES, AnyEntry, Entry
+from gridpeers.wire.journal import AnyEntry, Entry
 from gridpeers.wire.messages import LONGEST_MESSAGE, AnyMessage, Measurement, State
 
 _HEAD = b"\xdd"  # Begins an array of msgpack, before the number of its values in four bytes
 
-_LENGTHS = {kind.__struct_config__.tag: 1 + len(kind.__struct_fields__) for kind in ENTRIES}
-"""Number of values of an entry of each kind, with the kind itself."""
-
-_decoder = msgspec.msgpack.Decoder(list[AnyEntry])
+_decode_all = msgspec.msgpack.Decoder(list[AnyEntry]).decode
+_decode_one = msgspec.msgpack.Decoder(AnyEntry).decode
 
 
 def entries_of(data: bytes, note_damage: Callable[[ValueError], None] | None = None) -> Iterator[Entry]:
@@ -28,65 +27,42 @@ def entries_of(data: bytes, note_damage: Callable[[ValueError], None] | None = N
 
     Raise ValueError where the bytes end within an entry, or make none.
     """
-    try:
-        yield from _whole_entries(data)
-    except (msgpack.UnpackException, msgspec.DecodeError, ValueError, RecursionError):
-        for raw in _raw_entries(data, note_damage):
-            try:
-                entry = _entry_of(raw)
-            except ValueError as error:
-                if note_damage is None:
-                    raise
-                note_damage(error)
-            else:
-                if entry is not None:
-                    yield entry
 
-
-def _whole_entries(data: bytes) -> Sequence[Entry]:
-    """Return all entries at once, which takes a twentieth of the time; raise an error if any is damaged or unknown."""
-    unpacker, count = msgpack.Unpacker(max_buffer_size=LONGEST_MESSAGE), 0
-    unpacker.feed(data)
-    while unpacker.tell() < len(data):
-        unpacker.skip()
-        count += 1
-    return _decoder.decode(_HEAD + count.to_bytes(4, "big") + data)
-
-
-def _raw_entries(data: bytes, note_damage: Callable[[ValueError], None] | None) -> Iterator[Any]:
-    """Yield the msgpack values in the data of a journal, whatever they are; `_entry_of` checks them."""
-    most, end = LONGEST_MESSAGE, 0
-    unpacker = msgpack.Unpacker(max_buffer_size=most, max_array_len=most, max_map_len=most, strict_map_key=False)
-    try:
-        if len(data) > most:
-            raise ValueError(f"{len(data)} bytes, a part of a journal has at most {most}")
-        unpacker.feed(data)
-        while end < len(data):
-            raw = unpacker.unpack()
-            end = unpacker.tell()
-            yield raw
-    except (msgpack.UnpackException, ValueError, TypeError, RecursionError) as error:  # of type: a list as a key
-        why = f"it ends within the entry from byte {end} on" if isinstance(error, msgpack.OutOfData) else str(error)
-        damage = ValueError(f"no msgpack at byte {unpacker.tell()}: {why or type(error).__name__}")
+    def damaged(text: str) -> None:
         if note_damage is None:
-            raise damage from None
-        note_damage(damage)
+            raise ValueError(text)
+        note_damage(ValueError(text))
 
-
-def _entry_of(raw: Any) -> Entry | None:
-    """Return an entry, without what a later version added at its end; None if it is of a kind of a later version.
-
-    Raise ValueError if it is none of ours.
-    """
-    if isinstance(raw, list) and raw and isinstance(raw[0], str) and raw[0] in _LENGTHS:
-        raw = raw[: _LENGTHS[raw[0]]]
+    if len(data) > LONGEST_MESSAGE:
+        damaged(f"{len(data)} bytes, a part of a journal has at most {LONGEST_MESSAGE}")
+        return
+    ends, broken = _ends(data)
+    whole = _HEAD + (len(ends) - 1).to_bytes(4, "big") + data[: ends[-1]]
     try:
-        entry: Entry = msgspec.convert(raw, AnyEntry)
-    except msgspec.ValidationError as error:
-        if str(error).startswith("Invalid value"):
-            return None
-        raise ValueError(f"an entry is none of ours: {error}") from None
-    return entry
+        yield from _decode_all(whole)
+    except (msgspec.DecodeError, ValueError, RecursionError):  # one by one, which takes twenty times as long
+        for begin, end in pairwise(ends):
+            try:
+                yield _decode_one(data[begin:end])
+            except (msgspec.DecodeError, ValueError, RecursionError) as error:
+                if not str(error).startswith("Invalid value"):  # else it is of a kind of a later version
+                    damaged(f"an entry is none of ours: {error}")
+    if broken:
+        damaged(broken)
+
+
+def _ends(data: bytes) -> tuple[list[int], str]:
+    """Return the places (bytes) between msgpack values, and why what follows the last one is none, or ""."""
+    unpacker, ends = msgpack.Unpacker(max_buffer_size=LONGEST_MESSAGE), [0]
+    unpacker.feed(data)
+    try:
+        while ends[-1] < len(data):
+            unpacker.skip()
+            ends.append(unpacker.tell())
+    except (msgpack.UnpackException, ValueError) as error:
+        why = "it ends within the entry" if isinstance(error, msgpack.OutOfData) else str(error) or "no msgpack"
+        return ends, f"no msgpack at byte {ends[-1]}: {why}"
+    return ends, ""
 
 
 def message_of(
