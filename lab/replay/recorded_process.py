@@ -143,7 +143,7 @@ class RecordedProcess:
 
 class JournalParts:
     def __init__(self, index: MessageIndex) -> None:
-        self.index, self.count = index, len(index.file.spans)
+        self.index, self.count = index, index.parts
         self.of = lru_cache(maxsize=16)(self._of)
 
     def _of(self, number: int) -> dict[tuple[str, int], list[tuple[Journal, list[Entry]]]]:

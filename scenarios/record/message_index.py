@@ -5,7 +5,7 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from math import inf
 from typing import TypeVar
@@ -82,23 +82,11 @@ class MessageIndex:
         self._reach = max(0.0, 2.0 * speed - 1.0)
         """How much further than its own time a message is looked for (s of run time): a journal comes up to a second of
         wall time after what it is about, and so does that of the sender."""
-        self._ends: list[float] = []
-        self._note_parts()
         self.part = lru_cache(maxsize=40)(self._read_part)  # more than `near` yields for a message: 20 in real time
-
-    def refresh(self) -> bool:
-        """Note what the file of a run that is still recorded has got since; return whether that is anything."""
-        changed = self.file.refresh()
-        self._note_parts()
-        return changed
 
     @property
     def parts(self) -> int:
-        return len(self._ends)
-
-    def _note_parts(self) -> None:
-        for _, until in self.file.spans[len(self._ends) :]:  # a part may have late entries alone; the ends must rise
-            self._ends.append(max(until, self._ends[-1]) if self._ends else until)
+        return len(self.file.ends)
 
     def note_damage(self, text: str) -> None:
         if text not in self.damage:
@@ -116,13 +104,11 @@ class MessageIndex:
                 elif isinstance(message, kind):
                     yield message
 
-    # ---------------------------------------------------------------- journals
-
     def near(self, since: float, until: float) -> range:
         """Return the parts that may have what happened between two run times (s)."""
-        first = bisect_left(self._ends, since - 1e-9)
-        last = bisect_left(self._ends, until + self._late) + 1 if until < inf else len(self._ends)
-        return range(first, min(last, len(self._ends)))
+        ends = self.file.ends
+        last = bisect_left(ends, until + self._late) + 1
+        return range(bisect_left(ends, since - 1e-9), min(last, len(ends)))
 
     def entries_in(self, journal: Journal) -> Iterator[Entry]:
         """Yield the entries of one part of a journal, as far as they can be read."""
@@ -228,48 +214,43 @@ def on_wire(
 ) -> MessageOnWire:
     """Return a message from its bytes, or from the message itself where none were sent."""
     message = message or sound(payload)
-    if message is None:
-        values = values_of(payload)
-        epoch, number, t = (values.get(name) for name in ("epoch", "seq", "t"))
+    if message is not None:
         return MessageOnWire(
-            sender=str(values.get("sender") or key.rpartition("/")[2])[:64],
+            sender=message.sender,
             receiver=receiver,
-            kind=str(values.get("type") or "")[:40],
+            kind=type(message).__name__,
             key=key,
-            epoch=epoch if type(epoch) is int else -1,
-            number=number if type(number) is int else -1,
-            t=float(t) if isinstance(t, int | float) else -1.0,
+            epoch=message.epoch,
+            number=message.seq,
+            t=message.t,
             at=at,
             rejected=rejected,
-            payload=payload,
+            message=message,
+            payload=payload or encode(message),
         )
+    values = values_of(payload)
+    epoch, number, t = (values.get(name) for name in ("epoch", "seq", "t"))
     return MessageOnWire(
-        sender=message.sender,
+        sender=str(values.get("sender") or key.rpartition("/")[2])[:64],
         receiver=receiver,
-        kind=type(message).__name__,
+        kind=str(values.get("type") or "")[:40],
         key=key,
-        epoch=message.epoch,
-        number=message.seq,
-        t=message.t,
+        epoch=epoch if type(epoch) is int else -1,
+        number=number if type(number) is int else -1,
+        t=float(t) if isinstance(t, int | float) else -1.0,
         at=at,
         rejected=rejected,
-        message=message,
-        payload=payload or encode(message),
+        payload=payload,
     )
 
 
 def heard_of(receiver: str, message: AnyMessage | None, entry: MessageReference, t: float) -> MessageOnWire:
     """Return a message as it was heard, whose bytes are in its sender's journal."""
-    return MessageOnWire(
+    return replace(
+        on_wire(entry.key, b"", entry.at, receiver=receiver, rejected=entry.rejected, message=message),
         sender=sender_of(entry.key),
-        receiver=receiver,
         kind="Measurement" if kind_of(entry.key) == "measurement" else "State",
-        key=entry.key,
         epoch=entry.epoch,
         number=entry.seq,
         t=t if message is None else message.t,
-        at=entry.at,
-        rejected=entry.rejected,
-        message=message,
-        payload=b"" if message is None else encode(message),
     )

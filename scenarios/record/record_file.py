@@ -14,7 +14,6 @@ from io import BytesIO
 from pathlib import Path
 from typing import BinaryIO, NamedTuple, get_args
 
-import lz4.frame
 import msgspec
 import zstandard
 from mcap.data_stream import ReadDataStream
@@ -29,10 +28,9 @@ from gridpeers.wire.wording import suggestion
 
 _MAGIC = bytes((137, 77, 67, 65, 80, 48, 13, 10))
 _FRAME = struct.Struct("<BQ")
-_TIMES = struct.Struct("<QQQ")
+_TIMES = struct.Struct("<QQ")
 _FOOTER = 20  # Bytes of the record that ends a file
 RECENT = 8  # Chunks whose messages stay in memory
-MOST_CHUNK = 256_000_000  # Most bytes of a chunk: far more than a writer of ours makes of a second
 
 _BROKEN = (
     McapError, struct.error, ValueError, KeyError, OverflowError, MemoryError, zstandard.ZstdError, RuntimeError,
@@ -55,8 +53,8 @@ class RecordMessage(NamedTuple):
 class _ChunkPlace(NamedTuple):
     offset: int
     length: int
-    since: int
-    until: int
+    since: float
+    until: float
 
 
 class RecordFile:
@@ -78,8 +76,10 @@ class RecordFile:
         self._topics: dict[int, Topic] = dict(enumerate(get_args(Topic), 1))
         """Topic of each channel: those of our writer, as the first chunk, which names them, may be damaged."""
         self._chunks: list[_ChunkPlace] = []
+        self.ends: list[float] = []
+        """Latest run time (s) up to the end of each part that can be read on its own, in the order of the file."""
         self._info: RecordInfo | None = None
-        self._read_on()
+        self.refresh()
         if self._info is None:
             raise RecordFileError(f"{path}: it ends before it says what was recorded: {self._size} bytes")
         self.info: RecordInfo = self._info
@@ -91,85 +91,67 @@ class RecordFile:
         """Sentences on parts of the file that could not be read, and on its end if it is cut off."""
         return (*self._damage, *filter(None, [self._end]))
 
-    def refresh(self) -> bool:
-        """Note what was written since, of a run that is still recorded; return whether that is anything."""
-        if self.complete:
-            return False
-        chunks = len(self._chunks)
-        self._read_on()
-        return self.complete or len(self._chunks) > chunks
-
-    @property
-    def spans(self) -> list[tuple[float, float]]:
-        """First and last run time (s) of each part that can be read on its own, in the order of the file."""
-        return [(place.since / 1e9, place.until / 1e9) for place in self._chunks]
-
     @property
     def t_end(self) -> float:
-        return max((place.until for place in self._chunks), default=0) / 1e9
+        return self.ends[-1] if self.ends else 0.0
 
     def messages(self, topics: Collection[Topic] | None = None) -> Iterator[RecordMessage]:
         """Yield the messages of these topics, or all, in the order of the file; one part is in memory at a time."""
-        for index in range(len(self._chunks)):
+        for index in range(len(self.ends)):
             yield from (message for message in self.part(index) if topics is None or message.topic in topics)
 
     def part(self, index: int) -> tuple[RecordMessage, ...]:
-        """Return the messages of one of `spans`; none if it is damaged: `damage` says so then."""
+        """Return the messages of a part; none if it is damaged: `damage` says so then."""
         # not an lru_cache of a method: in a cycle with its file it would stay in memory long after
-        messages = self._recent.pop(index) if index in self._recent else self._load_chunk(index)
+        messages = self._recent.pop(index) if index in self._recent else self._load_chunk(self._chunks[index])
         self._recent[index] = messages
         if len(self._recent) > RECENT:
             del self._recent[next(iter(self._recent))]
         return messages
 
-    def _read_on(self) -> None:
+    def refresh(self) -> None:
+        """Note what was written since, of a run that is still recorded."""
         try:
             with self.path.open("rb") as file:
                 self._size = file.seek(0, 2)
                 file.seek(self._offset)
-                self._scan(file)
+                if not self._offset and file.read(len(_MAGIC)) != _MAGIC:
+                    raise RecordFileError(
+                        f"{self.path}: this is no record: it does not begin as an MCAP file; give a {FILE}"
+                    )
+                self._offset = file.tell()
+                if not self.complete:
+                    self._end = self._scan(file)
         except OSError as error:
             raise RecordFileError(f"{self.path}: cannot be read: {error.strerror}") from None
 
-    def _scan(self, file: BinaryIO) -> None:
-        if not self._offset:
-            if file.read(len(_MAGIC)) != _MAGIC:
-                raise RecordFileError(
-                    f"{self.path}: this is no record: it does not begin as an MCAP file; give a {FILE}"
-                )
-            self._offset = len(_MAGIC)
-        self._end = ""
+    def _scan(self, file: BinaryIO) -> str:
+        """Note the places of chunks from here on; return how the file ends if it is cut off, or ""."""
         while frame := file.read(_FRAME.size):
             if len(frame) < _FRAME.size:
-                self._cut("within the length of a record")
-                return
+                return self._cut("within the length of a record")
             opcode, length = _FRAME.unpack(frame)
             start = file.tell()
             if start + length > self._size:
-                self._cut("within a chunk" if opcode == Opcode.CHUNK else "within a record")
-                return
+                return self._cut("within a chunk" if opcode == Opcode.CHUNK else "within a record")
             if opcode == Opcode.FOOTER and length == _FOOTER:
                 self.complete = True
-                return
+                return ""
             if opcode == Opcode.CHUNK and length > _TIMES.size:
-                since, until, size = _TIMES.unpack(file.read(_TIMES.size))
-                if size > MOST_CHUNK or since > until:
-                    self._damage.append(f"a chunk of {size} bytes at byte {start} is none of ours")
-                    self.holes.append((self.t_end, self.t_end))
-                else:
-                    self._chunks.append(_ChunkPlace(start, length, since, until))
+                since, until = _TIMES.unpack(file.read(_TIMES.size))
+                self._chunks.append(_ChunkPlace(start, length, since / 1e9, until / 1e9))
+                self.ends.append(max(self.t_end, until / 1e9))  # a part may have late messages alone
             elif opcode == Opcode.HEADER:
                 self._check_header(file.read(length))
             elif opcode == Opcode.METADATA:
                 self._info = self._info or self._info_of(file.read(length))
             self._offset = start + length
             file.seek(self._offset)
-        if not self._damage:
-            self._cut("between two chunks")
+        return self._cut("between two chunks")
 
-    def _cut(self, where: str) -> None:
-        at = f" after t = {self.t_end:.2f} s" if self._chunks else ""
-        self._end = f"the file is cut off {where}{at}: its writer was killed, or is still at work"
+    def _cut(self, where: str) -> str:
+        at = f" after t = {self.t_end:.2f} s" if self.ends else ""
+        return f"the file is cut off {where}{at}: its writer was killed, or is still at work"
 
     def _check_header(self, data: bytes) -> None:
         try:
@@ -202,25 +184,20 @@ class RecordFile:
                 f"{self.path}: what it says about its run (written by gridpeers {by[:40]}) cannot be read: {error}"
             ) from None
 
-    def _load_chunk(self, index: int) -> tuple[RecordMessage, ...]:
-        place = self._chunks[index]
+    def _load_chunk(self, place: _ChunkPlace) -> tuple[RecordMessage, ...]:
         try:
             with self.path.open("rb") as file:
                 file.seek(place.offset)
-                chunk = Chunk.read(ReadDataStream(BytesIO(file.read(place.length))))
-            if not 0 <= _unpacked_size(chunk) <= MOST_CHUNK:
-                raise ValueError("its length is not known, or too large")
-            records = breakup_chunk(chunk, validate_crc=True)
+                data = file.read(place.length)
+            records = breakup_chunk(Chunk.read(ReadDataStream(BytesIO(data))), validate_crc=True)
         except OSError as error:
             raise RecordFileError(f"{self.path}: cannot be read: {error.strerror}") from None
         except _BROKEN as error:
-            hole = place.since / 1e9, place.until / 1e9
+            since, until = hole = place.since, place.until
             if hole not in self.holes:
                 self.holes.append(hole)
-                self._damage.append(
-                    f"a chunk is damaged, from t = {hole[0]:.2f} s to {hole[1]:.2f} s: "
-                    f"{str(error)[:100] or type(error).__name__}"
-                )
+                why = str(error)[:100] or type(error).__name__
+                self._damage.append(f"a chunk is damaged, from t = {since:.2f} s to {until:.2f} s: {why}")
             return ()
         messages = []
         for record in records:
@@ -230,14 +207,6 @@ class RecordFile:
                 topic = self._topics[record.channel_id]
                 messages.append(RecordMessage(topic, record.log_time, record.sequence, record.data))
         return tuple(messages)
-
-
-def _unpacked_size(chunk: Chunk) -> int:
-    if chunk.compression == "zstd":
-        return zstandard.frame_content_size(chunk.data)
-    if chunk.compression == "lz4":
-        return int(lz4.frame.get_frame_info(chunk.data)["content_size"]) or -1
-    return len(chunk.data)
 
 
 def record_path(path: str | Path, case: str = "") -> Path:

@@ -59,9 +59,9 @@ class RunRecord:
         """True if the record was closed properly. If not, its end is missing: at most the last second."""
         return self._file.complete
 
-    def refresh(self) -> bool:
-        """Take in what was written since, of a run that is still recorded; return whether that is anything."""
-        return self.index.refresh()
+    def refresh(self) -> None:
+        """Take in what was written since, of a run that is still recorded."""
+        self._file.refresh()
 
     @property
     def damage(self) -> tuple[str, ...]:

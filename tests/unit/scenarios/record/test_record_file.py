@@ -152,8 +152,8 @@ def test_physics_alone_have_no_decisions(tmp_path: Path) -> None:
 def index_of(clock: str, speed: float, T_c: float = 0.02) -> MessageIndex:
     """Of a file with a part for each second of a minute."""
     info: Any = SimpleNamespace(clock=clock, T_c=T_c, plant=SimpleNamespace(speed=speed))
-    spans = [(float(t), float(t + 1)) for t in range(60)]
-    return MessageIndex(cast(RecordFile, SimpleNamespace(info=info, spans=spans)))
+    ends = [float(t + 1) for t in range(60)]
+    return MessageIndex(cast(RecordFile, SimpleNamespace(info=info, ends=ends)))
 
 
 @pytest.mark.parametrize(("clock", "speed", "last"), [("simulated", 40.0, 12), ("wall", 1.0, 12), ("wall", 10.0, 30)])
