@@ -98,8 +98,8 @@ class DecisionEntries:
         place = bisect_right(first_ticks, tick) - 1
         if place < 0:
             return None
-        ticks, entries = self._in_part(parts[place])[agent]
-        return entries[bisect_right(ticks, tick) - 1]
+        entries = self._in_part(parts[place])[agent]
+        return entries[max(each for each in entries if each <= tick)]
 
     def knows(self, agent: str, t: float) -> bool:
         """Return whether the record says how an agent decided at a run time (s) of simulated time."""
@@ -172,14 +172,12 @@ class DecisionEntries:
     def _first_tick(self, journal: Journal) -> int | None:
         return next((entry.tick for entry in self._index.entries_in(journal) if isinstance(entry, Decision)), None)
 
-    def _read_part(self, part: int) -> dict[str, tuple[list[int], list[Decision]]]:
+    def _read_part(self, part: int) -> dict[str, dict[int, Decision]]:
         found: dict[str, dict[int, Decision]] = defaultdict(dict)
-        for journal in self._index.journals_in(part):
-            if journal.sender != PLANT:
-                for entry in self._index.entries_in(journal):
-                    if isinstance(entry, Decision):
-                        found[journal.sender][entry.tick] = entry
-        return {name: (sorted(by_tick), [by_tick[tick] for tick in sorted(by_tick)]) for name, by_tick in found.items()}
+        for journal, entry in self._index.part(part).entries:
+            if isinstance(entry, Decision):
+                found[journal.sender][entry.tick] = entry
+        return found
 
 
 def is_periodic(info: RecordInfo, node: str) -> bool:

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import AgentConfig, nameplate_of
 from gridpeers.agents.graphs import GraphError, in_neighbours, rule_of
-from gridpeers.netem.liar import HeardFrom, lies_about
+from gridpeers.netem.liar import HeardFrom, last_before, lies_about
 from gridpeers.netem.models import INSTANT
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.record.decision_entries import DecisionEntries
@@ -22,8 +22,7 @@ from gridpeers.wire.messages import OFF, PLANT, Measurement, Nameplate, State
 from gridpeers.wire.timing import time_of
 
 _REACH = 2.0
-"""How far (s) a state may be from where its number says: in wall-clock time agents tick by their own clocks."""
-
+"""Time (s) before a lie's moment in which the true state is looked for first."""
 
 _NOTHING = Decision(0, 0, [], [], [], [])
 
@@ -37,7 +36,6 @@ class DecisionReader:
         self.entries = DecisionEntries(index)
         self._listens = lru_cache(maxsize=None)(self._all_in_neighbours)
         self._hearing = lru_cache(maxsize=None)(self._heard_from)
-        self._true_state = lru_cache(maxsize=20_000)(index.state)
 
     def decisions(self, agent: str, since: float, until: float) -> Iterator[RecordedDecision]:
         config = self._info.agent(agent)
@@ -54,29 +52,18 @@ class DecisionReader:
                 t = time_of(state.seq, T_c)
                 if not since - 1e-9 <= t <= until + 1e-9 or not self.entries.knows(name, t):
                     continue
-                form = self.entries.at(name, state.seq) or _NOTHING
-                decision = self._at_tick(config, state, t, form)
-                if decision is not None:
+                if (decision := self._at_tick(config, state, t)) is not None:
                     yield decision
 
-    def _at_tick(self, config: AgentConfig, state: State, t: float, form: Decision) -> RecordedDecision | None:
-        name, tick = config.name, state.seq
-        idle = state.idle
-        age = 0 if idle else form.measurement
-        measured = self._index.measurement(name, tick - age, time_of(tick - age, self._info.T_c))
+    def _at_tick(self, config: AgentConfig, state: State, t: float) -> RecordedDecision | None:
+        form = None if state.idle else self.entries.at(config.name, state.seq)
+        form = form or _NOTHING
+        age = form.measurement
+        measured = self._index.measurement(config.name, state.seq - age, time_of(state.seq - age, self._info.T_c))
         if measured is None:
             return None
-        if age:
-            measured = replace(measured, seq=tick, t=t)
-        neighbours = []
-        for i, neighbour in enumerate([] if idle else form.neighbours):
-            lag = form.states[i]
-            number = None if lag is None else tick - lag
-            at = 0.0 if number is None else time_of(number, self._info.T_c)
-            heard = None if number is None else self._index.state(neighbour, number, at)
-            since = None if number is None else t - (at if heard is None else heard.t)
-            neighbours.append(self._input(name, form, i, heard, number, since))
-        return self._decision(config, state, measured, tuple(neighbours), form, age)
+        measured = replace(measured, seq=state.seq, t=t) if age else measured
+        return self._decision(config, state, measured, form, age)
 
     def _in_real_time(self, config: AgentConfig, since: float, until: float) -> Iterator[RecordedDecision]:
         name = config.name
@@ -86,34 +73,34 @@ class DecisionReader:
                     continue
                 measured = self._index.measurement(name, entry.measurement, journal.t)
                 state = self._index.state(name, entry.tick, journal.t)
-                if measured is None or state is None or not since - 1e-9 <= measured.t <= until + 1e-9:
-                    continue
-                neighbours = []
-                for i, neighbour in enumerate(entry.neighbours):
-                    number, age = entry.states[i], entry.ages[i] if i < len(entry.ages) else None
-                    at = measured.t - (age or 0.0)
-                    heard = None if number is None else self._index.state(neighbour, number, at)
-                    neighbours.append(self._input(name, entry, i, heard, number, age))
-                yield self._decision(config, state, measured, tuple(neighbours), entry)
+                if measured is not None and state is not None and since - 1e-9 <= measured.t <= until + 1e-9:
+                    yield self._decision(config, state, measured, entry)
 
-    def _input(
-        self, agent: str, form: Decision, i: int, state: State | None, number: int | None, age: float | None
-    ) -> NeighbourInput:
-        name, lie = form.neighbours[i], ""
-        if state is not None and (heard := self._hearing(agent, name)) is not None:
-            lie = heard.in_words(state.t)
-            state = heard.told(state, partial(self._last_state_before, state))
-        unused = form.unused[i] if i < len(form.unused) else ""
-        weight = form.weights[i] if i < len(form.weights) else 1.0
-        return NeighbourInput(
-            nameplate=self._nameplate(name, state),
-            state=state,
-            number=number,
-            age=age,
-            weight=0.0 if unused else weight,
-            unused=unused,
-            lie=lie,
-        )
+    def _inputs(self, agent: str, form: Decision, tick: int, t: float) -> Iterator[NeighbourInput]:
+        """Yield what an agent had heard of each neighbour at a tick, at t (s of run time)."""
+        for i, name in enumerate(form.neighbours):
+            number, age = form.states[i], form.ages[i] if i < len(form.ages) else None
+            at = t - (age or 0.0)
+            if self._info.simulated and number is not None:  # the entry has its age in ticks
+                number = tick - number
+                at = time_of(number, self._info.T_c)
+            state, lie = None if number is None else self._index.state(name, number, at), ""
+            if self._info.simulated and number is not None:
+                age = t - (at if state is None else state.t)
+            if state is not None and (heard := self._hearing(agent, name)) is not None:
+                lie = heard.in_words(state.t)
+                state = heard.told(state, partial(self._last_state_before, state))
+            unused = form.unused[i] if i < len(form.unused) else ""
+            weight = form.weights[i] if i < len(form.weights) else 1.0
+            yield NeighbourInput(
+                nameplate=self._nameplate(name, state),
+                state=state,
+                number=number,
+                age=age,
+                weight=0.0 if unused else weight,
+                unused=unused,
+                lie=lie,
+            )
 
     def _heard_from(self, agent: str, sender: str) -> HeardFrom | None:
         """Return how an agent hears a sender; None if nobody lies about it."""
@@ -126,24 +113,18 @@ class DecisionReader:
 
     def _last_state_before(self, latest: State, t: float) -> State:
         """Return the last state that the process of a state sent up to a run time (s), or its first one."""
-        T_c, number = self._info.T_c, latest.seq
+        found = self._states_of(latest, t - _REACH, t)
+        if not found or found[0].t > t + INSTANT:
+            found = self._states_of(latest, 0.0, latest.t)
+        return last_before(found or [latest], t)
 
-        def state(n: int) -> State | None:
-            at = max(0.0, latest.t - (number - n) * T_c)
-            return None if n < 0 else self._true_state(latest.sender, n, at, latest.epoch, _REACH)
-
-        n = max(0, min(number, number - round((latest.t - t) / T_c)))
-        while n < number and (later := state(n + 1)) is not None and later.t <= t + INSTANT:
-            n += 1
-        first = None
-        while (found := state(n)) is not None:
-            n -= 1
-            if not (found.idle or found.quiet):  # these no receiver hears
-                first = found
-                if found.t <= t + INSTANT:
-                    return found
-        later_ones = filter(None, map(state, range(n + 1, number + 1)))
-        return first or next((each for each in later_ones if not (each.idle or each.quiet)), latest)
+    def _states_of(self, latest: State, since: float, until: float) -> list[State]:
+        """Return the states that receivers heard of the process of a state, in the parts with these run times (s)."""
+        parts = (self._index.part(index).states.items() for index in self._index.near(since, until))
+        sent = (each for part in parts for (sender, _), each in part if sender == latest.sender)
+        heard = (each for states in sent for each in states if not (each.idle or each.quiet))
+        own = (each for each in heard if each.epoch == latest.epoch and each.seq <= latest.seq)
+        return sorted(own, key=lambda each: each.seq)
 
     def _nameplate(self, name: str, state: State | None) -> Nameplate:
         known = self._nameplates.get(name)
@@ -152,14 +133,9 @@ class DecisionReader:
         return known if state is None or state.epoch == known.epoch else replace(known, epoch=state.epoch)
 
     def _decision(
-        self,
-        config: AgentConfig,
-        state: State,
-        measured: Measurement,
-        neighbours: tuple[NeighbourInput, ...],
-        form: Decision,
-        age: int = 0,
+        self, config: AgentConfig, state: State, measured: Measurement, form: Decision, age: int = 0
     ) -> RecordedDecision:
+        neighbours = tuple(self._inputs(config.name, form, state.seq, measured.t))
         met, own = {each.name for each in neighbours}, self._own_before(config, state, form)
         action = _action(config, state, measured)
         return RecordedDecision(

@@ -124,28 +124,25 @@ class MessageIndex:
         for index in self.near(since, until):
             yield from (entry for journal, entry in self.part(index).entries if journal.sender == node)
 
-    def state(self, sender: str, number: int, t: float, epoch: int | None = None, reach: float = 0.0) -> State | None:
-        """Return a state of about run time t (s), give or take `reach` (s); None if the record does not have it.
+    def state(self, sender: str, number: int, t: float, epoch: int | None = None) -> State | None:
+        """Return a state of about run time t (s); None if the record does not have it.
 
         Of several that restarted processes numbered alike, it is the one of this epoch, or the nearest in time.
         """
-        parts = (self.part(i).states for i in self._about(t, reach))
-        return _nearest((each for part in parts for each in part.get((sender, number), ())), t, epoch)
+        return _nearest((self.part(i).states.get((sender, number), ()) for i in self._about(t)), t, epoch)
 
     def measurement(self, to: str, number: int, t: float, epoch: int | None = None) -> Measurement | None:
         """Return a measurement of about run time t (s), as `state` does."""
-        parts = (self.part(i).measurements for i in self._about(t, 0.0))
-        return _nearest((each for part in parts for each in part.get((to, number), ())), t, epoch)
+        return _nearest((self.part(i).measurements.get((to, number), ()) for i in self._about(t)), t, epoch)
 
     def named_by(self, entry: MessageReference, t: float) -> State | Measurement | None:
         """Return the message of about run time t (s) that an entry names by its number, as `state` does."""
         find = self.measurement if kind_of(entry.key) == "measurement" else self.state
         return find(name_of(entry.key), entry.seq, t, entry.epoch)
 
-    def _about(self, t: float, reach: float) -> range:
-        """Return the parts that may have a message of about run time t (s): a journal tells of the last second."""
-        further = max(reach, self._reach)
-        return self.near(t - 1.0 - further, t + further)
+    def _about(self, t: float) -> range:
+        """Return the parts that may have a message of about run time t (s): a journal is of the last second."""
+        return self.near(t - 1.0 - self._reach, t + self._reach)
 
     def messages(self, sender: str | None, since: float, until: float, kind: str | None) -> Iterator[MessageOnWire]:
         """Yield messages as they were sent; see `RunRecord.messages`."""
@@ -197,9 +194,9 @@ class MessageIndex:
         return part
 
 
-def _nearest(found: Iterable[M], t: float, epoch: int | None) -> M | None:
+def _nearest(found: Iterable[Sequence[M]], t: float, epoch: int | None) -> M | None:
     """Return the message of an epoch, or of any, that is nearest in time: numbers begin anew with a process."""
-    own = (message for message in found if epoch is None or message.epoch == epoch)
+    own = (message for part in found for message in part if epoch is None or message.epoch == epoch)
     return min(own, key=lambda message: abs(message.t - t), default=None)
 
 
