@@ -24,7 +24,7 @@ from gridpeers.cli.usage import (
 from gridpeers.output_folders import RUNS, refusal, shown
 
 if TYPE_CHECKING:
-    from gridpeers.papers.singhal2022.experiments import FromScenario, FromSweep
+    from gridpeers.papers.singhal2022.experiments import Experiment
     from gridpeers.papers.singhal2022.experiments.experiment_output import ExperimentResult
 
 
@@ -50,20 +50,17 @@ def experiment(
 
     Example:  gridpeers experiment delay
     """
-    from gridpeers.papers.singhal2022.experiments import EXPERIMENTS, FromSweep
+    from gridpeers.papers.singhal2022.experiments import EXPERIMENTS
 
     if name == "list":
         for known, source in EXPERIMENTS.items():
-            if isinstance(source, FromSweep):
-                title = gp.sweep_files.sweep_title(source.sweep)
-            else:
-                title = gp.load(source.scenario).title
+            title = gp.sweep_files.sweep_title(source.sweep) if source.sweep else gp.load(source.scenario).title
             typer.echo(f"{known:22} {title}")
         return
     check_choice("", "experiment", name, tuple(EXPERIMENTS))
     source, folder = EXPERIMENTS[name], RUNS / "experiments" / name if out is None else out
     again = ["experiment", name, *(["--out", str(out)] if out else [])]
-    if isinstance(source, FromSweep):
+    if source.sweep:
         result = _from_sweep(source, folder, jobs, dask, again)
     elif dask:
         fail([f"--dask: goes with the experiments that are sweeps; {name} is one run"], BAD_INPUT)
@@ -77,7 +74,9 @@ def experiment(
         typer.echo(shown(path))
 
 
-def _from_sweep(source: FromSweep, folder: Path, jobs: int | None, dask: str, again: Sequence[str]) -> ExperimentResult:
+def _from_sweep(
+    source: Experiment, folder: Path, jobs: int | None, dask: str, again: Sequence[str]
+) -> ExperimentResult:
     """Do the runs of the sweep that are not done yet, and draw."""
     import pandas as pd
 
@@ -92,7 +91,7 @@ def _from_sweep(source: FromSweep, folder: Path, jobs: int | None, dask: str, ag
     return source.make(SweepData(rows=pd.read_parquet(summary.table), base=plan.base, window=plan.base.events[0].label))
 
 
-def _from_scenario(source: FromScenario, folder: Path) -> ExperimentResult:
+def _from_scenario(source: Experiment, folder: Path) -> ExperimentResult:
     """Run every case of the scenario in this process, and draw."""
     from gridpeers.papers.singhal2022.experiments.experiment_data import CaseData
 

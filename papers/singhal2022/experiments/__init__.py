@@ -8,40 +8,40 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
-from gridpeers.papers.singhal2022.experiments.degraded_communication_experiment import degraded_communication
-from gridpeers.papers.singhal2022.experiments.experiment_data import CaseData, SweepData
 from gridpeers.papers.singhal2022.experiments.experiment_output import ExperimentResult
 from gridpeers.papers.singhal2022.experiments.hostile_experiment import hostile
-from gridpeers.papers.singhal2022.experiments.link_experiments import communication, delay, loss, places, topology
+from gridpeers.papers.singhal2022.experiments.link_experiments import (
+    communication,
+    degraded_communication,
+    delay,
+    loss,
+    places,
+    topology,
+)
 from gridpeers.papers.singhal2022.experiments.outage_experiments import flapping, partition
 
 
 @dataclass(frozen=True)
-class FromSweep:
-    """An experiment on the rows of a sweep of `scenarios/catalogue/sweeps/`."""
-
-    sweep: str
-    make: Callable[[SweepData], ExperimentResult]
-
-
-@dataclass(frozen=True)
-class FromScenario:
-    """An experiment on the histories of the cases of a scenario of `scenarios/catalogue/`."""
-
-    scenario: str
-    make: Callable[[CaseData], ExperimentResult]
+class Experiment:
+    make: Callable[[Any], ExperimentResult]
+    """Takes `SweepData` of a sweep, `CaseData` of a scenario."""
+    sweep: str = ""
+    """The sweep of `scenarios/catalogue/sweeps/` whose rows it draws."""
+    scenario: str = ""
+    """The scenario of `scenarios/catalogue/` whose histories it draws, where there is no sweep."""
 
 
-EXPERIMENTS: Mapping[str, FromSweep | FromScenario] = {
-    "delay": FromSweep("delay", delay),
-    "loss": FromSweep("loss", loss),
-    "places": FromSweep("places", places),
-    "topology": FromSweep("topology-delay", topology),
-    "flapping": FromScenario("flapping", flapping),
-    "partition": FromScenario("partition", partition),
-    "degraded-communication": FromSweep("degraded-communication", degraded_communication),
-    "communication": FromSweep("communication-delay", communication),
-    "hostile": FromSweep("hostile", hostile),
+EXPERIMENTS: Mapping[str, Experiment] = {
+    "delay": Experiment(delay, sweep="delay"),
+    "loss": Experiment(loss, sweep="loss"),
+    "places": Experiment(places, sweep="places"),
+    "topology": Experiment(topology, sweep="topology-delay"),
+    "flapping": Experiment(flapping, scenario="flapping"),
+    "partition": Experiment(partition, scenario="partition"),
+    "degraded-communication": Experiment(degraded_communication, sweep="degraded-communication"),
+    "communication": Experiment(communication, sweep="communication-delay"),
+    "hostile": Experiment(hostile, sweep="hostile"),
 }
 """In the order of docs/experiments.md."""

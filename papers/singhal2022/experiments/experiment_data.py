@@ -5,29 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from gridpeers import measures
+from gridpeers import measures, theory
 from gridpeers.measures import STEADY, Floats, History, Settling, Window, nameplates_of
-from gridpeers.theory import (
-    Feeder,
-    InverterGroup,
-    LoadStep,
-    ScenarioModel,
-    Times,
-    VarResponse,
-    feeder_of,
-    first_window,
-    inverter_group_of,
-    load_steps,
-    predicted_times,
-    var_response,
-    without_faults,
-)
+from gridpeers.theory import Feeder, InverterGroup, LoadStep, ScenarioModel, Times, VarResponse, inverter_group_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +52,7 @@ class CaseData:
     @cached_property
     def loads(self) -> dict[str, LoadStep]:
         """The step of load of each event, from the plant on droop alone."""
-        steps = load_steps(without_faults(self.scenario), self.feeder)
+        steps = theory.load_steps(theory.without_faults(self.scenario), self.feeder)
         return {step.label: step.load for step in steps if step.load is not None}
 
 
@@ -79,17 +64,14 @@ def without(inverters: InverterGroup, links: Iterable[tuple[str, str]]) -> Inver
     return replace(inverters, A=A)
 
 
-INDEXES = (("t_f_s", "Frequency within 0.01 Hz"), ("t_share_s", "Power shared, MPSI < 0.01"))
-"""The two times of an event that most experiments are about, and their titles."""
-
-TimePair = tuple[float, float]
-"""Times to restore the frequency and to share power (s); infinite for never."""
+INDEXES = {"t_f_s": ("f", "Frequency within 0.01 Hz"), "t_share_s": ("sharing", "Power shared, MPSI < 0.01")}
+"""The two times of an event that most experiments are about: index, word in a table, title of a panel."""
 
 
-def times_of(predicted: Times) -> TimePair:
-    """Return the times to restore and to share (s); infinite for never."""
-    restore, share = (np.inf if t is None else t for t in (predicted.restore_s, predicted.share_s))
-    return restore, share
+def times_of(predicted: Times) -> dict[str, float]:
+    """Return the times to restore and to share (s) by their index; infinite for never."""
+    times = zip(INDEXES, (predicted.restore_s, predicted.share_s), strict=True)
+    return {index: np.inf if t is None else t for index, t in times}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,9 +98,9 @@ class SweepData:
             keep &= (self.rows[name] == value).to_numpy()
         return self.rows[keep]
 
-    def values(self, column: str, equal: Mapping[str, Any] = MappingProxyType({})) -> list[Any]:
+    def values(self, column: str, equal: Mapping[str, Any] | None = None) -> list[Any]:
         """Return the different values of a column, sorted."""
-        return sorted(self.where(equal)[column].unique().tolist())
+        return sorted(self.where(equal or {})[column].unique().tolist())
 
     def measured(self, index: str, rows: pd.DataFrame) -> Floats:
         """Return an index of some rows: infinite for a time that never came, not a number where a run broke."""
@@ -148,30 +130,44 @@ class SweepData:
 
     @cached_property
     def feeder(self) -> Feeder:
-        return feeder_of(self.base)
+        return theory.feeder_of(self.base)
 
     @cached_property
     def calm(self) -> ScenarioModel:
         """The scenario with links that do nothing, its first event alone, and an end before long."""
-        return first_window(self.base, 3.0)
+        return theory.first_window(self.base, 3.0)
 
     @cached_property
     def load(self) -> LoadStep:
         """The step of load of the event, from the plant on droop alone."""
-        (step,) = (step for step in load_steps(self.calm, self.feeder) if step.label == self.window)
+        (step,) = (step for step in theory.load_steps(self.calm, self.feeder) if step.label == self.window)
         assert step.load is not None
         return step.load
 
     @cached_property
     def response(self) -> VarResponse:
         """How voltages and vars respond to V_set."""
-        return var_response(self.calm, self.feeder)
+        return theory.var_response(self.calm, self.feeder)
 
     @cached_property
     def inverters(self) -> Mapping[str, InverterGroup]:
         """The inverters under the rule of each case."""
         return {case: inverter_group_of(self.base, self.feeder, case) for case in self.base.cases}
 
-    def predicted(self, case: str, *, link_delay_s: float = 0.0, loss: float = 0.0) -> TimePair:
-        """Return the times of a case over late or lossy links, by theory."""
-        return times_of(predicted_times(self.inverters[case], link_delay_s=link_delay_s, loss=loss, load=self.load))
+    @cached_property
+    def _predicted(self) -> dict[tuple[str, float, float], dict[str, float]]:
+        return {}
+
+    def predicted(self, case: str, *, link_delay_s: float = 0.0, loss: float = 0.0) -> dict[str, float]:
+        """Return the times of a case over late or lossy links, by theory, as `times_of`."""
+        key = case, link_delay_s, loss
+        if key not in self._predicted:
+            times = theory.predicted_times(self.inverters[case], link_delay_s=link_delay_s, loss=loss, load=self.load)
+            self._predicted[key] = times_of(times)
+        return self._predicted[key]
+
+    def theory(self, index: str, case: str, **over: Iterable[float]) -> tuple[Floats, Floats]:
+        """Return a predicted time over delays or losses, `link_delay_s=[...]` or `loss=[...]`, and these."""
+        ((what, values),) = over.items()
+        found = [(x, self.predicted(case, **{what: x})[index]) for x in values]
+        return np.array(found).T[0], np.array(found).T[1]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -81,69 +81,66 @@ class Page:
     """Height of a row of panels (inch)."""
 
 
-def time_panels(curves: Callable[[int, str], Sequence[Curve]], suffix: str = "", **axes: Any) -> list[Panel]:
-    """Return a panel for each of the two times after islanding; `curves` takes the number of the time and its name."""
+def time_panels(
+    cases: Sequence[Any], curves: Callable[[str, int, Any], Iterable[Curve]], suffix: str = "", **axes: Any
+) -> list[Panel]:
+    """Return a panel for each of the two times after islanding, with `curves(index, style, case)` of each case."""
     return [
-        Panel(title=f"{title}{suffix}", y_label="time after islanding (s)", curves=curves(number, index), **axes)
-        for number, (index, title) in enumerate(INDEXES)
+        Panel(
+            title=f"{title}{suffix}",
+            y_label="time after islanding (s)",
+            curves=[curve for style, case in enumerate(cases) for curve in curves(index, style, case)],
+            **axes,
+        )
+        for index, (_, title) in INDEXES.items()
     ]
 
 
-TableCell = str | float | None
-"""A text, a number, or None for a time that never came."""
+@dataclass(frozen=True)
+class ExperimentResult:
+    """A page, and the rows of its table by columns that end in their unit."""
 
-
-@dataclass(frozen=True, kw_only=True)
-class ExperimentTable:
-    """Rows under column names that end in their unit."""
-
-    columns: Sequence[str]
-    rows: Sequence[Sequence[TableCell]]
+    page: Page
+    rows: Sequence[Mapping[str, Any]]
+    """Of texts and numbers; infinite or None for a time that never came."""
     digits: int = 3
     """Significant digits in Markdown; CSV has all."""
     apart: int = 0
     """So many first columns split the table in Markdown: one table for each of their values."""
 
+    def write(self, folder: Path) -> tuple[Path, ...]:
+        """Write figure.png, table.csv and table.md into a folder; return the files."""
+        files = folder / "table.csv", folder / "table.md"
+        write_whole(files[0], self.as_csv())
+        write_whole(files[1], self.markdown())
+        return *gp.figures.save(draw(self.page), folder, "figure", dpi=DPI), *files
+
     def as_csv(self) -> str:
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(self.columns)
-        writer.writerows([["never" if _is_never(cell) else cell for cell in row] for row in self.rows])
+        writer.writerow(self.rows[0])
+        writer.writerows([["never" if _is_never(cell) else cell for cell in row.values()] for row in self.rows])
         return text.getvalue()
 
     def markdown(self) -> str:
+        columns = list(self.rows[0])[self.apart :]
+        head = [f"| {' | '.join(columns)} |", "|" + "---|" * len(columns)]
         parts: dict[tuple[str, ...], list[str]] = {}
         for row in self.rows:
-            texts = [self._text(cell) for cell in row]
-            parts.setdefault(tuple(texts[: self.apart]), []).append(f"| {' | '.join(texts[self.apart :])} |")
-        columns = self.columns[self.apart :]
-        head = [f"| {' | '.join(columns)} |", "|" + "---|" * len(columns)]
-        return "\n".join(
-            "\n".join([*([f"**{', '.join(name)}**", ""] if name else []), *head, *rows]) + "\n"
-            for name, rows in parts.items()
-        )
+            texts = [self._text(cell) for cell in row.values()]
+            name = tuple(texts[: self.apart])
+            parts.setdefault(name, [f"**{', '.join(name)}**", "", *head] if name else [*head])
+            parts[name].append(f"| {' | '.join(texts[self.apart :])} |")
+        return "\n".join("\n".join(part) + "\n" for part in parts.values())
 
-    def _text(self, cell: TableCell) -> str:
+    def _text(self, cell: Any) -> str:
         if _is_never(cell):
             return "never"
         return cell if isinstance(cell, str) else f"{cell:.{self.digits}g}"
 
 
-def _is_never(cell: TableCell) -> bool:
+def _is_never(cell: Any) -> bool:
     return cell is None or (isinstance(cell, float) and math.isinf(cell))
-
-
-@dataclass(frozen=True, kw_only=True)
-class ExperimentResult:
-    page: Page
-    table: ExperimentTable
-
-    def write(self, folder: Path) -> tuple[Path, ...]:
-        """Write figure.png, table.csv and table.md into a folder; return the files."""
-        files = folder / "table.csv", folder / "table.md"
-        write_whole(files[0], self.table.as_csv())
-        write_whole(files[1], self.table.markdown())
-        return *gp.figures.save(draw(self.page), folder, "figure", dpi=DPI), *files
 
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7a7a7a", "#000000")

@@ -5,19 +5,13 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import numpy as np
 
 from gridpeers.papers.singhal2022.experiments.experiment_data import SweepData
-from gridpeers.papers.singhal2022.experiments.experiment_output import (
-    Curve,
-    ExperimentResult,
-    ExperimentTable,
-    Page,
-    Panel,
-    TableCell,
-)
+from gridpeers.papers.singhal2022.experiments.experiment_output import Curve, ExperimentResult, Page, Panel
 
 EVENT = "event2"
 """The event at which the lies begin."""
@@ -34,14 +28,8 @@ MEASURES: tuple[tuple[str, str, float, tuple[float, float], float], ...] = (
 
 LIMITS = {index: limit for index, _, limit, _, _ in MEASURES}
 
-LETTERS = {"MPSI": "P", "MQSI": "Q", "S_max_pu": "S"}
-"""Signs of measures that are out of their limits, beside the frequency."""
-
 RUN = ("case", "node", "link", "law")
 """Columns that name a run."""
-
-SIZES = (("P_set_W", 1e-3, " kW"), ("P_set", 1.0, ""), ("delay_s", 1.0, " s"))
-"""Keys of a lie that are its size: key, factor, and unit in words."""
 
 
 def hostile(sweep: SweepData) -> ExperimentResult:
@@ -78,8 +66,7 @@ def hostile(sweep: SweepData) -> ExperimentResult:
             x_names=list(attacks) if index == MEASURES[-1][0] else [""] * len(attacks),
             y_range=ends,
         )
-        for index, label, limit, ends, least in MEASURES
-        for case in GRAPHS
+        for (index, label, limit, ends, least), case in product(MEASURES, GRAPHS)
     ]
     page = Page(
         title="Agents that lie from 4 s on, as a third of the load is lost; lines: limits of the checks",
@@ -90,14 +77,12 @@ def hostile(sweep: SweepData) -> ExperimentResult:
         share_y=True,
         height=3.0,
     )
-    table: list[tuple[TableCell, ...]] = [
-        (case, what, attack, *(cell(measured(case, attack, defence)) for defence in defences))
-        for case in GRAPHS
-        for what, cell in CELLS.items()
-        for attack in attacks
+    rows = [
+        {"graph": case, "numbers": what, "attack": attack}
+        | {defence: cell(measured(case, attack, defence)) for defence in defences}
+        for case, (what, cell), attack in product(GRAPHS, CELLS.items(), attacks)
     ]
-    heads = ("graph", "numbers", "attack", *defences)
-    return ExperimentResult(page=page, table=ExperimentTable(columns=heads, rows=table, apart=2))
+    return ExperimentResult(page, rows, apart=2)
 
 
 def frequency_cell(found: Mapping[str, float]) -> str:
@@ -108,29 +93,20 @@ def frequency_cell(found: Mapping[str, float]) -> str:
     >>> frequency_cell({"f_off_Hz": 0.004, "MPSI": 0.0, "MQSI": 0.3, "S_max_pu": 1.3})
     '0.004 Q S'
     """
-    out = [letter for index, letter in LETTERS.items() if found[index] > LIMITS[index]]
+    letters = {"MPSI": "P", "MQSI": "Q", "S_max_pu": "S"}
+    out = [letter for index, letter in letters.items() if found[index] > LIMITS[index]]
     return " ".join([_bold_if_out(found, "f_off_Hz", ".3f"), *out])
 
 
-def sharing_cell(found: Mapping[str, float]) -> str:
-    """Return MPSI and MQSI, bold out of their limits."""
-    return f"{_bold_if_out(found, 'MPSI', '.2f')} / {_bold_if_out(found, 'MQSI', '.2f')}"
-
-
-def rating_cell(found: Mapping[str, float]) -> str:
-    """Return the largest apparent power, bold out of its limit, and the range of voltages (pu)."""
-    return f"{_bold_if_out(found, 'S_max_pu', '.2f')} / {found['V_min_pu']:.2f}..{found['V_max_pu']:.2f}"
-
-
-def _bold_if_out(found: Mapping[str, float], index: str, form: str) -> str:
+def _bold_if_out(found: Mapping[str, float], index: str, form: str = ".2f") -> str:
     text = f"{found[index]:{form}}"
     return f"**{text}**" if found[index] > LIMITS[index] else text
 
 
 CELLS: Mapping[str, Callable[[Mapping[str, float]], str]] = {
     "frequency error (Hz)": frequency_cell,
-    "MPSI / MQSI": sharing_cell,
-    "S / V (pu)": rating_cell,
+    "MPSI / MQSI": lambda found: f"{_bold_if_out(found, 'MPSI')} / {_bold_if_out(found, 'MQSI')}",
+    "S / V (pu)": lambda found: f"{_bold_if_out(found, 'S_max_pu')} / {found['V_min_pu']:.2f}..{found['V_max_pu']:.2f}",
 }
 """The tables of a graph: their numbers, and a cell of them from what was measured."""
 
@@ -151,6 +127,10 @@ def attack_words(node: str, link: str) -> str:
         lost = links[0].get("loss")
         return "old bytes, all twice" if lost is None else f"flood, {100.0 * lost:g} % lost"
     return ", ".join(_lie_words(liars)) if liars else "nobody lies"
+
+
+SIZES = (("P_set_W", 1e-3, " kW"), ("P_set", 1.0, ""), ("delay_s", 1.0, " s"))
+"""Keys of a lie that are its size: key, factor, and unit in words."""
 
 
 def _lie_words(liars: list[dict[str, Any]]) -> Iterator[str]:

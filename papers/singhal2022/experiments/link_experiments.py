@@ -1,4 +1,4 @@
-"""Late and lossy links: times to restore f and to share power against delay, loss and the number of links; swings.
+"""Late and lossy links: times to restore f and to share power against delay, loss, number of links and options; swings.
 
 With hold, a state is used until the next one comes. If each is lost with probability p, the mean age is T_c/(1 - p):
 the one period that every state takes, and T_c p/(1 - p) more.
@@ -6,24 +6,19 @@ the one period that every state takes, and T_c p/(1 - p) more.
 
 from __future__ import annotations
 
+import json
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import product
 from typing import Any
 
 import numpy as np
 
+from gridpeers import theory
 from gridpeers.measures import Flags, Floats
 from gridpeers.papers.singhal2022.experiments.experiment_data import INDEXES, SweepData, times_of
-from gridpeers.papers.singhal2022.experiments.experiment_output import (
-    Curve,
-    ExperimentResult,
-    ExperimentTable,
-    Page,
-    Panel,
-    TableCell,
-    time_panels,
-)
-from gridpeers.theory import InverterGroup, delay_limit, predicted_times, var_delay_limit, var_growth
+from gridpeers.papers.singhal2022.experiments.experiment_output import Curve, ExperimentResult, Page, Panel, time_panels
+from gridpeers.theory import InverterGroup, var_growth
 
 DELAY, LOSS, K_Q, ON = "link[0].delay", "link[0].loss", "gains.k_q", "link[0].on"
 WHOLE, ALONE = 0.25, 1e5
@@ -35,66 +30,57 @@ X = "delay of every agent-agent link (s)"
 def delay(sweep: SweepData) -> ExperimentResult:
     """Return the times against delay, measured and predicted."""
     cases, delays = list(sweep.base.cases)[:4], sweep.values(DELAY)
-    fine = np.unique(np.concatenate([delays, np.round(np.geomspace(0.02, 1.0, 12), 2)]))
-    theory = {(case, d): sweep.predicted(case, link_delay_s=d) for case in cases for d in fine.tolist()}
+    fine = np.unique(np.concatenate([delays, np.round(np.geomspace(0.02, 1.0, 12), 2)])).tolist()
 
-    def curves(number: int, index: str) -> list[Curve]:
-        found = []
-        for style, case in enumerate(cases):
-            predicted = np.array([theory[case, d][number] for d in fine.tolist()])
-            found += [
-                Curve(*sweep.curve(DELAY, index, {"case": case, K_Q: WHOLE}), style),
-                Curve(*sweep.curve(DELAY, index, {"case": case, K_Q: ALONE}), style, "hollow"),
-                Curve(fine, predicted, style, "predicted"),
-            ]
-        return found
+    def curves(index: str, style: int, case: str) -> Iterator[Curve]:
+        yield Curve(*sweep.curve(DELAY, index, {"case": case, K_Q: WHOLE}), style)
+        yield Curve(*sweep.curve(DELAY, index, {"case": case, K_Q: ALONE}), style, "hollow")
+        yield Curve(*sweep.theory(index, case, link_delay_s=fine), style, "predicted")
 
     page = Page(
         title="Islanding over late links",
-        panels=time_panels(curves, x_label=X, log="xy", zero=0.02, x_ticks=delays, y_range=(0.3, 40.0)),
+        panels=time_panels(cases, curves, x_label=X, log="xy", zero=0.02, x_ticks=delays, y_range=(0.3, 40.0)),
         columns=2,
         names=sweep.names(cases),
         looks={"measured": "measured", "hollow": "measured, V_set left alone", "predicted": "predicted"},
         share_y=True,
     )
-    rows: list[list[TableCell]] = []
+    rows = []
     for case, d in product(cases, delays):
-        row: list[TableCell] = [case, d]
-        for number, (index, _) in enumerate(INDEXES):
-            measured = [sweep.median(index, {"case": case, DELAY: d, K_Q: k}) for k in (ALONE, WHOLE)]
-            row += [theory[case, d][number], *measured]
-        rows.append(row)
-    columns = ["graph", "delay (s)", *_of_times("predicted", "V_set left alone", "whole law")]
-    return ExperimentResult(page=page, table=ExperimentTable(columns=columns, rows=rows))
+        rows.append(row := {"graph": case, "delay (s)": d})
+        for index, (what, _) in INDEXES.items():
+            row[f"{what}, predicted (s)"] = sweep.predicted(case, link_delay_s=d)[index]
+            row[f"{what}, V_set left alone (s)"] = sweep.median(index, {"case": case, DELAY: d, K_Q: ALONE})
+            row[f"{what}, whole law (s)"] = sweep.median(index, {"case": case, DELAY: d, K_Q: WHOLE})
+    return ExperimentResult(page, rows)
 
 
-def _of_times(*kinds: str) -> list[str]:
-    """Return columns for kinds of each of the two times."""
-    return [f"{what}, {kind} (s)" for what in ("f", "sharing") for kind in kinds]
-
-
-LEFT: tuple[tuple[str, dict[str, Any]], ...] = (
-    ("V_error", {"y_label": "mean of abs(V - 1) (pu)", "y_range": (0.0, 0.012)}),
-    ("MQSI", {"y_label": "var sharing index, MQSI", "log": "y", "y_range": (0.003, 1.0)}),
-)
+LEFT: Mapping[str, Mapping[str, Any]] = {
+    "V_error": {"y_label": "mean of abs(V - 1) (pu)", "y_range": (0.0, 0.012)},
+    "MQSI": {"y_label": "var sharing index, MQSI", "log": "y", "y_range": (0.003, 1.0)},
+}
 """Steady values with their axes."""
+
+AT_THE_END = {
+    "f_error_Hz": "abs(f - 60) (Hz)",
+    "MPSI": "MPSI",
+    "V_error": "V_error (pu)",
+    "MQSI": "MQSI",
+    "V_swing_pu": "swing of V (pu)",
+}
+"""Columns of the table of `communication`."""
 
 
 def communication(sweep: SweepData) -> ExperimentResult:
     """Return the times and steady values against delay, for every case of the scenario."""
     cases, delays = sweep.rows["case"].unique().tolist(), sweep.values(DELAY)
-    theory = {(case, d): sweep.predicted(case, link_delay_s=d) for case in cases for d in delays}
 
-    def curves(number: int, index: str) -> list[Curve]:
-        found = []
-        for style, case in enumerate(cases):
-            x, y = sweep.curve(DELAY, index, {"case": case})
-            predicted = np.array([theory[case, d][number] for d in delays])
-            found += [Curve(x, y, style), Curve(x, predicted, style, "predicted")]
-        return found
+    def curves(index: str, style: int, case: str) -> Iterator[Curve]:
+        yield Curve(*sweep.curve(DELAY, index, {"case": case}), style)
+        yield Curve(*sweep.theory(index, case, link_delay_s=delays), style, "predicted")
 
-    panels = time_panels(curves, x_label=X, log="y", y_range=(0.3, 25.0))
-    for index, axes in LEFT:
+    panels = time_panels(cases, curves, x_label=X, log="y", y_range=(0.3, 25.0))
+    for index, axes in LEFT.items():
         lines = [Curve(*sweep.curve(DELAY, index, {"case": case}), style) for style, case in enumerate(cases)]
         panels.append(Panel(title=f"{index} at the end of the run", x_label=X, curves=lines, **axes))
     page = Page(
@@ -104,128 +90,97 @@ def communication(sweep: SweepData) -> ExperimentResult:
         names={style: f"{case}: {sweep.base.cases[case].title}" for style, case in enumerate(cases)},
         height=2.6,
     )
-    rows: list[list[TableCell]] = []
+    rows = []
     for case, d in product(cases, delays):
-        row: list[TableCell] = [case, d]
-        for number, (index, _) in enumerate(INDEXES):
-            row += [theory[case, d][number], sweep.median(index, {"case": case, DELAY: d})]
-        for name in ("f_error_Hz", "MPSI", "V_error", "MQSI", "V_swing_pu"):
-            row.append(round(sweep.median(name, {"case": case, DELAY: d}), 4))
-        rows.append([*row, round(var_growth(sweep.inverters[case], sweep.response, link_delay_s=d), 2)])
-    columns = (
-        *("case", "delay (s)", "f, predicted (s)", "f (s)", "sharing, predicted (s)", "sharing (s)"),
-        *("abs(f - 60) (Hz)", "MPSI", "V_error (pu)", "MQSI", "swing of V (pu)", "growth of vars, predicted (1/s)"),
-    )
-    return ExperimentResult(page=page, table=ExperimentTable(columns=columns, rows=rows, digits=2))
+        rows.append(row := {"case": case, "delay (s)": d})
+        for index, (what, _) in INDEXES.items():
+            row[f"{what}, predicted (s)"] = sweep.predicted(case, link_delay_s=d)[index]
+            row[f"{what} (s)"] = sweep.median(index, {"case": case, DELAY: d})
+        row |= {name: round(sweep.median(of, {"case": case, DELAY: d}), 4) for of, name in AT_THE_END.items()}
+        growth = var_growth(sweep.inverters[case], sweep.response, link_delay_s=d)
+        row["growth of vars, predicted (1/s)"] = round(growth, 2)
+    return ExperimentResult(page, rows, digits=2)
 
 
 def loss(sweep: SweepData) -> ExperimentResult:
     """Return the times against loss, and against mean age, measured and predicted."""
     cases, T_c = list(sweep.base.cases)[:4], sweep.base.time.T_c_s
-    lost, late = sweep.values(LOSS, {DELAY: 0.0}), sweep.values(DELAY, {LOSS: 0.0})[1:]
-    age_of_loss, ages = np.array([T_c / (1.0 - p) for p in lost]), np.array([T_c, *late])
-    fine = np.linspace(0.0, 0.96, 25)
-    by_loss = {case: np.array([sweep.predicted(case, loss=p) for p in fine.tolist()]) for case in cases}
-    by_age = {case: np.array([sweep.predicted(case, link_delay_s=d) for d in ages.tolist()]) for case in cases}
+    lost, late = sweep.values(LOSS, {DELAY: 0.0}), sweep.values(DELAY, {LOSS: 0.0})
+    age_of_loss = [T_c / (1.0 - p) for p in lost]
 
-    def against_loss(number: int, index: str) -> list[Curve]:
-        found = []
-        for style, case in enumerate(cases):
-            of = {"case": case, DELAY: 0.0}
-            found += [
-                Curve(*sweep.curve(LOSS, index, of), style, "measured", *sweep.range(LOSS, index, of)),
-                Curve(fine, by_loss[case][:, number], style, "predicted"),
-            ]
-        return found
+    def against_loss(index: str, style: int, case: str) -> Iterator[Curve]:
+        of = {"case": case, DELAY: 0.0}
+        yield Curve(*sweep.curve(LOSS, index, of), style, "measured", *sweep.range(LOSS, index, of))
+        yield Curve(*sweep.theory(index, case, loss=np.linspace(0.0, 0.96, 25).tolist()), style, "predicted")
 
-    def against_age(number: int, index: str) -> list[Curve]:
-        found = []
-        for style, case in enumerate(cases):
-            x, y = sweep.curve(DELAY, index, {"case": case, LOSS: 0.0})
-            found += [
-                Curve(age_of_loss, sweep.curve(LOSS, index, {"case": case, DELAY: 0.0})[1], style, "points"),
-                Curve(np.maximum(x, T_c), y, style, "hollow"),
-                Curve(ages, by_age[case][:, number], style, "predicted"),
-            ]
-        return found
+    def against_age(index: str, style: int, case: str) -> Iterator[Curve]:
+        _, y = sweep.curve(LOSS, index, {"case": case, DELAY: 0.0})
+        yield Curve(np.array(age_of_loss), y, style, "points")
+        x, y = sweep.curve(DELAY, index, {"case": case, LOSS: 0.0})
+        yield Curve(np.maximum(x, T_c), y, style, "hollow")
+        yield Curve(*sweep.theory(index, case, link_delay_s=[T_c, *late[1:]]), style, "predicted")
 
-    panels = time_panels(against_loss, x_label="probability p that a message is lost", log="y", y_range=(0.3, 25.0))
-    panels += time_panels(
-        against_age,
-        ", against mean age",
-        x_label="mean age of what is used: delay, or T_c/(1 - p) (s)",
-        log="xy",
-        x_ticks=[0.02, 0.04, 0.1, 0.2, 0.4],
-        y_range=(0.3, 25.0),
-    )
+    range_s = (0.3, 25.0)
+    by_loss: dict[str, Any] = {"x_label": "probability p that a message is lost", "log": "y", "y_range": range_s}
+    by_age: dict[str, Any] = {"x_label": "mean age of what is used: delay, or T_c/(1 - p) (s)", "y_range": range_s}
+    by_age |= {"log": "xy", "x_ticks": [0.02, 0.04, 0.1, 0.2, 0.4], "suffix": ", against mean age"}
     page = Page(
         title="Islanding over lossy links, the last state held",
-        panels=panels,
+        panels=[*time_panels(cases, against_loss, **by_loss), *time_panels(cases, against_age, **by_age)],
         columns=2,
         names=sweep.names(cases),
         looks={"measured": "loss: median and range of 3 seeds", "hollow": "delay", "predicted": "predicted"},
     )
-    rows: list[list[TableCell]] = []
-    for case, (p, age) in product(cases, zip(lost, age_of_loss.tolist(), strict=True)):
-        row: list[TableCell] = [case, p, age]
-        same_age = next((d for d in sweep.values(DELAY) if abs(d - age) < 1e-9), 0.0 if p == 0.0 else None)
-        predicted = sweep.predicted(case, loss=p)
-        for number, (index, _) in enumerate(INDEXES):
-            late_cell = "" if same_age is None else sweep.median(index, {"case": case, DELAY: same_age, LOSS: 0.0})
-            row += [predicted[number], sweep.median(index, {"case": case, DELAY: 0.0, LOSS: p}), late_cell]
-        rows.append(row)
-    columns = ["graph", "loss", "mean age (s)", *_of_times("predicted", "measured", "delay of that age")]
-    return ExperimentResult(page=page, table=ExperimentTable(columns=columns, rows=rows))
+    rows = []
+    for case, (p, age) in product(cases, zip(lost, age_of_loss, strict=True)):
+        rows.append(row := {"graph": case, "loss": p, "mean age (s)": age})
+        same = next((d for d in sweep.values(DELAY) if abs(d - age) < 1e-9), 0.0 if p == 0.0 else None)
+        for index, (what, _) in INDEXES.items():
+            row[f"{what}, predicted (s)"] = sweep.predicted(case, loss=p)[index]
+            row[f"{what}, measured (s)"] = sweep.median(index, {"case": case, DELAY: 0.0, LOSS: p})
+            of_delay = "" if same is None else sweep.median(index, {"case": case, DELAY: same, LOSS: 0.0})
+            row[f"{what}, delay of that age (s)"] = of_delay
+    return ExperimentResult(page, rows)
 
 
 GRAPH_LINKS = "graph.links"
-PREDICTED = ("predicted f", "predicted sharing")
-"""Columns of the predicted times (s)."""
 
 
 def topology(sweep: SweepData) -> ExperimentResult:
     """Return the times against the number of links, with and without delay, measured and predicted."""
-    theory = [
-        times_of(predicted_times(on_graph(sweep, edges), link_delay_s=d, load=sweep.load))
+    predicted = [
+        times_of(theory.predicted_times(on_graph(sweep, edges), link_delay_s=d, load=sweep.load))
         for edges, d in zip(sweep.rows["graph.edges"], sweep.rows[DELAY], strict=True)
     ]
-    runs = sweep.rows.assign(**dict(zip(PREDICTED, np.array(theory).T, strict=True)))
-    delays = sweep.values(DELAY)
+    runs = sweep.rows.assign(**{index: [times[index] for times in predicted] for index in INDEXES})
 
-    def curves(number: int, index: str) -> list[Curve]:
-        found = []
-        for style, d in enumerate(delays):
-            x, y = sweep.curve(GRAPH_LINKS, index, {DELAY: d})
-            low, high = sweep.range(GRAPH_LINKS, index, {DELAY: d})
-            rows = runs[runs[DELAY] == d]
-            at = (rows[GRAPH_LINKS] + 0.25 * (-1.0) ** rows["graph.number"]).to_numpy(float)
-            medians = rows.groupby(GRAPH_LINKS)[PREDICTED[number]].median().to_numpy()
-            found += [
-                Curve(x, y, style, low=low, high=np.minimum(high, 1e3)),
-                Curve(at, sweep.measured(index, rows), style, "points"),
-                Curve(x, medians, style, "predicted"),
-            ]
-        return found
+    def curves(index: str, style: int, d: float) -> Iterator[Curve]:
+        x, y = sweep.curve(GRAPH_LINKS, index, {DELAY: d})
+        low, high = sweep.range(GRAPH_LINKS, index, {DELAY: d})
+        rows = runs[runs[DELAY] == d]
+        at = (rows[GRAPH_LINKS] + 0.25 * (-1.0) ** rows["graph.number"]).to_numpy(float)
+        yield Curve(x, y, style, low=low, high=np.minimum(high, 1e3))
+        yield Curve(at, sweep.measured(index, rows), style, "points")
+        yield Curve(x, rows.groupby(GRAPH_LINKS)[index].median().to_numpy(), style, "predicted")
 
-    links = "links of the communication graph"
+    delays, links = sweep.values(DELAY), "links of the communication graph"
     page = Page(
         title="Random connected graphs",
-        panels=time_panels(curves, x_label=links, log="y", x_ticks=range(8, 37, 4), y_range=(0.3, 15.0)),
+        panels=time_panels(delays, curves, x_label=links, log="y", x_ticks=range(8, 37, 4), y_range=(0.3, 15.0)),
         columns=2,
         names={style: f"links late by {d:g} s" if d else "links at once" for style, d in enumerate(delays)},
         looks={"measured": "median and range", "points": "a graph", "predicted": "predicted, median"},
         share_y=True,
     )
-    table: list[list[TableCell]] = []
+    table = []
     for (d, count), rows in runs.groupby([DELAY, GRAPH_LINKS]):
-        row: list[TableCell] = [d, count, len(rows)]
-        for number, (index, _) in enumerate(INDEXES):
+        table.append(row := {"delay (s)": d, "links": count, "graphs": len(rows)})
+        for index, (what, _) in INDEXES.items():
             times = sweep.measured(index, rows)
-            predicted = rows[PREDICTED[number]].median()
-            row += [float(x) for x in (predicted, np.median(times), times.min(), times.max())]
-        table.append(row)
-    columns = ["delay (s)", "links", "graphs", *_of_times("predicted", "median", "lowest", "highest")]
-    return ExperimentResult(page=page, table=ExperimentTable(columns=columns, rows=table))
+            row[f"{what}, predicted (s)"] = rows[index].median()
+            row[f"{what}, median (s)"] = np.median(times)
+            row |= {f"{what}, lowest (s)": times.min(), f"{what}, highest (s)": times.max()}
+    return ExperimentResult(page, table)
 
 
 def on_graph(sweep: SweepData, edges: str) -> InverterGroup:
@@ -259,30 +214,29 @@ def places(sweep: SweepData) -> ExperimentResult:
     The links carry frequency and voltage together. Mostly the voltage swings first; to see the frequency by itself,
     the sweep has runs that leave V_set alone.
     """
-    limits = _limits(sweep)
     panels, rows = [], []
     for (index, least, title, y_label, k_q), (on, place) in product(SWINGS, PLACES):
-        curves, lines = [], []
+        panel = Panel(
+            title=f"{title}: late {place}",
+            x_label=f"delay of {place} (s)",
+            y_label=y_label,
+            curves=(curves := []),
+            lines=(lines := []),
+            level=least,
+            log="y",
+            x_range=(-0.01, 0.62),
+            y_range=(LEAST, 1.0),
+        )
+        panels.append(panel)
         for style, case in enumerate(GRAPHS):
             x, y = sweep.curve(DELAY, index, {"case": case, ON: on, K_Q: k_q})
             curves.append(Curve(x, np.maximum(y, LEAST), style))
-            limit = limits[index, on != LINKS, case]
+            limit = _limit(sweep, case, index, of_plant=on != LINKS)
             if np.isfinite(limit) and limit <= x[-1]:
                 lines.append((limit, style))
-            rows.append((title, place, case, limit, *_between(x, y < least)))
-        panels.append(
-            Panel(
-                title=f"{title}: late {place}",
-                x_label=f"delay of {place} (s)",
-                y_label=y_label,
-                curves=curves,
-                lines=lines,
-                level=least,
-                log="y",
-                x_range=(-0.01, 0.62),
-                y_range=(LEAST, 1.0),
-            )
-        )
+            calm_s, swings_s = _between(x, y < least)
+            row = {"what swings": title, "late": place, "graph": case, "predicted limit (s)": limit}
+            rows.append(row | {"calm up to (s)": calm_s, "swings from (s)": swings_s})
     page = Page(
         title="Where a delay sits decides whether it destabilises",
         panels=panels,
@@ -291,27 +245,19 @@ def places(sweep: SweepData) -> ExperimentResult:
         looks={},
         height=2.9,
     )
-    columns = ("what swings", "late", "graph", "predicted limit (s)", "calm up to (s)", "swings from (s)")
-    return ExperimentResult(page=page, table=ExperimentTable(columns=columns, rows=rows))
+    return ExperimentResult(page, rows)
 
 
-def _limits(sweep: SweepData) -> dict[tuple[str, bool, str], float]:
-    """Return the predicted limits (s) by the quantity that swings, whether links of the plant are late, and graph."""
-    found = {}
-    for case in GRAPHS:
-        inverters = sweep.inverters[case]
-        found["f_swing_Hz", False, case] = delay_limit(inverters, "neighbours", longest_s=1.0)
-        found["f_swing_Hz", True, case] = delay_limit(inverters, "local loop", longest_s=1.0)
-        found["V_swing_pu", False, case] = _var_link_limit(sweep, case)
-        found["V_swing_pu", True, case] = var_delay_limit(inverters, sweep.response)
-    return found
-
-
-def _var_link_limit(sweep: SweepData, case: str) -> float:
-    """Return the longest delay (s) of the links up to which the var law decays; infinite: all of the sweep."""
+def _limit(sweep: SweepData, case: str, index: str, *, of_plant: bool) -> float:
+    """Return the predicted longest delay (s), of links of the plant or between agents, up to which a swing decays."""
+    inverters = sweep.inverters[case]
+    if index == "f_swing_Hz":
+        return theory.delay_limit(inverters, "local loop" if of_plant else "neighbours", longest_s=1.0)
+    if of_plant:
+        return theory.var_delay_limit(inverters, sweep.response)
     T_c = sweep.base.time.T_c_s
     for n in range(1, round(max(sweep.values(DELAY)) / T_c) + 1):
-        if var_growth(sweep.inverters[case], sweep.response, link_delay_s=n * T_c) > 0.0:
+        if var_growth(inverters, sweep.response, link_delay_s=n * T_c) > 0.0:
             return round((n - 1) * T_c, 9)
     return np.inf
 
@@ -320,3 +266,83 @@ def _between(x: Floats, calm: Flags) -> tuple[float, float]:
     """Return the last delay up to which all is calm, and the next one; infinite where nothing ever swings."""
     first = int(np.argmin(calm)) if not calm.all() else len(x)
     return float(x[first - 1]) if first else 0.0, float(x[first]) if first < len(x) else np.inf
+
+
+OPTIONS: Mapping[str, Mapping[str, Any]] = {
+    "hold (paper)": {},
+    "skip": {"stale": "skip"},
+    "age-weighted, 50 ms": {"stale": "age-weighted", "T_age_s": 0.05},
+    "age-weighted, 200 ms": {"stale": "age-weighted"},
+    "degree-normalised": {"weights": "degree-normalised"},
+    "degree-norm., kappa_c 24": {"weights": "degree-normalised", "kappa_c": 24.0},
+    "degree-norm. + age 200 ms": {"weights": "degree-normalised", "stale": "age-weighted"},
+    "no limits on P_set, V_set": {"anti_windup": "none"},
+    "conditional anti-windup": {"anti_windup": "conditional"},
+}
+"""Options of `[degraded_communication]` in the sweep, by name; keys that they leave out are as in the paper."""
+
+_PAPER = {"stale": "hold", "T_age_s": 0.2, "weights": "paper", "kappa_c": 12.0, "anti_windup": "clamp"}
+
+
+def degraded_communication(sweep: SweepData) -> ExperimentResult:
+    """Return the times of every option under every delay and loss."""
+    cases, conditions = GRAPHS[:3], sweep.rows["link"].unique().tolist()
+
+    def predicted(case: str, links: str) -> dict[str, float]:
+        late_s, lost = _condition(links)
+        return sweep.predicted(case, link_delay_s=late_s, loss=lost)
+
+    def measured(case: str, links: str, option: str, index: str) -> float:
+        options = {f"degraded_communication.{key}": value for key, value in (_PAPER | dict(OPTIONS[option])).items()}
+        (value,) = sweep.measured(index, sweep.where({"case": case, "link": links, **options}))
+        return float(value)
+
+    panels = []
+    for (index, (_, title)), links in product(INDEXES.items(), conditions):
+        curves = []
+        for style, case in enumerate(cases):
+            x = np.arange(float(len(OPTIONS))) + 0.18 * (style - 1)
+            y = np.array([measured(case, links, option, index) for option in OPTIONS])
+            curves += [Curve(x, y, style, "points")]
+            curves += [Curve(x[:1], np.array([predicted(case, links)[index]]), style, "hollow")]
+        panel = Panel(
+            title=condition_words(*_condition(links)),
+            x_label="",
+            y_label=f"{title.partition(',')[0]}, time (s)" if links == conditions[0] else "",
+            curves=curves,
+            log="y",
+            x_names=list(OPTIONS) if index == "t_share_s" else [""] * len(OPTIONS),
+            y_range=(0.2, 30.0),
+        )
+        panels.append(panel)
+    page = Page(
+        title="Islanding over late and lossy links, with every option of the agents",
+        panels=panels,
+        columns=len(conditions),
+        names=sweep.names(cases),
+        looks={"points": "measured", "hollow": "predicted (hold)"},
+        share_y=True,
+        height=2.6,
+    )
+    rows = []
+    for case, links in product(cases, conditions):
+        by_option = {"hold, predicted": predicted(case, links)}
+        by_option |= {name: {index: measured(case, links, name, index) for index in INDEXES} for name in OPTIONS}
+        of = {"graph": case, "links": condition_words(*_condition(links))}
+        for option, times in by_option.items():
+            rows.append({**of, "option": option, "f (s)": times["t_f_s"], "sharing (s)": times["t_share_s"]})
+    return ExperimentResult(page, rows)
+
+
+def condition_words(late: float, lost: float) -> str:
+    """Return a delay (s) and a loss of all agent-agent links in words.
+
+    >>> condition_words(0.1, 0.0), condition_words(0.0, 0.9), condition_words(0.0, 0.0)
+    ('late by 0.1 s', 'loss 90 %', 'good links')
+    """
+    return f"late by {late:g} s" if late else f"loss {100 * lost:g} %" if lost else "good links"
+
+
+def _condition(links: str) -> tuple[float, float]:
+    entries = json.loads(links)
+    return (entries[0].get("delay", 0.0), entries[0].get("loss", 0.0)) if entries else (0.0, 0.0)

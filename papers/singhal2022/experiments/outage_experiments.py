@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from gridpeers.measures import Floats
-from gridpeers.papers.singhal2022.experiments.experiment_data import CaseData, times_of, without
-from gridpeers.papers.singhal2022.experiments.experiment_output import (
-    Curve,
-    ExperimentResult,
-    ExperimentTable,
-    Page,
-    Panel,
-    TableCell,
-)
-from gridpeers.theory import Case, Loop, Ticks, Times, predicted_times, sharing_index
+from gridpeers.papers.singhal2022.experiments.experiment_data import INDEXES, CaseData, times_of, without
+from gridpeers.papers.singhal2022.experiments.experiment_output import Curve, ExperimentResult, Page, Panel
+from gridpeers.theory import Case, Loop, Ticks, predicted_times, sharing_index
 
 COLUMNS = (
     ("halves", ("halves", "halves-expire")),
@@ -33,70 +28,63 @@ LOST = 1.0 - 1e-12
 def partition(runs: CaseData) -> ExperimentResult:
     """Return f and MPSI over time, with their values at the end of the partition and the times to come back."""
     split = runs.scenario.cases["halves"].netem.partitions[0]
-    event, last = runs.scenario.events[-1], runs.scenario.time.end_s
+    event, last, f_nom = runs.scenario.events[-1], runs.scenario.time.end_s, runs.feeder.f_nom
     start, end = split.from_s, split.to_s or last
     split_cases = [case for case, rule in runs.scenario.cases.items() if rule.netem.partitions]
     theory = {case: predicted(runs, case, end - event.t_s) for case in split_cases}
     panels = []
-    for row, (title, measure, y_label, y_range) in enumerate(
-        (
-            ("f", runs.f, "f, mean of the GFM (Hz)", (59.97, 60.25)),
-            ("MPSI", runs.MPSI, "MPSI", (0.0, 0.25)),
-        )
-    ):
+    for row, (title, measure, y_label, y_range) in enumerate(_measures(runs, "f", "MPSI", (59.97, 60.25))):
         for name, cases in COLUMNS:
             curves = [Curve(runs.t("whole"), measure("whole"), WHOLE, "reference")]
             for style, case in zip((HELD, EXPIRED), cases, strict=False):
                 t, of = theory[case]
                 curves.append(Curve(runs.t(case), measure(case), style, "solid"))
                 curves.append(Curve(t + event.t_s, of[row], style, "predicted"))
-            panels.append(
-                Panel(
-                    title=f"{title}, {name}",
-                    x_label="time (s)",
-                    y_label=y_label,
-                    curves=curves,
-                    spans=[(start, end)],
-                    x_range=(2.0, last),
-                    y_range=y_range,
-                )
+            panel = Panel(
+                title=f"{title}, {name}",
+                x_label="time (s)",
+                y_label=y_label,
+                curves=curves,
+                spans=[(start, end)],
+                x_range=(2.0, last),
+                y_range=y_range,
             )
+            panels.append(panel)
+    held, expired = "in groups, last state held", "in groups, states expire after 0.25 s"
     page = Page(
         title="In groups from 2.5 to 7 s (grey); a third of the load is lost at 3 s",
         panels=panels,
         columns=3,
-        names={
-            WHOLE: "no partition",
-            HELD: "in groups, last state held",
-            EXPIRED: "in groups, states expire after 0.25 s",
-        },
+        names={WHOLE: "no partition", HELD: held, EXPIRED: expired},
         looks={"predicted": "predicted for the time in groups"},
         height=2.5,
     )
-    rows: list[list[TableCell]] = []
+    rows = []
     for case, rule in runs.scenario.cases.items():
-        f, after = runs.f(case), runs.settling(case, end, last)
-        f_off, MPSI = 1e3 * (f - runs.feeder.f_nom), runs.MPSI(case)
-        theory_f: TableCell = ""
-        theory_MPSI: TableCell = ""
+        after = runs.settling(case, end, last)
+        f_off, MPSI = 1e3 * (runs.f(case) - f_nom), runs.MPSI(case)
+        f_apart: float | str = ""
+        MPSI_apart: float | str = ""
         if case in theory:
             _, (of_f, of_MPSI) = theory[case]
-            theory_f, theory_MPSI = round(1e3 * (float(of_f[-1]) - runs.feeder.f_nom), 1), round(float(of_MPSI[-1]), 3)
-        apart = round(runs.mean(f_off, case, end), 1) + 0.0  # no -0
-        shared = round(runs.mean(MPSI, case, end), 3)
-        largest = round(float(np.abs(f_off[runs.t(case) > end]).max()), 1)
-        rows.append([rule.title, theory_f, apart, theory_MPSI, shared, after.t_f_s, after.t_share_s, largest])
-    columns = (
-        "case",
-        "f - 60 before it ends, predicted (mHz)",
-        "measured (mHz)",
-        "MPSI before it ends, predicted",
-        "measured",
-        "f back after (s)",
-        "sharing back after (s)",
-        "largest abs(f - 60) after (mHz)",
-    )
-    return ExperimentResult(page=page, table=ExperimentTable(columns=columns, rows=rows))
+            f_apart, MPSI_apart = round(1e3 * (float(of_f[-1]) - f_nom), 1), round(float(of_MPSI[-1]), 3)
+        cells = {
+            "case": rule.title,
+            "f - 60 before it ends, predicted (mHz)": f_apart,
+            "measured (mHz)": round(runs.mean(f_off, case, end), 1) + 0.0,  # no -0
+            "MPSI before it ends, predicted": MPSI_apart,
+            "measured": round(runs.mean(MPSI, case, end), 3),
+            "f back after (s)": after.t_f_s,
+            "sharing back after (s)": after.t_share_s,
+            "largest abs(f - 60) after (mHz)": round(float(np.abs(f_off[runs.t(case) > end]).max()), 1),
+        }
+        rows.append(cells)
+    return ExperimentResult(page, rows)
+
+
+def _measures(runs: CaseData, f: str, MPSI: str, f_range: tuple[float, float]) -> tuple[Any, ...]:
+    """Return title, measure of a case, label and range of the axis, for the two rows of a figure."""
+    return (f, runs.f, "f, mean of the GFM (Hz)", f_range), (MPSI, runs.MPSI, "MPSI", (0.0, 0.25))
 
 
 def predicted(runs: CaseData, case: str, length: float) -> tuple[Floats, tuple[Floats, Floats]]:
@@ -130,10 +118,7 @@ def flapping(runs: CaseData) -> ExperimentResult:
             x_range=(0.5, runs.scenario.time.end_s),
             y_range=y_range,
         )
-        for title, measure, y_label, y_range in (
-            ("Frequency", runs.f, "f, mean of the GFM (Hz)", (59.88, 60.15)),
-            ("Power sharing", runs.MPSI, "MPSI", (0.0, 0.25)),
-        )
+        for title, measure, y_label, y_range in _measures(runs, "Frequency", "Power sharing", (59.88, 60.15))
     ]
     page = Page(
         title="A flapping link; islanding at 1 s, loss of load at 6 s",
@@ -143,19 +128,15 @@ def flapping(runs: CaseData) -> ExperimentResult:
         height=2.4,
     )
     ends = [*(event.t_s for event in events[1:]), runs.scenario.time.end_s]
-    rows: list[list[TableCell]] = []
+    rows = []
     for case, rule in cases.items():
-        row: list[TableCell] = [rule.title, extra_age(rule)]
+        rows.append(row := {"case": rule.title, "mean age added (s)": extra_age(rule)})
         for event, end in zip(events, ends, strict=True):
-            theory = times_of(_flapping_predicted(runs, case, event.label))
-            found = runs.settling(case, event.t_s, end)
-            row += [theory[0], found.t_f_s, theory[1], found.t_share_s]
-        rows.append(row)
-    columns = ["case", "mean age added (s)"]
-    for event in events:
-        for what in ("f", "sharing"):
-            columns += [f"{event.label}, {what}, predicted (s)", "measured (s)"]
-    return ExperimentResult(page=page, table=ExperimentTable(columns=columns, rows=rows))
+            predicted, found = _flapping_predicted(runs, case, event.label), runs.settling(case, event.t_s, end)
+            for index, (what, _) in INDEXES.items():
+                row[f"{event.label}, {what}, predicted (s)"] = predicted[index]
+                row[f"{event.label}, {what}, measured (s)"] = getattr(found, index)
+    return ExperimentResult(page, rows)
 
 
 def extra_age(rule: Case) -> float:
@@ -164,10 +145,10 @@ def extra_age(rule: Case) -> float:
     return sum(flap.down_s**2 / (2.0 * (flap.up_s + flap.down_s)) for flap in flaps)
 
 
-def _flapping_predicted(runs: CaseData, case: str, label: str) -> Times:
+def _flapping_predicted(runs: CaseData, case: str, label: str) -> dict[str, float]:
     """Return times with the flapping link as one that is always late by its mean age; one that is cut is not there."""
     rule, inverters = runs.scenario.cases[case], runs.inverters(case)
     late = dict.fromkeys((("inv4", "inv5"), ("inv5", "inv4")), inverters.T_c + extra_age(rule))
     if any(entry.cut for entry in rule.netem.links):
-        return predicted_times(without(inverters, late), load=runs.loads[label])
-    return predicted_times(inverters, link_delay_s=late, load=runs.loads[label])
+        return times_of(predicted_times(without(inverters, late), load=runs.loads[label]))
+    return times_of(predicted_times(inverters, link_delay_s=late, load=runs.loads[label]))

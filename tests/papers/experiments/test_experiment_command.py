@@ -8,13 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from gridpeers.papers.singhal2022.experiments import EXPERIMENTS
-from gridpeers.papers.singhal2022.experiments.experiment_output import (
-    Curve,
-    ExperimentResult,
-    ExperimentTable,
-    Page,
-    Panel,
-)
+from gridpeers.papers.singhal2022.experiments.experiment_output import Curve, ExperimentResult, Page, Panel
 from tests import command_line
 
 DOCS = Path(__file__).parents[3] / "docs"
@@ -60,9 +54,9 @@ def test_a_result_is_a_figure_and_the_same_table_twice(tmp_path: Path) -> None:
         log="xy",
         zero=0.02,
     )
-    table = ExperimentTable(columns=("x (s)", "y (s)"), rows=((0.0, 1.0), (1.0, np.inf)))
+    rows = [{"x (s)": 0.0, "y (s)": 1.0}, {"x (s)": 1.0, "y (s)": np.inf}]
 
-    ExperimentResult(page=Page(title="t", panels=[panel], columns=1, names={0: "one"}), table=table).write(tmp_path)
+    ExperimentResult(Page(title="t", panels=[panel], columns=1, names={0: "one"}), rows).write(tmp_path)
 
     assert (tmp_path / "figure.png").read_bytes().startswith(b"\x89PNG")
     assert (tmp_path / "table.csv").read_text() == "x (s),y (s)\n0.0,1.0\n1.0,never\n"

@@ -78,14 +78,14 @@ def test_every_run_is_in_the_table_and_has_words_of_its_own() -> None:
     )
     result = hostile(SweepData(rows=rows, base=plan.base, window="event1"))
 
-    assert len(result.table.rows) == 3 * len(attacks) * len(GRAPHS)
-    assert result.table.columns == ("graph", "numbers", "attack", *dict.fromkeys(map(defence_words, rows["law"])))
-    assert {(row[1], cell) for row in result.table.rows for cell in row[3:]} == {
+    assert len(result.rows) == 3 * len(attacks) * len(GRAPHS)
+    assert tuple(result.rows[0]) == ("graph", "numbers", "attack", *dict.fromkeys(map(defence_words, rows["law"])))
+    assert {(row[1], cell) for row in result.rows for cell in row[3:]} == {
         ("frequency error (Hz)", "**0.500** P Q"),
         ("MPSI / MQSI", "**0.50** / **0.50**"),
         ("S / V (pu)", "0.50 / 0.50..0.50"),
     }
-    assert result.table.markdown().count("| attack |") == 3 * len(GRAPHS)
+    assert result.markdown().count("| attack |") == 3 * len(GRAPHS)
 
 
 def f_off(case: str, attack: str, defence: str) -> float:
