@@ -80,7 +80,7 @@ def test_every_run_is_in_the_table_and_has_words_of_its_own() -> None:
 
     assert len(result.rows) == 3 * len(attacks) * len(GRAPHS)
     assert tuple(result.rows[0]) == ("graph", "numbers", "attack", *dict.fromkeys(map(defence_words, rows["law"])))
-    assert {(row[1], cell) for row in result.rows for cell in row[3:]} == {
+    assert {(row["numbers"], cell) for row in result.rows for cell in list(row.values())[3:]} == {
         ("frequency error (Hz)", "**0.500** P Q"),
         ("MPSI / MQSI", "**0.50** / **0.50**"),
         ("S / V (pu)", "0.50 / 0.50..0.50"),
