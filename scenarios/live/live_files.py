@@ -24,7 +24,7 @@ from gridpeers.scenarios.record.record_info import LIVE, RecordInfo
 from gridpeers.scenarios.results.run_files import FolderError, new_folder, refusal, set_broken, shown, write_whole
 from gridpeers.scenarios.schema.participants import LISTS, inverters_of, netem_of
 from gridpeers.scenarios.schema.scenario_model import LONGEST_RUN, ScenarioModel
-from gridpeers.scenarios.schema.scenario_writing import to_toml, toml_lines
+from gridpeers.scenarios.schema.scenario_writing import to_toml
 from gridpeers.scenarios.versions import versions
 from gridpeers.wire.driver.command_line import command_line
 from gridpeers.wire.messages import LinkRequest
@@ -152,12 +152,12 @@ class LinkLog:
     def _write(self, t: float) -> list[Path]:
         files = list(filter(None, [self._replay, self._replay_if_changed if self._commands else None]))
         for file in files:
-            write_whole(file, replay_lines(self._scenario, self._feeder, self.changes, t))
+            write_whole(file, replay_toml(self._scenario, self._feeder, self.changes, t))
         return files
 
 
-def replay_lines(scenario: ScenarioModel, feeder: Feeder, changes: Sequence[Change], t: float) -> Iterator[str]:
-    """Yield the lines of the scenario whose links change by schedule as they did by command until t (s).
+def replay_toml(scenario: ScenarioModel, feeder: Feeder, changes: Sequence[Change], t: float) -> str:
+    """Return the scenario whose links change by schedule as they did by command until t (s).
 
     It leaves out agents that the scenario lacks. An age that the live run had by default is written out, as there is no
     such default in simulated time.
@@ -184,7 +184,7 @@ def replay_lines(scenario: ScenarioModel, feeder: Feeder, changes: Sequence[Chan
         "A live run's links, which people changed: agents, switches and loads that they changed are not in it "
         "(events.csv)."
     )
-    return toml_lines(replay, as_run, [links_alone], links=replayed(netem, changes, microgrids))
+    return to_toml(replay, as_run, [links_alone], links=replayed(netem, changes, microgrids))
 
 
 def check_new(file: Path | None) -> None:

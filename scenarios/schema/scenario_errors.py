@@ -37,11 +37,11 @@ class Problems:
         self._found: list[tuple[int, str]] = []
         self.noted: list[tuple[str, str]] = []
         """Key and text of each problem; "" is the key of one that says itself where it is."""
-        self._paths: set[str] = set()
+        self.paths: set[str] = set()
 
     def add(self, path: str, text: str) -> None:
         """Note a problem at a key, e.g. `time.T_c_s`; "" is the file as a whole."""
-        self._paths.add(path)
+        self.paths.add(path)
         self.noted.append((path, text))
         within = any(path == key or path.startswith((f"{key}.", f"{key}[")) for key in self._changed)
         around = path not in self._lines and any(key.startswith((f"{path}.", f"{path}[")) for key in self._changed)
@@ -69,14 +69,10 @@ class Problems:
 
     def touch(self, *paths: str) -> bool:
         """Return True if a problem was noted at one of these keys: a check that relates them is idle then."""
-        return any(path in self._paths for path in paths)
+        return any(path in self.paths for path in paths)
 
     def below(self, path: str) -> bool:
-        return any(noted.startswith(f"{path}.") for noted in self._paths)
-
-    @property
-    def paths(self) -> frozenset[str]:
-        return frozenset(self._paths)
+        return any(noted.startswith(f"{path}.") for noted in self.paths)
 
     def read(self, struct: type[T], data: Mapping[str, Any]) -> T:
         table, problems = read_table(struct, data)

@@ -15,24 +15,18 @@ from gridpeers.wire.schema.table_schema import INHERITED, INLINE, NO_KEY, NamedT
 
 
 def to_toml(
-    scenario: ScenarioModel, as_run: Mapping[str, Any], remarks: Iterable[str] = (), *, terse: bool = False
-) -> str:
-    """Return every key of a scenario, defaults included, and the table `[as_run]`; if `terse`, what is no default.
-
-    Defaults are written out because they may differ in a later version. The remarks become comments at the head.
-    """
-    return "".join(toml_lines(scenario, as_run, remarks, terse=terse))
-
-
-def toml_lines(
     scenario: ScenarioModel,
     as_run: Mapping[str, Any],
     remarks: Iterable[str] = (),
     *,
     terse: bool = False,
     links: Iterable[Fault] = (),
-) -> Iterator[str]:
-    """Yield the lines of `to_toml`, with further entries `[[link]]`, of which there may be thousands."""
+) -> str:
+    """Return every key of a scenario, defaults included, and the table `[as_run]`; if `terse`, what is no default.
+
+    Defaults are written out because they may differ in a later version. The remarks become comments at the head, the
+    `links` further entries `[[link]]`.
+    """
     keys, tables = _lines(scenario, "", scenario, terse=terse)
     if terse:
         head, foot = [f"# {remark}".rstrip() for remark in remarks], []
@@ -40,8 +34,8 @@ def toml_lines(
         first = "# The scenario as run, every default spelled out. `gridpeers run` takes this file as it is."
         head = [first, *(f"# {remark}" for remark in remarks)]
         foot = ["", f"[{AS_RUN}]", *(f"{key} = {_value(value)}" for key, value in as_run.items())]
-    for line in chain(head, keys, tables, _entries(links, "link", scenario, terse=terse), foot):
-        yield f"{line}\n"
+    lines = chain(head, keys, tables, _entries(links, "link", scenario, terse=terse), foot)
+    return "".join(f"{line}\n" for line in lines)
 
 
 def _lines(

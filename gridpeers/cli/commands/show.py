@@ -46,7 +46,7 @@ def check(
     from gridpeers.cli.progress import TRYING, explained
     from gridpeers.rooms import ROOMS
     from gridpeers.scenarios.results.file_sizes import file_sizes
-    from gridpeers.scenarios.schema.check_notes import liar_notes, security_notes, start_problem
+    from gridpeers.scenarios.schema.check_notes import liar_notes, start_problem
     from gridpeers.scenarios.schema.supply import supply_notes
 
     with explained(lambda: typer.echo(TRYING)):
@@ -54,7 +54,7 @@ def check(
     if problem:
         fail([f"{file}: the plant cannot start: {problem}"], BAD_INPUT)
     of_scenario = (supply_notes, liar_notes, ROOMS.resolve("robustness_notes"))
-    for note in chain(*(notes(spec, feeder) for notes in of_scenario), security_notes(spec, feeder, file)):
+    for note in chain.from_iterable(notes(spec, feeder) for notes in of_scenario):
         typer.echo(f"NOTE  {note}")
     typer.echo(
         f"{file}: can be run: {counted(len(spec.cases), 'case')} {', '.join(spec.cases)}; "

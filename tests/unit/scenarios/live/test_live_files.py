@@ -23,7 +23,7 @@ from gridpeers.scenarios.live.live_files import (
     check_new,
     ended_scenario,
     folders,
-    replay_lines,
+    replay_toml,
     write_scenario,
 )
 from gridpeers.scenarios.live.live_processes import ProcessOutcome
@@ -106,7 +106,7 @@ def test_the_replayed_scenario_is_one_and_its_links_do_what_was_commanded(tmp_pa
         LinkCommand(heal=Heal(on="inv1 -> inv4", from_s=0.0)).at(1.4),
         LinkCommand(fault=Fault(on="inv7 -> inv8", loss=0.5)).at(7.34),
     ]
-    (tmp_path / "again.toml").write_text("".join(replay_lines(scenario, feeder, changes, 7.33)))
+    (tmp_path / "again.toml").write_text(replay_toml(scenario, feeder, changes, 7.33))
     again, _ = load_scenario(tmp_path / "again.toml")
     netem = netem_of(again, "IV")
 
@@ -153,7 +153,7 @@ def test_a_partition_by_islands_stays_one_and_another_becomes_cuts(tmp_path: Pat
         cases={"IV": scenario.cases["IV"]},
         netem=Netem(partitions=(by_island, Partition(by="halves", from_s=2.0, to_s=3.0))),
     )
-    (tmp_path / "again.toml").write_text("".join(replay_lines(scenario, feeder, (), 5.0)))
+    (tmp_path / "again.toml").write_text(replay_toml(scenario, feeder, (), 5.0))
     again = load_scenario(tmp_path / "again.toml")[0].netem
 
     assert again.partitions == (by_island,)

@@ -219,7 +219,7 @@ LINK = BASE + '\n[[link]]\non = "inv1 -> inv2"\n'
         (BASE.replace('"13-152"', '"\\u001b[2J"'), r'no switch "\x1b[2J"'),
         (BASE + "\nx = \x1b[31m\n", r"\x1b[31m"),
         (BASE.replace('"microgrid123"', f'"{"a" * 300}"'), "no such feeder"),
-        (LINK + 'delay = { model = "trace", file = "/dev/zero" }\n', "it is no file"),
+        (LINK + 'delay = { model = "trace", file = "/dev/zero" }\n', "there is no file"),
     ],
 )
 def test_a_hostile_file_is_refused_in_lines_that_can_be_printed(tmp_path: Path, text: str, said: str) -> None:

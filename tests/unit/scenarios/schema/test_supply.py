@@ -172,22 +172,6 @@ def test_check_lists_each_liar_with_its_time_its_lie_and_its_cases(tmp_path: Pat
     ]
 
 
-def test_check_says_of_a_lie_for_an_agent_that_is_away_that_nobody_hears_it(tmp_path: Path) -> None:
-    """It has left before; an agent that returns meanwhile lies."""
-    away = '[[event]]\nlabel = "away"\nt_s = 0.5\nleave = ["inv3"]\n'
-    back = '[[event]]\nlabel = "back"\nt_s = 1.5\njoin = ["inv3"]\n'
-    told = []
-    for more in (away, away + back):
-        (tmp_path / "liars.toml").write_text(LIARS + more, encoding="utf-8")
-        told.append([note for note in liar_notes(*load_scenario(tmp_path / "liars.toml")) if note.startswith("inv3")])
-    lies = "inv3 lies from 1 s to the end: offset, P_set_W 100000"
-
-    assert told == [
-        [f"{lies}; nobody hears it, as inv3 has left at 0.5 s"],
-        [lies],
-    ]
-
-
 def test_nobody_lies_in_anothers_name_behind_certificates(tmp_path: Path) -> None:
     """With `security = "mtls"` such an entry is a problem at its key."""
     (tmp_path / "liars.toml").write_text('security = "mtls"\n' + LIARS, encoding="utf-8")
