@@ -21,7 +21,6 @@ from gridpeers.scenarios.live.run_address import (
     check_endpoint,
     check_wait,
     loopback_of,
-    next_port,
 )
 from gridpeers.scenarios.live.run_client import RunClient
 from gridpeers.scenarios.run_request import SPEEDS
@@ -56,12 +55,10 @@ def endpoint_for_run(listen: str, credentials: Credentials | None = None, access
             raise
         found_by = RunAddress(run=there[0], connect=(where,), access=access or Access()).words
         status, down = command_line("status", *found_by), command_line("down", *found_by)
-        beside = next_port(listen)
         raise UsageError(
             f"--listen: {' and '.join(f'run {name}' for name in there)} is there already, at {where}; "
-            f"{status} shows it, {down} ends it; to have both, give this one a name and "
-            f"a port of its own (--run NAME --listen {beside}; its other commands --run NAME --connect "
-            f"{loopback_of(beside)})"
+            f"{status} shows it, {down} ends it; to have both, give this one a name and a port of its own, by --run "
+            "and --listen, and its other commands --run and --connect"
         ) from None
 
 
@@ -80,21 +77,6 @@ def check_alone(
             )
 
 
-class LiveOptions(msgspec.Struct, frozen=True, kw_only=True):
-    run: str
-    case: str = ""
-    speed: float = 1.0
-    """Run time per wall time (s/s)."""
-    wait: float = 30.0
-    """Time (s) for which the plant waits for its agents."""
-    duration: float | None = None
-    """Run time (s) after which the run ends; None for no end."""
-    recorded: bool = False
-    secured: bool = False
-    strict: bool = False
-    """The run breaks when the plant cannot keep pace."""
-
-
 def chosen_case(scenario: ScenarioModel, case: str) -> str:
     """Return the case asked for, or the last, in the paper full coordination; UsageError if there is no such case."""
     if case and case not in scenario.cases:
@@ -103,35 +85,49 @@ def chosen_case(scenario: ScenarioModel, case: str) -> str:
 
 
 def configure(
-    scenario: ScenarioModel, feeder: Feeder, options: LiveOptions, listen: str, beyond: tuple[str, ...] = ()
+    scenario: ScenarioModel,
+    feeder: Feeder,
+    listen: str,
+    beyond: tuple[str, ...] = (),
+    *,
+    run: str,
+    case: str = "",
+    speed: float = 1.0,
+    wait: float = 30.0,
+    duration: float | None = None,
+    recorded: bool = False,
+    secured: bool = False,
+    strict: bool = False,
 ) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
     """Return the configurations of the plant and of all agents of a checked scenario, spare ones last.
 
-    The plant connects to the endpoints `beyond` itself, e.g. a Zenoh router. UsageError if an option cannot be used.
+    The plant connects to the endpoints `beyond` itself, e.g. a Zenoh router. It waits for its agents for `wait` (s);
+    the run ends after `duration` (s of run time). `speed` is run time per wall time; a `strict` run breaks when the
+    plant cannot keep pace. UsageError if an option cannot be used.
     """
     least, greatest = SPEEDS
-    if not least <= options.speed <= greatest:
-        raise UsageError(f"--speed: must be from {least:g} to {greatest:g} (1 is real time), got {options.speed:g}")
-    check_wait(options.wait)
-    check_duration(options.duration)
+    if not least <= speed <= greatest:
+        raise UsageError(f"--speed: must be from {least:g} to {greatest:g} (1 is real time), got {speed:g}")
+    check_wait(wait)
+    check_duration(duration)
     if scenario.plant.simulator != "gridpeers":
         raise UsageError(
             f'plant.simulator = "{scenario.plant.simulator}": keeps no real time; use {command_line("run")}, '
             'or "gridpeers"'
         )
-    if scenario.security == "mtls" and not options.secured:
+    if scenario.security == "mtls" and not secured:
         raise UsageError(NEEDS_KEYS)
-    case = chosen_case(scenario, options.case)
+    case = chosen_case(scenario, case)
     plant, agents = configs(scenario, feeder, case, listen, real_nodes=True)
     # links are emulated even without a fault: gridpeers link may set one during the run
     links = plant.links or setup_of(netem_of(scenario, case), scenario, feeder, real_nodes=True).to_tree()
-    level: RecordLevel = scenario.record if options.recorded else "physics"
-    live = {"run": options.run, "clock": "wall", "speed": options.speed, "links": links, "record": level}
+    level: RecordLevel = scenario.record if recorded else "physics"
+    live = {"run": run, "clock": "wall", "speed": speed, "links": links, "record": level}
     first = [replace(agent, **live, deadline=0.0) for agent in agents if agent.name in plant.agents]
     nameplate = ("name", "kind", "microgrid", "P_rated", "V_nom", "m_p", "m_q")
     spares = (replace(first[0], **{name: getattr(row, name) for name in nameplate}) for row in feeder.spares)
     everyone = (*first, *spares)
-    end = None if options.duration is None else max(1, round(options.duration / plant.T_c)) * plant.T_c
+    end = None if duration is None else max(1, round(duration / plant.T_c)) * plant.T_c
     diagram = replace(feeder_map(as_in(scenario, feeder)), scenario=scenario.name, case=case)
     plant = replace(
         plant,
@@ -140,17 +136,9 @@ def configure(
         schedule=(),  # in a live run, people let agents leave and join
         end=end,
         connect=beyond,
-        wait_for_agents=min(options.wait, LONGEST_TIME),  # JSON has no infinity
-        strict=options.strict,
+        wait_for_agents=min(wait, LONGEST_TIME),  # JSON has no infinity
+        strict=strict,
         feeder_map=msgspec.to_builtins(diagram),
         agent_configs={agent.name: msgspec.json.decode(msgspec.json.encode(agent)) for agent in everyone},
     )
     return plant, everyone
-
-
-def manual_node_faults(scenario: ScenarioModel) -> str:
-    """Return a note on the faults that people have to inject into processes of their own; "" if there are none."""
-    (case,) = scenario.cases
-    names = ", ".join(dict.fromkeys(node.name for node in netem_of(scenario, case).nodes if node.kill or node.pause))
-    note = f"[[node]] of {names}: agents in other terminals are killed and paused by you (kill -KILL, -STOP, -CONT)"
-    return note if names else ""

@@ -29,7 +29,7 @@ from gridpeers.scenarios.live.live_files import LinkLog
 from gridpeers.scenarios.live.run_address import RunAddress, UsageError, far_hosts, loopback_of, return_path
 from gridpeers.scenarios.live.run_client import RunClient
 from gridpeers.scenarios.live.run_monitor import line_of
-from gridpeers.scenarios.live.run_requests import ANSWER, check_free, configuration, own_code
+from gridpeers.scenarios.live.run_requests import ANSWER, free_configurations, own_code
 from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.scenarios.results.record import Recorded, Recorder, RecordError
 from gridpeers.scenarios.short_texts import short
@@ -296,9 +296,7 @@ def agent_here(
         with RunClient(where) as client:
             end = monotonic() + wait
             client.find_plant(wait, lambda line: say(f"{who}: {line}"))
-            configs = [configuration(client, name, max(ANSWER, end - monotonic())) for name in dict.fromkeys(names)]
-            for name in names:
-                check_free(client, name)
+            configs = free_configurations(client, names, max(ANSWER, end - monotonic()))
         named = list(dict.fromkeys(code for config in configs for code in own_code(config)))
         if named and not trusts and far_hosts(where.connect):
             raise UsageError(

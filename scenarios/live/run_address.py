@@ -183,9 +183,3 @@ def return_path(connect: tuple[str, ...]) -> tuple[str, ...]:
 def loopback_of(listen: str) -> str:
     """Return where a process of this host connects to one that listens there."""
     return listen.replace("/0.0.0.0:", "/127.0.0.1:").replace("/[::]:", "/[::1]:")
-
-
-def next_port(listen: str) -> str:
-    endpoint = parse_endpoint(listen)
-    assert endpoint is not None
-    return str(endpoint._replace(port=endpoint.port + 1 if endpoint.port < 65535 else endpoint.port - 1, rest=""))

@@ -8,7 +8,8 @@ from __future__ import annotations
 import re
 from collections import deque
 from collections.abc import Collection
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from typing import Any
 
 import msgspec
 
@@ -234,40 +235,25 @@ class RunMonitor:
         )
 
     def _inverter(self, name: str, present: bool, current: bool, now: float) -> InverterStatus:
-        one = InverterStatus(name=name)
+        status, at = self._status.get(name, (None, now))
+        if not present or now - at > SILENT:
+            status = None
+        known: dict[str, Any] = {"note": self._note(name, present, status, now - at)}
         config, latest = self._configs.get(name), self._telemetry
         if current and self._row and latest is not None and name in latest.inverters:
             start = 1 + _PER_INVERTER * latest.inverters.index(name)
             f, P, Q, V, P_set, V_set = self._row[start : start + _PER_INVERTER]
-            one = replace(one, f=f, P=P / 1e3, Q=Q / 1e3, P_set=P_set / 1e3)
+            known |= {"f": f, "P": P / 1e3, "Q": Q / 1e3, "P_set": P_set / 1e3}
             if config is not None:
                 V_pu = V / config.V_nom
-                one = replace(
-                    one,
-                    P_share=P / config.P_rated,
-                    V=V_pu,
-                    V_set=V_set / config.V_nom,
-                    off_voltage=not V_LOW <= V_pu <= V_HIGH,
-                )
-        status, at = self._status.get(name, (None, now))
-        if not present or now - at > SILENT:
-            status = None
-        one = replace(one, note=self._note(name, present, status, now - at))
-        if status is None:
-            return one
-        ages = dict(zip(status.neighbours, status.ages, strict=False))
-        used = {neighbour: age for neighbour, age in ages.items() if neighbour in status.used}
-        return replace(
-            one,
-            island=status.island,
-            ages=used,
-            hears=len(status.used),
-            late=any(age >= OLD for age in used.values()),
-            received=status.received,
-            sent=status.sent,
-            lost=status.lost,
-            impaired=status.impaired,
-        )
+                known |= {"P_share": P / config.P_rated, "V": V_pu, "V_set": V_set / config.V_nom}
+                known["off_voltage"] = not V_LOW <= V_pu <= V_HIGH
+        if status is not None:
+            ages = dict(zip(status.neighbours, status.ages, strict=False))
+            used = {neighbour: age for neighbour, age in ages.items() if neighbour in status.used}
+            known |= {"ages": used, "hears": len(status.used), "late": any(age >= OLD for age in used.values())}
+            known |= {key: getattr(status, key) for key in ("island", "received", "sent", "lost", "impaired")}
+        return InverterStatus(name=name, **known)
 
     def _pace(self) -> str:
         pacing, plant = self._pacing, self._plant_status

@@ -132,13 +132,24 @@ def has_ended(client: RunClient) -> bool:
     return client.until(lambda: not client.plant, LEAVING)
 
 
-def configuration(client: RunClient, name: str, wait: float = ANSWER) -> AgentConfig:
-    """Return the configuration that the plant hands out to the agent of an inverter in `wait` (s), or NobodyError."""
+def free_configurations(client: RunClient, names: tuple[str, ...], wait: float = ANSWER) -> list[AgentConfig]:
+    """Return what the plant hands out, in `wait` (s), to agents that can start here.
+
+    NobodyError if there is no such inverter, or if another agent of it takes part; of two agents that start at the same
+    moment the plant refuses one.
+    """
     end = monotonic() + wait
-    inverters = plant_status(client, wait).inverters
-    if name not in inverters:
-        raise NobodyError(f'no inverter "{name}" in {client.where}; inverters are {", ".join(in_order(inverters))}')
-    return configurations(client, name, end - monotonic())[name]
+    status = plant_status(client, wait)
+    for name in names:
+        if name not in status.inverters:
+            listed = ", ".join(in_order(status.inverters))
+            raise NobodyError(f'no inverter "{name}" in {client.where}; inverters are {listed}')
+        if name in status.agents:
+            raise NobodyError(
+                f"{name}: another agent of this name takes part in run {client.where.run} already; stop it first "
+                f"({command_line('stop', name, *client.where.words)}), or start the agent of another inverter"
+            )
+    return [configurations(client, name, end - monotonic())[name] for name in names]
 
 
 def configurations(client: RunClient, name: str = "", wait: float = ANSWER) -> dict[str, AgentConfig]:
@@ -178,15 +189,6 @@ def read_config(payload: bytes) -> AgentConfig | None:
     except (msgspec.DecodeError, ValueError):
         return None
     return config
-
-
-def check_free(client: RunClient, name: str) -> None:
-    """Raise NobodyError if an agent of this name takes part; of two at the same moment the plant refuses one."""
-    if name in plant_status(client).agents:
-        raise NobodyError(
-            f"{name}: another agent of this name takes part in run {client.where.run} already; stop it first "
-            f"({command_line('stop', name, *client.where.words)}), or start the agent of another inverter"
-        )
 
 
 def own_code(config: AgentConfig) -> Iterator[str]:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import msgspec
 from msgspec.structs import replace
 
-from gridpeers.scenarios.live.live_options import LiveOptions, configure
+from gridpeers.scenarios.live.live_options import configure
 from gridpeers.scenarios.schema import load_scenario
 from tests.resources.attack import LINKED, Attack
 from tests.toy.town import Town
@@ -122,7 +122,7 @@ def real_town(folder: Path, name: str = "islanding", *, record: str = "physics")
     """Return nine agents on the paper's feeder, islanded at 1 s and fully coordinated, in real time."""
     scenario, feeder = load_scenario(name)
     scenario = replace(scenario, events=scenario.events[:1])
-    plant, agents = configure(scenario, feeder, LiveOptions(run="trial", case="IV"), "tcp/127.0.0.1:0")
+    plant, agents = configure(scenario, feeder, "tcp/127.0.0.1:0", run="trial", case="IV")
     if record != "physics":
         plant = replace(plant, record=record)
         agents = tuple(replace(agent, record=record) for agent in agents)

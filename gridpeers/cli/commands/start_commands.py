@@ -79,12 +79,10 @@ class Start:
 def _start(start: Start, *, agents: bool) -> None:
     """Run the plant, with its agents or without, until it ends; end with its exit code."""
     from gridpeers.scenarios.live.live_options import (
-        LiveOptions,
         check_alone,
         chosen_case,
         configure,
         endpoint_for_run,
-        manual_node_faults,
     )
 
     # first: reading a scenario takes seconds, and a forgotten run is reported at once
@@ -110,7 +108,11 @@ def _start(start: Start, *, agents: bool) -> None:
     spec, feeder = load(start.scenario)
     check_new(start.record)
     spec = chosen(spec, chosen_case(spec, start.case), None)
-    options = LiveOptions(
+    config, everyone = configure(
+        spec,
+        feeder,
+        endpoint,
+        beyond,
         run=run,
         case=start.case,
         speed=start.speed,
@@ -120,7 +122,6 @@ def _start(start: Start, *, agents: bool) -> None:
         recorded=start.out is not None,
         secured=start.keys is not None,
     )
-    config, everyone = configure(spec, feeder, options, endpoint, beyond)
     inverters = tuple(row.name for row in (*feeder.inverters, *feeder.spares))
     if start.keys is not None:
         started = config.agents if agents else ()
@@ -144,8 +145,6 @@ def _start(start: Start, *, agents: bool) -> None:
             say(f"{watch}, in another terminal, shows it; Ctrl-C here, or {down} there, ends it")
             outcome = all_here(config, everyone, kept.logs, kept.record, link_log, info)
         else:
-            if note := manual_node_faults(spec):
-                say(note)
             outcome = plant_here(config, kept.record, link_log, info)
         if kept.whole is not None:
             metrics = RunMetrics(

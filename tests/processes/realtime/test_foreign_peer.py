@@ -14,7 +14,7 @@ from msgspec.structs import replace
 
 from gridpeers.plant.plant_config import SwitchEvent
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
-from gridpeers.scenarios.live.live_options import LiveOptions, configure
+from gridpeers.scenarios.live.live_options import configure
 from gridpeers.scenarios.results.sharing_index import sharing_index
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.schema.configs import configs
@@ -126,9 +126,7 @@ def test_a_foreign_agent_takes_its_share_in_real_time(tmp_path: Path) -> None:
     scenario, feeder = load_scenario("islanding")
     scenario = replace(scenario, events=scenario.events[:1])
     endpoint = "tcp/127.0.0.1:0"
-    plant, agents = configure(
-        scenario, feeder, LiveOptions(run="feeder", case="IV", duration=45.0, speed=0.5), endpoint
-    )
+    plant, agents = configure(scenario, feeder, endpoint, run="feeder", case="IV", duration=45.0, speed=0.5)
     standing = [agent for agent in agents if agent.name in plant.agents]
     s = np.array([agent.P_rated for agent in standing])
     run = Mixed(plant, standing, tmp_path, foreign=("inv2",))

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import socket
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import pytest
 
 from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.scenarios.live.live_options import LiveOptions, configure
+from gridpeers.scenarios.live.live_options import configure
 from gridpeers.scenarios.schema import load_scenario
 from tests.command_line import invoke
 
@@ -118,8 +119,8 @@ def test_a_port_in_use_is_told(elsewhere: Path) -> None:
 
 def test_the_plant_hands_every_agent_what_it_needs() -> None:
     """Each inverter, spare ones too, has a configuration of this run; the plant waits for those that are no spares."""
-    wishes = LiveOptions(run="lab", case="III", speed=2.0, wait=5.0, duration=1.0)
-    plant, agents = configure(*load_scenario("islanding"), wishes, "tcp/127.0.0.1:7447")
+    wishes: dict[str, Any] = {"run": "lab", "case": "III", "speed": 2.0, "wait": 5.0, "duration": 1.0}
+    plant, agents = configure(*load_scenario("islanding"), "tcp/127.0.0.1:7447", **wishes)
     handed = {name: msgspec.convert(tree, AgentConfig) for name, tree in plant.agent_configs.items()}
 
     assert plant.agents == tuple(f"inv{i}" for i in range(1, 10))

@@ -68,8 +68,7 @@ def test_code_of_a_plant_on_another_host_is_run_only_if_it_is_trusted(
     monkeypatch.setattr(
         live_processes, "RunClient", lambda where: nullcontext(type("V", (), {"find_plant": lambda *_: None})())
     )
-    monkeypatch.setattr(live_processes, "configuration", lambda client, name, wait: CONFIG)
-    monkeypatch.setattr(live_processes, "check_free", lambda client, name: None)
+    monkeypatch.setattr(live_processes, "free_configurations", lambda client, names, wait: [CONFIG])
     monkeypatch.setattr(
         live_processes, "run_agents", lambda process, links: ran.extend(config.name for config in process) or ""
     )

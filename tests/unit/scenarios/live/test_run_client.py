@@ -17,7 +17,6 @@ from gridpeers.scenarios.live.run_address import (
     accepting,
     address_of,
     loopback_of,
-    next_port,
     return_path,
     with_protocol,
 )
@@ -97,11 +96,10 @@ def test_the_options_that_find_a_run_say_what_is_not_the_default(endpoint: str, 
 
 
 def test_endpoints_as_other_commands_need_them() -> None:
-    """On the same host, at the next port, and with certificates."""
+    """On the same host, and with certificates."""
     listens = ("tcp/0.0.0.0:7447", "tcp/[::]:7447", "tcp/10.0.0.1:7447")
 
     assert [*map(loopback_of, listens)] == ["tcp/127.0.0.1:7447", "tcp/[::1]:7447", "tcp/10.0.0.1:7447"]
-    assert [*map(next_port, ("tcp/127.0.0.1:7447", "tcp/[::1]:65535"))] == ["tcp/127.0.0.1:7448", "tcp/[::1]:65534"]
     assert with_protocol("tcp/lab:7447", keys=True, default="tcp/lab:7447") == "tls/lab:7447"
     assert RunAddress(run="gridpeers", connect=("tcp/127.0.0.1:7447",)).words == []
     assert RunAddress(run="demo", connect=("tcp/0.0.0.0:7500",)).words == [

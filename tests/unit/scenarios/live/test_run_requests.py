@@ -15,8 +15,8 @@ from gridpeers.scenarios.live.run_address import RUN, Access, RunAddress
 from gridpeers.scenarios.live.run_client import NobodyError, RunClient
 from gridpeers.scenarios.live.run_requests import (
     ask,
-    configuration,
     configurations,
+    free_configurations,
     link_states,
     links_of_run,
     plant_status,
@@ -109,7 +109,7 @@ def test_a_question_that_was_lost_is_asked_again(lossy: type[Lost]) -> None:
 def test_no_answer_is_not_taken_for_a_no(lossy: type[Lost]) -> None:
     """Neither an inverter nor emulated links are said to be missing, once the wait has ended."""
     with pytest.raises(NobodyError, match="the plant of run demo is there but has not answered within 30 s"):
-        configuration(cast(RunClient, lossy(1000)), "inv1", 30.0)
+        free_configurations(cast(RunClient, lossy(1000)), ("inv1",), 30.0)
     with pytest.raises(NobodyError, match="no answer: the plant of run demo has not sent the configuration of inv1"):
         configurations(cast(RunClient, lossy(1000)), "inv1", 30.0)
     with pytest.raises(NobodyError, match="no answer: the plant of run demo has not sent a configuration within"):
@@ -120,7 +120,7 @@ def test_an_inverter_that_the_plant_does_not_have_is_told_at_once(lossy: type[Lo
     """Its status names all inverters: nobody waits for a configuration that cannot come."""
     client = lossy()
     with pytest.raises(NobodyError, match='no inverter "inv3" in run demo; inverters are inv1, inv2'):
-        configuration(cast(RunClient, client), "inv3", 60.0)
+        free_configurations(cast(RunClient, client), ("inv3",), 60.0)
     assert client.now == 0.0
 
 
@@ -194,9 +194,9 @@ def test_the_other_agent_of_a_name_is_stopped_where_it_is(
     where: RunAddress, typed: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """`gridpeers stop inv2` alone would stop an agent of the default run, or find no plant."""
-    monkeypatch.setattr(run_requests, "plant_status", lambda client: SimpleNamespace(agents=("inv2",)))
+    monkeypatch.setattr(run_requests, "plant_status", lambda *_: SimpleNamespace(agents=("inv2",), inverters=("inv2",)))
 
     with pytest.raises(NobodyError) as error:
-        run_requests.check_free(SimpleNamespace(where=where), "inv2")  # type: ignore[arg-type]
+        free_configurations(SimpleNamespace(where=where), ("inv2",))  # type: ignore[arg-type]
 
     assert f"({typed})" in str(error.value)

@@ -11,7 +11,7 @@ from gridpeers.agents.agent_config import AgentConfig, Control
 from gridpeers.plant.equipment.named_loads import named_loads
 from gridpeers.scenarios.console import terminal
 from gridpeers.scenarios.live.feeder_map import FeederMap, feeder_map, read_feeder_map
-from gridpeers.scenarios.live.live_options import LiveOptions, configure
+from gridpeers.scenarios.live.live_options import configure
 from gridpeers.scenarios.live.run_monitor import InverterStatus, PlantStatus, RunMonitor, Snapshot
 from gridpeers.scenarios.live.watching import plain, table
 from gridpeers.scenarios.schema import load_scenario
@@ -154,7 +154,7 @@ def test_loads_are_on_the_map_as_the_run_has_them() -> None:
     """Each load of the feeder at its bus, with the scenario's factor on it."""
     scenario, feeder = load_scenario("islanding")
     twice = msgspec.structs.replace(scenario, plant=msgspec.structs.replace(scenario.plant, load_factor=2.0))
-    plant, _ = configure(twice, feeder, LiveOptions(run="lab"), "tcp/127.0.0.1:7447")
+    plant, _ = configure(twice, feeder, "tcp/127.0.0.1:7447", run="lab")
     diagram = msgspec.convert(plant.feeder_map, FeederMap)
 
     assert (diagram.scenario, diagram.case) == ("islanding", "IV")

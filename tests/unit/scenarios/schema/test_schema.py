@@ -18,7 +18,7 @@ from gridpeers.plant.plant_config import PlantSettings, PowerLimit, SwitchEvent,
 from gridpeers.plant.tables import read_feeder
 from gridpeers.plant.tables.read import DATA
 from gridpeers.scenarios.catalogue_files import CATALOGUE
-from gridpeers.scenarios.live.live_options import LiveOptions, configure
+from gridpeers.scenarios.live.live_options import configure
 from gridpeers.scenarios.results.history import as_they_came, late_moves
 from gridpeers.scenarios.schema import catalogue, load_scenario
 from gridpeers.scenarios.schema.configs import configs, limits_of
@@ -319,7 +319,7 @@ def test_a_spare_that_joins_is_there_but_not_awaited_at_the_start(tmp_path: Path
 def test_in_a_live_run_people_move_the_agents(tmp_path: Path) -> None:
     """The plant of a live run lets nobody leave by itself, and knows each inverter once."""
     text = PLUG.replace('join = ["inv2"]', 'join = ["inv2", "inv10"]')
-    plant, agents = configure(*load_scenario(written(tmp_path, text)), LiveOptions(run="lab"), "tcp/127.0.0.1:7447")
+    plant, agents = configure(*load_scenario(written(tmp_path, text)), "tcp/127.0.0.1:7447", run="lab")
 
     assert plant.schedule == ()
     assert [agent.name for agent in agents] == [f"inv{i}" for i in range(1, 11)]
