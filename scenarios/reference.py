@@ -135,7 +135,6 @@ TOPICS = ("keys", "messages", "scenario", "feeder", *_REGISTRIES)
 
 
 def page(topic: str) -> str:
-    """Return markdown of the page of one of `TOPICS`."""
     makers = {"keys": _keys, "messages": _messages, "scenario": _scenario, "feeder": _feeder}
     lines = makers[topic]() if topic in makers else _registry(topic)
     return "\n".join(lines) + "\n"
@@ -187,7 +186,6 @@ def _scenario() -> Iterator[str]:
 
 
 def _tables_in(cls: type, path: str) -> Iterator[tuple[str, type]]:
-    """Yield the tables below a table with their headers."""
     for field in fields_of(cls):
         key = f"{path}.{field.key}" if path else field.key
         if INLINE in field.marks:
@@ -246,7 +244,6 @@ def _registry(topic: str) -> Iterator[str]:
 
 
 def _entry(registry: Registry[Any], name: str) -> Iterator[str]:
-    """Yield the sentence and the parameters of one entry."""
     try:
         it = registry.resolve(name)
     except PluginError as error:  # an entry point of somebody's that is broken

@@ -10,7 +10,6 @@ _VERSIONS = ("gridpeers", "eclipse-zenoh", "msgspec", "numpy", "scipy", "numba")
 
 
 def versions() -> dict[str, str]:
-    """Versions of everything that has a part in the numbers of a run."""
     return {"python": platform.python_version()} | {name: version_of(name) for name in _VERSIONS}
 
 

@@ -10,7 +10,6 @@ from gridpeers.wire.driver.process import main
 
 
 def run(process: AgentProcess) -> str:
-    """Take part in a run; return why an agent could not go on, or ""."""
     return run_agents(process, links_of)
 
 

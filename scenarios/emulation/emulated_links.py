@@ -163,7 +163,6 @@ class EmulatedLinks:
 
 
 def _events_of(nodes: Sequence[NodeFault]) -> list[tuple[float, str, str]]:
-    """Return time (s), liar and sentence of each lie's beginning and end."""
     found = []
     for node in nodes:
         if node.lies is not None:
@@ -174,5 +173,4 @@ def _events_of(nodes: Sequence[NodeFault]) -> list[tuple[float, str, str]]:
 
 
 def links_of(name: str, tree: Mapping[str, Any]) -> EmulatedLinks | None:
-    """Return the links to a node from the tree in its configuration; None if it has none."""
     return EmulatedLinks(name, EmulationConfig.of_tree(tree)) if tree else None

@@ -11,7 +11,6 @@ from gridpeers.wire.driver.process import main
 
 
 def run(config: PlantConfig) -> str:
-    """Run the plant; return why the run broke, or ""."""
     return run_plant(config, make_links=links_of)
 
 

@@ -35,7 +35,6 @@ class EmulationConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
     """Every verdict is reported, not only their counts and their hash."""
 
     def to_tree(self) -> dict[str, Any]:
-        """Return it as the tree `links` of `AgentConfig` and `PlantConfig`, which know no netem."""
         tree: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(self))
         return tree
 
@@ -195,7 +194,6 @@ class LinkCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         return f"{where}: " + ", ".join(faults + ([] if self.for_s is None else [f"for {self.for_s:g} s"]))
 
     def in_words(self, impaired: Sequence[Link]) -> str:
-        """Return it in words, given which of its links have a fault when it begins to hold."""
         if self.fault is not None:
             return str(self)
         if not impaired:

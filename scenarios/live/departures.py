@@ -158,7 +158,6 @@ class _Due(NamedTuple):
 def _moved(
     scenario: ScenarioModel, feeder: Feeder, events: Iterable[PlantEvent], meant: Sequence[Window], ended: float
 ) -> Iterator[PlantEvent]:
-    """Yield the agents that joined, left or died against the scenario, and those that should have and did not."""
     due = [*_due(scenario, meant)]
     (case,) = scenario.cases
     netem = netem_of(scenario, case)

@@ -100,7 +100,6 @@ def write_scenario(folder: Path, scenario: ScenarioModel, remarks: Iterable[str]
 def live_record(
     scenario: ScenarioModel, plant: PlantConfig, agents: tuple[AgentConfig, ...], inverters: tuple[str, ...]
 ) -> RecordInfo:
-    """Return the head of a live run's record; the scenario has the one case that runs."""
     (case,) = scenario.cases
     return RecordInfo(
         level=plant.record,
@@ -145,7 +144,6 @@ class LinkLog:
             self._write(message.t)
 
     def close(self, t: float) -> list[str]:
-        """Write the scenario at the end of a run that reached t (s); return lines for the terminal."""
         files = self._write(t)
         return [f"the links as they were: {command_line('run', shown(files[0]))}"] if files else []
 
@@ -188,7 +186,6 @@ def replay_toml(scenario: ScenarioModel, feeder: Feeder, changes: Sequence[Chang
 
 
 def check_new(file: Path | None) -> None:
-    """Raise UsageError if the file of `--record` exists, or cannot be made."""
     if file is None:
         return
     folder = file.absolute().parent

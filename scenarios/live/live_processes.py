@@ -47,7 +47,6 @@ CHECK = 0.25
 """Time (s) between two checks for process faults that are due."""
 
 UNHEARD = "the plant has ended, and nothing was ever heard of it here: no link to it was made"
-"""Failure of a run whose plant ended without an error, but was never heard here."""
 
 LEAVING = 5.0
 """Time (s) that processes have to close by themselves once the plant has."""
@@ -56,14 +55,11 @@ _STOP = "stop"
 
 
 def say(line: str) -> None:
-    """Print a line on standard output at once."""
     print(line, flush=True)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ProcessOutcome:
-    """The outcome of a live run in the terminal where it was started."""
-
     broke: str = ""
     interrupted: str = ""
     """Name of the signal that ended it: SIGINT, as Ctrl-C gives, or SIGTERM."""
@@ -74,10 +70,9 @@ class ProcessOutcome:
 
 
 class LiveRecorder:
-    """Say the plant's events as they come, but for `silent` kinds, and feed the `Recorder` and `LinkLog` of the run.
+    """Say the plant's events, but for `silent` kinds, and record the run, in a thread, while its context lasts.
 
-    It works in a thread of its own while its context lasts. The plant waits for it before the start and at the end, so
-    nothing of the run is missing. Without a folder there is no record.
+    The plant waits for it before the start and at the end. Without a folder there is no record.
     """
 
     def __init__(
@@ -93,12 +88,9 @@ class LiveRecorder:
         self._link_log: LinkLog | None = link_log
         self._recorder = None if folder is None else Recorder(folder, gaps=True, record=record)
         self.recorded: Recorded | None = None
-        """The record, once it is closed, if it is whole."""
         self.failure = ""
-        """The first reason why something could not be recorded; "" if everything was."""
         self.failed_laws: dict[str, PlantEvent] = {}
         self.cut_short = ""
-        """Why the plant's last message does not come, if that is known."""
         self._limit = RateLimit()
         self.client: TelemetryClient
         self._thread = threading.Thread(target=self._follow, daemon=True)
@@ -111,7 +103,6 @@ class LiveRecorder:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Take in what has come, close the session, and give the files their names."""
         self.client.say(_STOP)
         self._thread.join()
         self.client.close()
@@ -210,7 +201,6 @@ def meaning(word: str, config: PlantConfig) -> str:
 
 
 def plant_here(config: PlantConfig, folder: Path | None, link_log: LinkLog, record: RecordInfo) -> ProcessOutcome:
-    """Run the plant in this process until it is told to end."""
     requests = stop_at_signals(StoppedError)
     _log()
     config = with_recorder(config, waits=folder is not None)

@@ -37,7 +37,6 @@ PRESENT = {"opened": "opens", "closed": "closes", "joined": "joins", "left": "le
 def live_drawing(
     departures: Departures, scenario: ScenarioModel, feeder: Feeder, history: History, events: Sequence[PlantEvent]
 ) -> Drawing:
-    """Return the data to draw of a run of one case: all events by name, and a line at each departure."""
     (case,) = scenario.cases
     reached = tuple(event for event in scenario.events if event.t_s < history.t[-1])
     came = as_they_came(msgspec.structs.replace(scenario, events=reached), events)
@@ -47,7 +46,6 @@ def live_drawing(
 
 
 def _marks(departures: Iterable[PlantEvent]) -> Iterator[Mark]:
-    """Yield marks of departures; those of one moment share a mark."""
     by_time: dict[float, list[PlantEvent]] = {}
     for event in departures:
         if event.t > 0.0:
@@ -107,7 +105,6 @@ def write_report(metrics: RunMetrics, recorded: Recorded, pacing: Pacing | None,
 
 
 def _live_table(recorded: Recorded, departures: Departures) -> dict[str, object]:
-    """Return the table `live` of metrics.json (docs/results.md)."""
     table: dict[str, object] = {
         "ended_s": recorded.ended,
         "windows": {

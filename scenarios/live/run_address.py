@@ -110,7 +110,6 @@ def check_name(option: str, name: str) -> str:
 
 
 def check_inverters(names: Sequence[str]) -> None:
-    """Raise UsageError for a name that cannot be an inverter's, and for one that is given twice."""
     for name in names:
         check_name("INVERTER", name)
     twice = [name for name, count in Counter(names).items() if count > 1]
@@ -167,7 +166,6 @@ def is_loopback_host(host: str) -> bool:
 
 
 def far_hosts(connect: tuple[str, ...]) -> list[str]:
-    """Return the hosts of endpoints that are not on this host's loopback."""
     hosts = [endpoint.host for text in connect if (endpoint := parse_endpoint(text))]
     return [host for host in hosts if not is_loopback_host(host)]
 

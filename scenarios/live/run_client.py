@@ -105,7 +105,6 @@ class RunClient:
 
     @property
     def id(self) -> str:
-        """Id of the session, in the key of its answers."""
         return self._session.id
 
     def listen(self, key: str) -> None:
@@ -113,7 +112,6 @@ class RunClient:
         self._session.subscribe(key)
 
     def fetch(self, key: str) -> None:
-        """Ask a queryable; its answers come in as messages on that key."""
         self._session.fetch(key)
 
     def publish(self, key: str, payload: bytes) -> None:
@@ -141,10 +139,9 @@ class RunClient:
         return True
 
     def find_plant(self, wait: float, tell: Callable[[str], None] = lambda line: None) -> None:
-        """Wait for the plant of the run, for `wait` (s) at most.
+        """Wait for the plant of the run, for `wait` (s) at most; `tell` gets a line now and then.
 
-        `tell` hears what is waited for: ever more rarely, and at once if plants of other runs are there. NobodyError
-        if there is no plant in time; at once if nobody there accepts the other's certificate.
+        NobodyError if there is no plant in time; at once if nobody there accepts the other's certificate.
         """
         began = monotonic()
         look, reminder = began + FIRST_LOOK, REMINDER
@@ -190,7 +187,6 @@ class RunClient:
         return "\n".join(refusals) if all(refusals) else ""
 
     def _link_faults(self) -> list[str]:
-        """Return what is wrong with links that are there, by their certificates."""
         credentials = self.where.credentials
         if credentials is None:
             return []
@@ -207,7 +203,6 @@ class RunClient:
         ]
 
     def _failure(self, wait: float) -> str:
-        """Return why no plant was found within a wait (s)."""
         where = self.where
         start = command_line("plant", "SCENARIO", *where.access.words)
         if self._session.peers():
@@ -226,21 +221,14 @@ class RunClient:
                 f"nothing answers at {', '.join(where.connect)} within {wait:g} s; start a plant there ({start}), "
                 "or say by --connect where it is"
             )
-        if where.credentials is not None:
-            return (
-                f"something listens at {mute} and has made no link within {wait:g} s: it is of a run without "
-                "certificates, no plant, or a frozen one, which kill -CONT lets go on; say by --connect where the "
-                "plant is"
-            )
+        keys = "is of a run without certificates" if where.credentials else "asks for --keys DIR and tls/..."
         return (
             f"something listens at {mute} but has said nothing within {wait:g} s; if it is a frozen plant, kill -CONT "
-            "lets it go on, else end it by its process id; if it is something else, say by --connect where the plant "
-            "is; a plant with certificates asks for --keys DIR and tls/..."
+            f"lets it go on; it may be a plant that {keys}; else say by --connect where the plant is"
         )
 
 
 def _refusal(text: str, where: RunAddress) -> str:
-    """Return why an endpoint and this process make no link; empty if they may."""
     endpoint = parse_endpoint(text)
     if endpoint is None or not endpoint.connects:
         return ""

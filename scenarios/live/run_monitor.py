@@ -37,7 +37,6 @@ class RunTokens:
         return runs | {self._run} if self.epochs else runs
 
     def appeared(self, key: str) -> None:
-        """Note a token, if it is one of those and there is room for it."""
         match self._keys.parts(key):
             case ("alive", "plant", part) if (epoch := epoch_of(part)) is not None and len(self.epochs) < MOST_PLANTS:
                 self.epochs.add(epoch)
@@ -147,7 +146,6 @@ class Snapshot:
 
 
 def line_of(event: PlantEvent) -> str:
-    """Return an event as a line; its time comes first and only there."""
     return f"{event.t:8.2f} s  {re.sub(r', at t = [0-9.e+]+ s$', '', event.text)}"
 
 
@@ -170,14 +168,12 @@ class RunMonitor:
 
     @property
     def inverters(self) -> tuple[str, ...]:
-        """Names of all inverters in the messages so far, in order."""
         first = self._telemetry.inverters if self._telemetry else ()
         others = {*self._status, *self._configs}.difference(first)
         return (*first, *sorted(others, key=lambda name: (len(name), name)))
 
     @property
     def has_configs(self) -> bool:
-        """True once the configurations of all inverters in the telemetry are here."""
         return self._telemetry is None or self._configs.keys() >= set(self._telemetry.inverters)
 
     def config(self, config: AgentConfig) -> None:
@@ -191,7 +187,6 @@ class RunMonitor:
         self._events.extend(event for event in status.events if event not in self._events)
 
     def telemetry(self, message: Telemetry, now: float) -> None:
-        """Note the plant's telemetry; `now` is the client's clock (s)."""
         before = self._telemetry
         if before is not None and message.epoch != before.epoch:
             self._events.clear()

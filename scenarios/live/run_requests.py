@@ -102,7 +102,6 @@ def request(
 
 
 def plant_status(client: RunClient, wait: float = ANSWER) -> PlantStatus:
-    """Return the state of the run as the plant reports it within `wait` (s)."""
     return data_of(client, request(client, verb="status", wait=wait)[0], PlantStatus)
 
 
@@ -153,10 +152,9 @@ def free_configurations(client: RunClient, names: tuple[str, ...], wait: float =
 
 
 def configurations(client: RunClient, name: str = "", wait: float = ANSWER) -> dict[str, AgentConfig]:
-    """Return configurations of agents by name: all that came until that of `name`, or any, was there.
+    """Return configurations by name: all that came until that of `name`, or any, was there, or NobodyError.
 
     With the certificate of an agent it asks for that of `name` alone: access rules let an agent ask for no other.
-    NobodyError if it does not come within `wait` (s).
     """
     known: dict[str, AgentConfig] = {}
     credentials = client.where.credentials
@@ -308,8 +306,6 @@ def link_states(client: RunClient) -> tuple[float, dict[tuple[str, str], LinkSta
 def _request(
     client: RunClient, verb: Verb, **command_fields: Any
 ) -> tuple[Answer, _LinkReply, dict[str, LinkAcknowledgement]]:
-    """Ask about links; return the plant's answer, its data, and the receivers' acknowledgements."""
-
     def receivers(answer: Answer) -> set[str]:
         reply = data_of(client, answer, _LinkReply)
         if verb == "link":  # for itself the plant has answered

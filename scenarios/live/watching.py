@@ -157,7 +157,6 @@ class RunSubscriber:
             self._client.fetch(self._client.keys.config("*"))
 
     def take(self, seconds: float) -> list[Telemetry | AgentStatus]:
-        """Wait (s) for messages, feed them into the monitor and return them."""
         heard: list[Telemetry | AgentStatus] = []
         for key, payload, at in self._client.take(seconds):
             config = read_config(payload)
@@ -229,7 +228,6 @@ def look(client: RunClient) -> Snapshot:
 
 
 def watch(client: RunClient, console: Console, seconds: float | None) -> None:
-    """Show a run, whose agents the client meets, until the user quits, or for a time (s)."""
     monitor, subscriber = _following(client)
     end = float("inf") if seconds is None else monotonic() + seconds
     if not console.is_terminal:

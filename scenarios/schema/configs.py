@@ -157,7 +157,6 @@ def limits_of(scenario: ScenarioModel, case: str) -> tuple[PowerLimit, ...]:
 
 
 def changes_of(scenario: ScenarioModel) -> FeederChanges:
-    """Return what a scenario changes in its feeder, in SI units and per unit."""
     plant = scenario.plant
     return FeederChanges(
         f_nom=plant.f_nom_Hz,

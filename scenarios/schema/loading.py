@@ -144,7 +144,6 @@ def check_tables(
 
 
 def _malformed(file: str, text: str, reason: str) -> str:
-    """Return the problem of a text that is no TOML, with its line, which `tomllib` names in parentheses."""
     lines = text.rstrip().splitlines() or [""]
     match = re.search(r"\(at line (\d+)", reason)
     line = min(int(match[1]), len(lines)) if match else len(lines)

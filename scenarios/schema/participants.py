@@ -200,7 +200,6 @@ def check_netem(scenario: ScenarioModel, feeder: Feeder | None, problems: Proble
 
 
 def _noted(prefix: str, problems: Problems) -> set[str]:
-    """Return the paths of entries with a problem, within the table of a prefix."""
     entries = tuple(f"{prefix}{list_.key}[" for list_ in LISTS)
     return {path.removeprefix(prefix) for path in problems.paths if path.startswith(entries)}
 

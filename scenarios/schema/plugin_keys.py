@@ -72,7 +72,6 @@ def with_folders(scenario: ScenarioModel, folder: Path) -> ScenarioModel:
 
 
 def with_keys(scenario: ScenarioModel, change: Callable[[PluginKey, Registry[Any]], PluginKey]) -> ScenarioModel:
-    """Return the scenario with every key changed that names something plugged in."""
     cases = {
         name: replace(
             case,
@@ -215,7 +214,6 @@ def _check_law(path: str, key: PluginKey, problems: Problems) -> None:
 
 
 def _check(path: str, key: PluginKey, registry: Registry[Any], problems: Problems) -> Plugin | None:
-    """Note the problems of a key and of its plugin; return the plugin if there are none."""
     table = table_of(key)
     names = [(name, table.get(name, "")) for name in ("use", "folder")]
     found = [(name, "must be a text in quotes") for name, value in names if not isinstance(value, str)]
@@ -231,7 +229,6 @@ def _check(path: str, key: PluginKey, registry: Registry[Any], problems: Problem
 
 
 def _rosters(scenario: ScenarioModel, feeder: Feeder, case: str) -> Iterator[dict[str, InverterRow]]:
-    """Yield the nameplates at the start, and after each event at which agents leave or join."""
     rows = with_agent(scenario, feeder, case)
     present = {row.name for row in rows if not row.spare}
     yield {row.name: row for row in rows if row.name in present}

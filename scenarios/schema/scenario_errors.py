@@ -63,7 +63,6 @@ class Problems:
         return name not in known
 
     def add_plain(self, text: str) -> None:
-        """Note a problem that says itself where it is, as a feeder's do."""
         self._found.append((0, text))
         self.noted.append(("", text))
 
@@ -84,7 +83,6 @@ class Problems:
         return bool(self._found)
 
     def raise_if_any(self) -> None:
-        """Raise `ScenarioError` with all problems in the order of their lines."""
         if self._found:
             raise ScenarioError(text for _, text in sorted(self._found, key=lambda item: item[0]))
 
