@@ -9,8 +9,7 @@ from typing import Any
 import pytest
 
 from gridpeers.agents.session_health import SessionHealth
-from gridpeers.lab.communication.communication_checks import MessageAccount
-from gridpeers.lab.communication.communication_summary import LINKED_WITHIN, summarise
+from gridpeers.lab.communication.communication_checks import LINKED_WITHIN, MessageAccount, summarise
 from tests.record.fake_clock import fake_clock_record
 
 LOST = ("inv1", "inv2")

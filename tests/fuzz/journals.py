@@ -9,7 +9,7 @@ from typing import Any, cast
 import msgspec
 from msgspec.structs import replace
 
-from gridpeers.lab.communication.communication_summary import CommunicationSummary
+from gridpeers.lab.communication.communication_checks import CommunicationSummary
 from gridpeers.netem.ledger import LinkTrace
 from gridpeers.scenarios.emulation.link_data import report_data
 from gridpeers.scenarios.record.record_file import RecordFile, RecordMessage

@@ -9,7 +9,7 @@ import msgspec
 import pytest
 
 from gridpeers.lab.communication import record_pass
-from gridpeers.lab.communication.communication_summary import CommunicationSummary
+from gridpeers.lab.communication.communication_checks import CommunicationSummary
 from gridpeers.lab.communication.sent_states import SentState
 from gridpeers.scenarios.checks.check_verdict import NotJudgedError
 from gridpeers.scenarios.checks.checked_case import CheckedCase

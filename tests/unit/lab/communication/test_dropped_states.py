@@ -12,8 +12,7 @@ from typing import Any, cast
 
 import pytest
 
-from gridpeers.lab.communication.communication_checks import MessageAccount
-from gridpeers.lab.communication.communication_summary import summarise
+from gridpeers.lab.communication.communication_checks import MessageAccount, summarise
 from gridpeers.lab.communication.record_pass import read_content
 from gridpeers.scenarios.checks.check_verdict import NotJudgedError
 from gridpeers.scenarios.checks.checked_case import CheckedCase

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 import gridpeers as gp
-from gridpeers.lab.communication.communication_summary import CommunicationSummary
+from gridpeers.lab.communication.communication_checks import CommunicationSummary
 from gridpeers.lab.communication.record_pass import RecordContent
 from gridpeers.scenarios.checks.check_registry import chosen_checks
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict
