@@ -111,12 +111,10 @@ def happening(event: Event, scenario: ScenarioModel) -> str:
     if event.load:
         changes = {_power_in_short(change) for change in event.load.values()}
         names = f"load {next(iter(event.load))}" if len(event.load) == 1 else f"{len(event.load)} loads"
-        parts += [f"{names}: {changes.pop()}" if len(changes) == 1 else f"{names} change"]
+        parts.append(f"{names}: {changes.pop()}" if len(changes) == 1 else f"{names} change")
     return ", ".join(parts)
 
 
 def _power_in_short(change: LoadChange) -> str:
-    if change.factor is not None:
-        return f"{change.factor:g} times"
-    given = ((change.P_kW, "kW"), (change.Q_kvar, "kvar"))
+    given = ((change.factor, "times"), (change.P_kW, "kW"), (change.Q_kvar, "kvar"))
     return ", ".join(f"{value:g} {unit}" for value, unit in given if value is not None)

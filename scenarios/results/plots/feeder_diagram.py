@@ -40,18 +40,25 @@ def feeder_diagram(feeder: Feeder, V: Mapping[str, float] | None = None) -> Figu
     few = len(feeder.buses) <= MANY
     zones = _zones(feeder)
     colours = _colours(feeder, zones)
-    lines = _draw_branches(feeder, at, axes)
+    branches = list(feeder.branches())
+    lines = LineCollection([(at[a], at[b]) for a, b, _ in branches], zorder=1, capstyle="round")
+    lines.set_linewidth([(1.0 if few else 0.5) * WIDTH[phases] for *_, phases in branches])
+    axes.add_collection(lines)
+    axes.autoscale_view()
     if V is None:
-        lines.set_color([colours.get(zones[a], BESIDE) for a, _, _ in feeder.branches()])
+        lines.set_color([colours.get(zones[a], BESIDE) for a, *_ in branches])
     else:
-        lines.set_array(np.array([(V[a] + V[b]) / 2.0 for a, b, _ in feeder.branches()]))
+        lines.set_array(np.array([(V[a] + V[b]) / 2.0 for a, b, _ in branches]))
         lines.set(cmap="viridis", clim=(0.9, 1.1))
         picture.colorbar(lines, ax=axes, label="V (pu, lowest phase)", shrink=0.6)
     if few:
         for bus in feeder.load_by_bus():
             axes.plot(*at[bus], ".", color="black" if V else colours.get(zones[bus], BESIDE), ms=3.5, zorder=2)
     for switch in feeder.switches:
-        _draw_switch(switch, at, axes)
+        x, y = zip(at[switch.from_bus], at[switch.to_bus], strict=True)
+        axes.plot(x, y, color="black", lw=1.0, ls="-" if switch.closed else ":", zorder=1)
+        face = "black" if switch.closed else "white"
+        axes.plot(*_middle(switch, at), marker="s", ms=5, mfc=face, mec="black", zorder=3)
     for row in (*feeder.inverters, *feeder.spares):
         GFM = row.kind == "GFM"
         face = "white" if row.spare else BESIDE if V else colours.get(row.microgrid, BESIDE)
@@ -89,27 +96,9 @@ def _colours(feeder: Feeder, zones: Mapping[str, str]) -> dict[str, str]:
     return dict(zip(named, cycle(COLOURS), strict=False)) | dict.fromkeys(beside, BESIDE)
 
 
-def _draw_branches(feeder: Feeder, at: Places, axes: Axes) -> LineCollection:
-    thin = 0.5 if len(feeder.buses) > MANY else 1.0
-    rows = list(feeder.branches())
-    lines = LineCollection([(at[a], at[b]) for a, b, _ in rows], zorder=1, capstyle="round")
-    lines.set_linewidth([thin * WIDTH[phases] for _, _, phases in rows])
-    axes.add_collection(lines)
-    axes.autoscale_view()
-    return lines
-
-
 def _middle(switch: Switch, at: Places) -> tuple[float, float]:
     a, b = at[switch.from_bus], at[switch.to_bus]
     return (a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0
-
-
-def _draw_switch(switch: Switch, at: Places, axes: Axes) -> None:
-    """Draw a switch: black when closed, white when open."""
-    a, b = at[switch.from_bus], at[switch.to_bus]
-    axes.plot((a[0], b[0]), (a[1], b[1]), color="black", lw=1.0, ls="-" if switch.closed else ":", zorder=1)
-    face = "black" if switch.closed else "white"
-    axes.plot(*_middle(switch, at), marker="s", ms=5, mfc=face, mec="black", zorder=3)
 
 
 def _draw_labels(feeder: Feeder, at: Places, axes: Axes) -> None:

@@ -30,12 +30,9 @@ from gridpeers.scenarios.results.plots.style import (
     from_zero,
     legend_below,
     mark_events,
-    name_panel,
-    nominal_line,
     note_above,
     save,
     stacked_styles,
-    time_axis,
 )
 from gridpeers.scenarios.results.sharing_index import NO_LOAD, total_load
 from gridpeers.wire.wording import suggestion
@@ -94,9 +91,12 @@ class Page(NamedTuple):
 def _fill(axes: Axes, panel: Panel) -> None:
     for t, y, (colour, dashes, width), label in panel.curves:
         axes.plot(t, y, color=colour, linestyle=dashes, linewidth=width, label=label)
-    name_panel(axes, panel.title, panel.label)
+    axes.set_title(panel.title, loc="left")
+    axes.set_ylabel(panel.label)
+    axes.set_xlabel("time (s)")
     if panel.nominal is not None:
-        nominal_line(axes, panel.nominal)
+        axes.axhline(panel.nominal, color=BLACK, linewidth=0.6, zorder=1)
+        axes.ticklabel_format(axis="y", useOffset=False)  # numbers near it in full
     if panel.bounds is not None:
         from_zero(axes, [curve.y for curve in panel.curves], panel.bounds)
     if panel.nominal is not None and panel.lost is not None:
@@ -113,7 +113,7 @@ def _keep_in_view(axes: Axes, curves: Sequence[PanelCurve], nominal: float, most
             note_above(axes, text, 1.0, "axes fraction", "right")
 
 
-def _drawn(page: Page, drawing: Drawing) -> Figure:
+def drawn(page: Page, drawing: Drawing) -> Figure:
     figure = Figure(figsize=page.size, layout="constrained")
     columns = len(page.rows[0])
     grid = figure.subplots(len(page.rows), columns, sharex=True, sharey=page.share_y, squeeze=False)
@@ -123,7 +123,7 @@ def _drawn(page: Page, drawing: Drawing) -> Figure:
             axes.set_visible(False)
             continue
         _fill(axes, panels[place])
-        time_axis(axes, drawing)
+        axes.set_xlim(0.0, drawing.end)
         mark_events(axes, drawing, labelled=place < columns or bool(page.title))
         lowest = place + columns >= len(panels)
         axes.tick_params(labelbottom=lowest)
@@ -324,7 +324,7 @@ def comparison(pairs: Sequence[tuple[str, Mapping[str, Drawing]]]) -> Figure:
                 label = measure.island_label if name == "frequency" else measure.label
                 _fill(axes, Panel(title, label, curves, bounds=measure.bounds))
                 axes.ticklabel_format(axis="y", useOffset=False)
-                time_axis(axes, longer)
+                axes.set_xlim(0.0, longer.end)
                 mark_events(axes, replace(longer, events=list(colours)), labelled=place < 2, colours=colours)
         legend_below(figure, grid[0, 0])
     return figure
@@ -347,7 +347,7 @@ def draw(drawing: Drawing, name: str) -> Figure:
     if name not in figures:
         raise ValueError(f'there is no figure "{name}" of this run; {suggestion(name, figures, "figures")}')
     with mpl.rc_context(PAGE):
-        return _drawn(figures[name](), drawing)
+        return drawn(figures[name](), drawing)
 
 
 def draw_all(drawing: Drawing, folder: Path, number: int = 0, of: int = 1) -> tuple[Path, ...]:

@@ -96,22 +96,6 @@ def from_zero(axes: Axes, curves: Iterable[Floats], bounds: Bounds) -> None:
         )
 
 
-def time_axis(axes: Axes, drawing: Drawing) -> None:
-    axes.set_xlabel("time (s)")
-    axes.set_xlim(0.0, drawing.end)
-
-
-def name_panel(axes: Axes, title: str, label: str) -> None:
-    axes.set_title(title, loc="left")
-    axes.set_ylabel(label)
-
-
-def nominal_line(axes: Axes, value: float) -> None:
-    """Draw a fine line at a nominal value, and write numbers near it in full."""
-    axes.axhline(value, color=BLACK, linewidth=0.6, zorder=1)
-    axes.ticklabel_format(axis="y", useOffset=False)
-
-
 def legend_below(figure: Figure, axes: Axes, *, one_row: bool = False) -> None:
     """Write the legend of some axes below a figure, in as many columns as fit, without a lonely last entry."""
     handles, labels = axes.get_legend_handles_labels()
