@@ -152,14 +152,9 @@ class PowerBalance(Check):
                 for kind, part in (("real power", off.real), ("reactive power", off.imag)):
                     found, before = 100.0 * abs(part) / size if size else 0.0, worst.get((name, kind))
                     if not found <= self.tolerance_percent and (before is None or found > (before.value or 0.0)):
-                        worst[name, kind] = Violation(
-                            text=f"generation minus load and losses, {kind}, island of {name}",
-                            t=t,
-                            agent=name,
-                            value=found,
-                            unit="%",
-                            limit=self.tolerance_percent,
-                        )
+                        text = f"generation minus load and losses, {kind}, island of {name}"
+                        limit = self.tolerance_percent
+                        worst[name, kind] = Violation(text=text, t=t, agent=name, value=found, unit="%", limit=limit)
         if not judged and not worst:
             raise NotJudgedError("no recorded row has an island without the substation")
         yield from worst.values()

@@ -17,6 +17,7 @@ from gridpeers.scenarios.checks.check_verdict import (
     INTERRUPTED,
     MOST_VIOLATIONS,
     SHOWN_VIOLATIONS,
+    CheckStatus,
     CheckVerdict,
     NotJudgedError,
     Violation,
@@ -116,13 +117,8 @@ def _verdict(name: str, plugin: Plugin, case: CheckedCase) -> CheckVerdict:
         raised = printable(str(error), 300)
     except ANYTHING as error:  # a check is a user's code
         raised = f"cannot judge{' further' if violations else ''}: {named(error)}"
-    return CheckVerdict(
-        check=name,
-        status="failed" if violations or raised else "passed",
-        reason=raised,
-        violations=tuple(violations),
-        count=count,
-    )
+    status: CheckStatus = "failed" if violations or raised else "passed"
+    return CheckVerdict(check=name, status=status, reason=raised, violations=tuple(violations), count=count)
 
 
 def _checked(violation: Any) -> Violation:

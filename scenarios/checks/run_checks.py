@@ -78,14 +78,9 @@ class Rating(Check):
                 lasted = float(history.t[last] - history.t[first]) if last >= first else 0.0
                 if lasted > self.longest_s + 1e-9:
                     peak = loading[first : last + 1, i].max()
-                    yield Violation(
-                        text=f"{name} above {limit:g} pu of the rating, up to {peak:.3g} pu",
-                        t=float(history.t[first]),
-                        agent=inverter,
-                        value=lasted,
-                        unit="s",
-                        limit=self.longest_s,
-                    )
+                    text = f"{name} above {limit:g} pu of the rating, up to {peak:.3g} pu"
+                    t, most = float(history.t[first]), self.longest_s
+                    yield Violation(text=text, t=t, agent=inverter, value=lasted, unit="s", limit=most)
 
 
 def longest_stretch(holds: Flags) -> tuple[int, int]:
@@ -187,14 +182,9 @@ class Oscillation(Check):
             for y, dt in _looks(x[tail, i], step):
                 mode = next((one for one in modes(y, dt) if one.f * len(y) * dt >= 1.0), None)  # it has a whole period
                 if mode and mode.damping < self.damping_percent / 100.0 and mode.swing > limit:
-                    yield Violation(
-                        text=f"{name} swings by {mode.swing:.2g} {unit} at {mode.f:.2g} Hz, damping",
-                        t=float(t[-1]),
-                        agent=history.inverters[i],
-                        value=100.0 * mode.damping,
-                        unit="%",
-                        limit=self.damping_percent,
-                    )
+                    text = f"{name} swings by {mode.swing:.2g} {unit} at {mode.f:.2g} Hz, damping"
+                    percent, least, agent = 100.0 * mode.damping, self.damping_percent, history.inverters[i]
+                    yield Violation(text=text, t=float(t[-1]), agent=agent, value=percent, unit="%", limit=least)
                     break
 
 
