@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from functools import partial
 from itertools import combinations, product
 from typing import Any, NamedTuple
 
@@ -13,16 +13,14 @@ import numpy as np
 
 from gridpeers.scenarios.schema.scenario_errors import Problems
 from gridpeers.scenarios.sweep.paths import flatten
-from gridpeers.scenarios.sweep.sweep_model import GraphAxis, RandomAxis, ValueRange
+from gridpeers.scenarios.sweep.sweep_model import GraphAxis, RandomAxis, Sweep, ValueRange
 from gridpeers.wire.schema.table_reading import read_table
 from gridpeers.wire.schema.table_schema import fields_of, problems_of
 from gridpeers.wire.wording import suggestion
 
-Edges = tuple[tuple[int, int], ...]
-"""Pairs i < j, sorted."""
+Edges = tuple[tuple[int, int], ...]  # Pairs i < j, sorted
 
-TRIES = 200
-"""Draws per graph that is asked for, until no more different ones are expected."""
+TRIES = 200  # Draws per graph that is asked for, until no more different ones are expected
 
 
 def connected_graphs(n: int, links: int, count: int, seed: int) -> tuple[Edges, ...]:
@@ -76,8 +74,7 @@ class Setting(NamedTuple):
     """Keys of the scenario, by path."""
 
 
-@dataclass(frozen=True)
-class Axis:
+class Axis(NamedTuple):
     """Keys that vary together; its points are of use only when no problem is noted."""
 
     origin: Mapping[str, str]
@@ -100,15 +97,16 @@ def of_values(values: Mapping[str, Sequence[Any]]) -> Sequence[Setting]:
     return [Setting(row, row) for row in rows]
 
 
-def value_axis(values: Mapping[str, Sequence[Any]], table: str) -> Axis:
-    return Axis({path: f"{table}.{path}" for path in values}, lambda: of_values(values))
+def own_axes(sweep: Sweep, problems: Problems) -> list[Axis]:
+    """Return the axes of the tables [grid], [zip] and [random]."""
+    grid = [
+        Axis({path: f"grid.{path}"}, partial(of_values, {path: values}))
+        for path, values in _values_of(sweep.grid, "grid", problems).items()
+    ]
+    return [*grid, *_zip_axes(sweep.zip, problems), *_random_axes(sweep.random, problems)]
 
 
-def grid_axes(table: Mapping[str, Any], problems: Problems) -> list[Axis]:
-    return [value_axis({path: values}, "grid") for path, values in _values_of(table, "grid", problems).items()]
-
-
-def zip_axes(table: Mapping[str, Any], problems: Problems) -> list[Axis]:
+def _zip_axes(table: Mapping[str, Any], problems: Problems) -> list[Axis]:
     values = _values_of(table, "zip", problems)
     counts = {path: len(items) for path, items in values.items()}
     if len(set(counts.values())) > 1 and all(counts.values()):
@@ -116,7 +114,7 @@ def zip_axes(table: Mapping[str, Any], problems: Problems) -> list[Axis]:
         problems.add("zip", f"keys that go together need equally many values, but {listed}; for all combinations: grid")
     elif (twice := _twice(list(zip(*values.values(), strict=False)))) is not None:
         problems.add("zip", f"has {twice!r} twice, and nothing is run twice; for more seeds write seeds = n")
-    return [value_axis(values, "zip")] if values else []
+    return [Axis({path: f"zip.{path}" for path in values}, partial(of_values, values))] if values else []
 
 
 def graph_axes(axis: GraphAxis, inverters: Sequence[str], cases: Sequence[str], problems: Problems) -> list[Axis]:
@@ -182,7 +180,7 @@ def _twice(items: Sequence[Any]) -> Any:
     return None
 
 
-def is_number(value: Any) -> bool:
+def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
@@ -193,8 +191,7 @@ def _is_range(value: Any) -> bool:
 DISTRIBUTIONS = ("uniform", "loguniform", "choice")
 
 
-@dataclass(frozen=True)
-class Distribution:
+class Distribution(NamedTuple):
     name: str
     of: Sequence[Any]
     """Bounds, or the choices."""
@@ -206,18 +203,8 @@ class Distribution:
         raw = low + (high - low) * u if self.name == "uniform" else low * (high / low) ** u
         return float(f"{raw:.12g}")
 
-    def problem(self) -> str:
-        of = self.of
-        if self.name == "choice":
-            return "" if isinstance(of, list) and of else f"choice needs a list of values, got {of!r}"
-        if not (isinstance(of, list) and len(of) == 2 and all(map(is_number, of)) and of[0] < of[1]):
-            return f"{self.name} needs [low, high], two numbers in this order, got {of!r}"
-        if self.name == "loguniform" and of[0] <= 0:
-            return f"loguniform needs bounds above 0, got {of!r}; or use uniform"
-        return ""
 
-
-def random_axes(axis: RandomAxis, problems: Problems) -> list[Axis]:
+def _random_axes(axis: RandomAxis, problems: Problems) -> list[Axis]:
     keys = {path: _distribution(path, value, problems) for path, value in flatten(axis.keys, _is_distribution)}
     if keys and not axis.samples and not problems.touch("random.samples"):
         problems.add("random.samples", "no sample is drawn; write how many, e.g. samples = 100")
@@ -240,11 +227,16 @@ def draw(axis: RandomAxis, keys: Mapping[str, Distribution]) -> Sequence[Setting
 def _distribution(path: str, value: Any, problems: Problems) -> Distribution:
     """Return the distribution of a key, of use only when no problem is noted."""
     name, of = next(iter(value.items()), ("", ())) if isinstance(value, Mapping) else ("", ())
+    text = ""
     if name not in DISTRIBUTIONS or len(value) != 1:
         hint = suggestion(name, DISTRIBUTIONS, "distributions")
         text = f"must be one distribution such as {{ uniform = [0.5, 2.0] }}, got {value!r}; {hint}"
-    else:
-        text = Distribution(name, of).problem()
+    elif name == "choice":
+        text = "" if isinstance(of, list) and of else f"choice needs a list of values, got {of!r}"
+    elif not (isinstance(of, list) and len(of) == 2 and all(map(_is_number, of)) and of[0] < of[1]):
+        text = f"{name} needs [low, high], two numbers in this order, got {of!r}"
+    elif name == "loguniform" and of[0] <= 0:
+        text = f"loguniform needs bounds above 0, got {of!r}; or use uniform"
     if text:
         problems.add(f"random.keys.{path}", text)
     return Distribution(name, of)

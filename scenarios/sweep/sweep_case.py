@@ -27,9 +27,7 @@ from gridpeers.scenarios.schema.configs import as_in, configs
 from gridpeers.scenarios.schema.plugin_keys import judges_laws
 from gridpeers.wire.wording import utf8
 
-KEPT_PLANTS = 4
-"""Plants at t = 0 that a worker keeps; one is about 1 MB."""
-
+KEPT_PLANTS = 4  # Plants at t = 0 that a worker keeps; one is about 1 MB
 
 _kept = threading.local()
 """Plants of this thread, by their configuration: a worker of Dask may be a thread among others."""
@@ -94,9 +92,9 @@ def _run(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, His
     with np.errstate(all="ignore"):  # a value that is no number is None
         found = find(scenario, feeder, {case: record})
     measures: dict[str, float | None] = {}
+    own = found.own.get(case, {})
     for label in found.results[case]:
         measures |= flat(label, _indexes(found, case, label))
-    own = found.own.get(case, {})
     for label, metrics in own.items():
         measures |= flat(label, dict(metrics.values))
     if failed_check:

@@ -24,18 +24,14 @@ from gridpeers.scenarios.results.plots.style import PAGE, STYLES, save
 from gridpeers.scenarios.sweep.sweep_case import FATE
 from gridpeers.scenarios.sweep.sweep_table import INDEXES, label_of
 
-MOST_VALUES = 40
-"""A number with more values than this was drawn at random, and is grouped."""
-
-BINS = 12
-"""Groups of equally many runs that a parameter drawn at random is cut into for its median."""
+MOST_VALUES = 40  # A number with more values than this was drawn at random, and is grouped
+BINS = 12  # Groups of equally many runs that a parameter drawn at random is cut into for its median
 
 REPEATS = ("sample", "case", "seed", "graph.number", "graph.lambda_2", "graph.edges")
 """Columns that repeat a point of the sweep instead of being an axis of it; medians are taken over them."""
 
 
 def is_number(column: pd.Series) -> bool:
-    """Return True if a column holds numbers alone; truth values are none."""
     return bool(is_numeric_dtype(column) and not is_bool_dtype(column))
 
 
@@ -87,14 +83,9 @@ def spread_of(at: pd.Series, values: pd.Series) -> pd.DataFrame:
     return grouped.agg({"low": "min", "median": "median", "high": "max", "never": "sum"})
 
 
-MOST_LETTERS = 24
-"""Letters of a value at an axis: a table of faults, as JSON, is longer than the figure."""
-
-MOST_TICKS = 12
-"""Most values of a parameter that are written at an axis."""
-
-_NEVER = "#b0b0b0"
-"""Colour of the hatching of a heat map where the median never came to be."""
+MOST_LETTERS = 24  # Letters of a value at an axis: a table of faults, as JSON, is longer than the figure
+MOST_TICKS = 12  # Most values of a parameter that are written at an axis
+_NEVER = "#b0b0b0"  # Colour of the hatching of a heat map where the median never came to be
 
 
 def draw_all(frame: pd.DataFrame, folder: Path) -> tuple[Path, ...]:

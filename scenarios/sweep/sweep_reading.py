@@ -23,16 +23,7 @@ from gridpeers.scenarios.schema.loading import check_tables, find_file, read_tom
 from gridpeers.scenarios.schema.participants import inverters_of
 from gridpeers.scenarios.schema.scenario_errors import Problems
 from gridpeers.scenarios.short_texts import duration
-from gridpeers.scenarios.sweep.axes import (
-    Axis,
-    Setting,
-    graph_axes,
-    grid_axes,
-    of_values,
-    random_axes,
-    samples,
-    zip_axes,
-)
+from gridpeers.scenarios.sweep.axes import Axis, Setting, graph_axes, of_values, own_axes, samples
 from gridpeers.scenarios.sweep.paths import PathError, Tree, flatten, put, steps
 from gridpeers.scenarios.sweep.sweep_model import Sweep
 from gridpeers.wire.schema.table_schema import problems_of
@@ -161,7 +152,7 @@ def plan_of(sweep: Sweep, base: BaseScenario) -> Plan:
 def _own_axes(sweep: Sweep, problems: Problems) -> list[Axis]:
     for problem in problems_of(sweep):
         problems.add(*problem)
-    axes = [*grid_axes(sweep.grid, problems), *zip_axes(sweep.zip, problems), *random_axes(sweep.random, problems)]
+    axes = own_axes(sweep, problems)
     if not (axes or sweep.graph.links or sweep.seeds > 1):
         problems.add("", "nothing is varied; write a table [grid], [zip], [random] or [graph], or seeds = n")
     return axes
@@ -211,14 +202,8 @@ def _plan(sweep: Sweep, text: str, axes: Sequence[Axis], base: BaseScenario, pro
         whole.update(msgspec.json.encode((run.sample, run.case, run.scenario, dict(run.shown))))
     for feeder in sorted(map(repr, feeders)):
         whole.update(feeder.encode())
-    return Plan(
-        name=sweep.name,
-        title=sweep.title,
-        text=text,
-        base=scenario,
-        runs=tuple(runs),
-        fingerprint=whole.hexdigest(),
-    )
+    name, title, mark = sweep.name, sweep.title, whole.hexdigest()
+    return Plan(name=name, title=title, text=text, base=scenario, runs=tuple(runs), fingerprint=mark)
 
 
 def _origins(axes: Sequence[Axis], problems: Problems) -> dict[str, str]:
