@@ -196,7 +196,7 @@ def claim_of(plugin: Plugin) -> Claim:
 
 
 def judged(findings: Findings, plugins: Sequence[Plugin]) -> tuple[Verdict, ...]:
-    """Return the verdicts on a scenario's own claims; one that raises does not hold, and its verdict says why."""
+    """Return the verdicts on a scenario's own claims."""
     verdicts: list[Verdict] = []
     for plugin in plugins:
         try:

@@ -56,7 +56,6 @@ class Findings:
         return {"": self.results[case][event]} | islands
 
     def value(self, cell: Published) -> float:
-        """Return our number at the place of one of the paper's."""
         return float(getattr(self._steady(cell), cell.quantity))
 
     def reason(self, cell: Published) -> str:

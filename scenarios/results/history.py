@@ -46,7 +46,6 @@ class Nameplates:
             object.__setattr__(self, "shares", np.ones(len(self.names), bool))
 
     def without(self, names: Collection[str]) -> Nameplates:
-        """Return the same with some inverters left out of the sharing indices."""
         return replace(self, shares=np.array([name not in names for name in self.names], bool)) if names else self
 
     @classmethod
@@ -75,20 +74,18 @@ UNITS = {"t": "s", "f": "Hz", "P": "W", "Q": "var", "V": "V", "P_set": "W", "V_s
 
 @dataclass(frozen=True, kw_only=True)
 class History:
-    """One case: T rows of N inverters, terminal quantities as the plant reported them."""
+    """One case: T rows of N inverters, terminal quantities as the plant reported them, in `UNITS`.
+
+    Time has the shape (T,), all else (T, N).
+    """
 
     inverters: tuple[str, ...]
     """Names, order of the columns."""
     t: Floats
-    """Time (s), shape (T,)."""
     f: Floats
-    """Frequency (Hz), shape (T, N), as all below."""
     P: Floats
-    """Real power (W)."""
     Q: Floats
-    """Reactive power (var)."""
     V: Floats
-    """Terminal voltage (V)."""
     P_set: Floats
     V_set: Floats
 
@@ -150,7 +147,6 @@ def read_history(path: Path) -> History:
 
 
 def history_of(recorded: Recorded) -> History:
-    """Return the arrays of a recorded case, from memory or from its file."""
     return History.of(recorded.inverters, recorded.rows) if recorded.file is None else read_history(recorded.file)
 
 
@@ -175,7 +171,6 @@ class Window:
         return rows
 
     def cut(self, history: History) -> History:
-        """Return the rows of a history that are of this window."""
         return history.rows(self.rows(history.t))
 
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 Quantity = Literal["f_error_Hz", "MPSI", "V_error", "MQSI"]  # A column of the tables, named as in metrics.json
 Measure = Quantity | Literal["p"]  # A steady value: a quantity of the tables, or the powers of the inverters
 
-UNITS: dict[Measure, str] = {"f_error_Hz": " Hz", "MPSI": "", "V_error": " pu", "MQSI": "", "p": " pu"}
+UNITS: dict[str, str] = {"f_error_Hz": " Hz", "MPSI": "", "V_error": " pu", "MQSI": "", "p": " pu"}
 """Unit as it follows a number."""
 
 DIGITS: dict[Measure, int] = {"f_error_Hz": 2, "MPSI": 2, "V_error": 3, "MQSI": 2, "p": 2}

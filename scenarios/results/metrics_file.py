@@ -13,13 +13,14 @@ from typing import TYPE_CHECKING, Any, Literal
 import msgspec
 
 from gridpeers.plant.equipment import Feeder
-from gridpeers.scenarios.results.metric import UNITS, Measure
+from gridpeers.scenarios.results.metric import UNITS
 from gridpeers.scenarios.results.record import Recorded
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.wire.messages import Pacing
 
 if TYPE_CHECKING:
     from gridpeers.scenarios.results.findings import Findings
+    from gridpeers.scenarios.results.metrics import Steady
 
 Clock = Literal["simulated", "wall"]  # Lock-step of plant and agents, or real time
 
@@ -57,7 +58,7 @@ def metrics_json(
 
     cases: dict[str, dict[str, Any]] = {}
     for case, steady in findings.results.items():
-        cases[case] = {label: _numbers(asdict(values)) for label, values in steady.items()}
+        cases[case] = {label: _numbers(values) for label, values in steady.items()}
         for label, share in findings.messages_saved.get(case, {}).items():
             cases[case][label]["messages_saved"] = share
         for label, islands in findings.islands.get(case, {}).items():
@@ -65,7 +66,7 @@ def metrics_json(
             whole |= dict.fromkeys(SHARING_OF_ISLANDS)
             for name in SHARING_OF_ISLANDS:
                 whole.get("reasons", {}).pop(name, None)
-            whole["islands"] = {name: _numbers(asdict(values)) for name, values in islands.items()}
+            whole["islands"] = {name: _numbers(values) for name, values in islands.items()}
         for label, measured in findings.own.get(case, {}).items():
             cases[case][label] |= measured.values
             if measured.reasons:
@@ -80,15 +81,14 @@ def metrics_json(
     return json.dumps(text, indent=2, allow_nan=False) + "\n"
 
 
-def _numbers(steady: dict[str, Any]) -> dict[str, Any]:
+def _numbers(steady: Steady) -> dict[str, Any]:
     """Return the measures; one that is no number, or not steady, is None. Reasons name the mean of the last 0.2 s."""
-    reasons: Mapping[Measure, str] = steady["reasons"]
-    finite = {name: x for name, x in steady.items() if isinstance(x, float) and math.isfinite(x)}
-    numbers: dict[str, Any] = {
-        name: None if name in reasons else finite.get(name) for name in steady if name not in ("p", "reasons")
-    }
-    texts = {
-        name: text + (f"; last mean {finite[name]:.4g}{UNITS[name]}" if name in finite else "")
-        for name, text in reasons.items()
-    }
-    return numbers | ({"reasons": texts} if texts else {})
+    numbers: dict[str, Any] = {}
+    reasons = dict[str, str]()
+    for name, value in asdict(steady).items():
+        finite = isinstance(value, float) and math.isfinite(value)
+        if name in steady.reasons:
+            reasons[name] = steady.reasons[name] + (f"; last mean {value:.4g}{UNITS[name]}" if finite else "")
+        if name not in ("p", "reasons"):
+            numbers[name] = value if finite and name not in steady.reasons else None
+    return numbers | ({"reasons": reasons} if reasons else {})
