@@ -9,20 +9,21 @@ from itertools import pairwise
 
 import msgspec
 
-from gridpeers.bridges.helics.federate import HelicsError, HelicsFederate
-from gridpeers.bridges.helics.helics_simulator import settings_of
-from gridpeers.bridges.helics.topics import (
+from gridpeers.bridges.helics.federate import (
     ACT,
     HELD,
     SENSORS,
     SET_POINTS,
     WHERE,
+    HelicsError,
+    HelicsFederate,
     Topic,
     Value,
     events,
     number,
     topics,
 )
+from gridpeers.bridges.helics.helics_simulator import settings_of
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_interface import PlantLike, Reading, RecordedPlant, SimulatedPlant

@@ -14,10 +14,18 @@ import pytest
 
 import gridpeers
 from gridpeers import Result, Scenario
-from gridpeers.bridges.helics.federate import HelicsError, HelicsFederate
+from gridpeers.bridges.helics.federate import (
+    ACT,
+    HELD,
+    SENSORS,
+    SET_POINTS,
+    HelicsError,
+    HelicsFederate,
+    events,
+    topics,
+)
 from gridpeers.bridges.helics.helics_plant import BridgedPlant
 from gridpeers.bridges.helics.helics_simulator import HelicsSettings
-from gridpeers.bridges.helics.topics import ACT, HELD, SENSORS, SET_POINTS, events, topics
 from gridpeers.plant.plant_config import PlantConfig, PlantSettings
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
 from gridpeers.scenarios.run_request import BrokenRunError
