@@ -17,12 +17,14 @@ from gridpeers.netem.schema.netem import Netem
 from gridpeers.scenarios.emulation.link_data import EVERYTHING, EmulationConfig, LinkCommand
 from gridpeers.scenarios.live.run_address import ENDPOINT, RUN, RunAddress
 from gridpeers.scenarios.schema import load_scenario
-from gridpeers.viewer.live_pages import OwnAgents
+from gridpeers.viewer.live_pages import OwnAgents, looks_only
 from gridpeers.viewer.page_actions import ActionClient, ActionKind, PageAction, scenario_form
 from gridpeers.wire.codec import decode, encode
 from gridpeers.wire.driver.command_line import command_line
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import Answer, AnyMessage, Command, LoadSetting, Pacing
+from gridpeers.wire.trust.key_folder import open_credentials
+from gridpeers.wire.trust.site_authority import make_site
 from tests.command_line import invoke
 from tests.scenario_files import written
 from tests.toy.toy_configs import agent_config
@@ -233,3 +235,17 @@ def test_a_fault_of_the_page_is_one_of_a_scenario(kind: Any, value: float, tmp_p
     (fault,) = scenario.netem.links
     assert (fault.on, set(fault.models())) == (BOTH, {kind})
     assert scenario_form(PageAction(kind="heal", subject="inv1", other="inv4")) == ""
+
+
+def test_a_page_that_only_looks_names_what_would_let_the_same_person_act(elsewhere: Path) -> None:
+    """An operator needs --control; a viewer another certificate, by name if its key is in the folder."""
+    pytest.importorskip("cryptography", reason="certificates need the extra keys")
+    make_site(Path("lab"))
+    operator = open_credentials(Path("lab"), ("operator",))[0]
+    viewer = open_credentials(Path("lab"), ("viewer",))[0]
+    said = "the page only looks, as viewer has the role viewer "
+
+    assert looks_only(operator) == "the page only looks (--control lets it act)"
+    assert looks_only(viewer) == f"{said}(--as operator --control lets it act)"
+    (elsewhere / "lab" / "operator.key").unlink()
+    assert looks_only(viewer) == f"{said}(to act takes --control and the key of an operator)"
