@@ -5,10 +5,8 @@ Exit statuses: see `gridpeers.wire.driver.process`.
 
 from __future__ import annotations
 
-import sys
-
 from gridpeers.agents.agent_process import AgentProcess, run_agents
 from gridpeers.wire.driver.process import main
 
 if __name__ == "__main__":
-    sys.exit(main("gridpeers.agents", "the agents of one inverter or several", AgentProcess, run_agents))
+    main("gridpeers.agents", "the agents of one inverter or several", AgentProcess, run_agents)

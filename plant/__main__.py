@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import sys
-
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_process import run_plant
 from gridpeers.wire.driver.process import main
 
 if __name__ == "__main__":
-    sys.exit(main("gridpeers.plant", "the feeder and its inverters", PlantConfig, run_plant))
+    main("gridpeers.plant", "the feeder and its inverters", PlantConfig, run_plant)

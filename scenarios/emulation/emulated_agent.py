@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-
 from gridpeers.agents.agent_process import AgentProcess, run_agents
 from gridpeers.scenarios.emulation.emulated_links import links_of
 from gridpeers.wire.driver.process import main
@@ -14,11 +12,9 @@ def run(process: AgentProcess) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(
-        main(
-            "gridpeers.scenarios.emulation.emulated_agent",
-            "the agents of one inverter or several behind emulated links",
-            AgentProcess,
-            run,
-        )
+    main(
+        "gridpeers.scenarios.emulation.emulated_agent",
+        "the agents of one inverter or several behind emulated links",
+        AgentProcess,
+        run,
     )

@@ -6,8 +6,6 @@ process, like ``python -m gridpeers.plant``. From t = 0.1 s on it is an island.
 
 from __future__ import annotations
 
-import sys
-
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_interface import Reading, RecordedPlant
 from gridpeers.plant.plant_process import run_plant
@@ -118,4 +116,4 @@ class ToyPlant(RecordedPlant):
 
 
 if __name__ == "__main__":
-    sys.exit(main("toy_plant", "a toy", PlantConfig, lambda config: run_plant(config, ToyPlant, links_of)))
+    main("toy_plant", "a toy", PlantConfig, lambda config: run_plant(config, ToyPlant, links_of))

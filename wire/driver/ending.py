@@ -12,7 +12,6 @@ detects the loss, below all buffers, for print, logging and rich alike. There ar
 from __future__ import annotations
 
 import atexit
-import gc
 import io
 import os
 import signal
@@ -23,7 +22,7 @@ from contextlib import contextmanager
 from math import inf
 from time import monotonic
 from types import FrameType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
@@ -162,20 +161,8 @@ def _flush() -> None:
             stream.flush()
 
 
-GRACE = 1.0
-"""Time (s) for threads to end by themselves that would keep a process."""
-
-
-def leave(status: int, tell: Callable[[str], None]) -> None:
-    """Return if no thread keeps the process alive, for Python to end; else end the process."""
-    gc.freeze()  # Python would seek garbage twice at its end: 0.2 s of a command, and 20 ms of each agent
-    deadline = monotonic() + GRACE
-    own = (threading.main_thread(), threading.current_thread())
-    left = [thread for thread in threading.enumerate() if not thread.daemon and thread not in own]
-    for thread in left:
-        thread.join(max(0.0, deadline - monotonic()))
-    if still := [thread.name for thread in left if thread.is_alive()]:
-        tell(f"ended although threads still ran that were started in it: {', '.join(still)}; make them daemons")
-        atexit._run_exitfuncs()  # noqa: SLF001  Python would do this once they had ended
-        _flush()
-        os._exit(status)
+def leave(status: int) -> NoReturn:
+    """End the process at once: neither a thread that a law has left nor the collection of garbage holds it up."""
+    atexit._run_exitfuncs()  # noqa: SLF001  Python would do this once all threads had ended
+    _flush()
+    os._exit(status)

@@ -15,7 +15,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from types import UnionType
-from typing import Any, TypeVar, get_args
+from typing import Any, NoReturn, TypeVar, get_args
 
 import msgspec
 
@@ -70,11 +70,9 @@ def no_links(name: str, tree: Mapping[str, Any]) -> None:
         )
 
 
-def main(module: str, what: str, config_type: type[C] | UnionType, run: Callable[[C], str]) -> int:
-    """Read the configuration, run, and return the exit status; `run` returns why the run broke, or an empty text."""
-    status = _main(module, what, config_type, run) + (IN_ORDER if LEASH in sys.argv[1:2] else 0)
-    leave(status, logging.getLogger(module).warning)
-    return status
+def main(module: str, what: str, config_type: type[C] | UnionType, run: Callable[[C], str]) -> NoReturn:
+    """Read the configuration, run, and end the process; `run` returns why the run broke, or an empty text."""
+    leave(_main(module, what, config_type, run) + (IN_ORDER if LEASH in sys.argv[1:2] else 0))
 
 
 def _main(module: str, what: str, config_type: type[C] | UnionType, run: Callable[[C], str]) -> int:
