@@ -41,32 +41,27 @@ class FiniteTime(Law):
     alpha: Annotated[float, Range(0, 1e3), "Weight of a leader's voltage error beside that of one neighbour."] = 1.0
 
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
-        y, count = own.m_p * own.P_set, max(1, len(neighbours))
-        change = sum(
-            other.weight * self._move(other.m_p * other.P_set - y, T * self.c_P, 0.5 / count) for other in neighbours
-        )
-        V_change = sum(
-            other.weight * self._move(other.m_q * other.Q - own.z, T * self.c_V, 0.5 / count) for other in neighbours
-        )
+        P_moves, V_moves = self._moves(own, neighbours, T)
+        change, V_change = sum(P_moves), sum(V_moves)
         if own.leader:
             change += self._move(-own.e, T * self.c_P, 1.0)
             V_change += self._move(1.0 - own.V, T * self.c_V * self.alpha, 0.5)
-        return SetPoints((y + change) / own.m_p, own.V_set + V_change)
+        return SetPoints((own.m_p * own.P_set + change) / own.m_p, own.V_set + V_change)
 
     def terms(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> Terms:
-        y, most = own.m_p * own.P_set, 0.5 / max(1, len(neighbours))
-        P = [
-            Term("consensus", n.weight * self._move(n.m_p * n.P_set - y, T * self.c_P, most) / own.m_p, n.name)
-            for n in neighbours
-        ]
-        V = [
-            Term("var sharing", n.weight * self._move(n.m_q * n.Q - own.z, T * self.c_V, most), n.name)
-            for n in neighbours
-        ]
+        P_moves, V_moves = self._moves(own, neighbours, T)
+        P = [Term("consensus", move / own.m_p, n.name) for move, n in zip(P_moves, neighbours, strict=True)]
+        V = [Term("var sharing", move, n.name) for move, n in zip(V_moves, neighbours, strict=True)]
         if own.leader:
             P.append(Term("frequency error", self._move(-own.e, T * self.c_P, 1.0) / own.m_p))
             V.append(Term("voltage error", self._move(1.0 - own.V, T * self.c_V * self.alpha, 0.5)))
         return Terms(tuple(P), tuple(V))
+
+    def _moves(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> tuple[list[float], list[float]]:
+        """Return the moves of m_p P_set and of V_set towards each neighbour (pu)."""
+        y, most = own.m_p * own.P_set, 0.5 / max(1, len(neighbours))
+        P = [n.weight * self._move(n.m_p * n.P_set - y, T * self.c_P, most) for n in neighbours]
+        return P, [n.weight * self._move(n.m_q * n.Q - own.z, T * self.c_V, most) for n in neighbours]
 
     def _move(self, difference: float, gain: float, most: float) -> float:
         """Return gain sig(difference)^gamma, at most a part of the difference."""
