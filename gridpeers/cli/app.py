@@ -28,7 +28,8 @@ def main() -> None:
         _tell(not_importable(error))
         sys.exit(2)
     except SystemExit as end:
-        leave(end.code if isinstance(end.code, int) else int(end.code is not None), _tell)
+        if isinstance(end.code, int | None):
+            leave(end.code or 0)
         raise
 
 
