@@ -6,7 +6,7 @@ import secrets
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from math import inf, isfinite
+from math import inf
 from time import monotonic
 from typing import Any, Literal, TypeVar
 
@@ -28,7 +28,7 @@ from gridpeers.scenarios.short_texts import aligned, in_order
 from gridpeers.wire.codec import decode_foreign, encode
 from gridpeers.wire.driver.command_line import command_line
 from gridpeers.wire.messages import MOST_COUNT, PLANT, Answer, Command, LinkAcknowledgement, LoadSetting
-from gridpeers.wire.schema.table_schema import Problem
+from gridpeers.wire.schema.table_schema import Problem, Range
 from gridpeers.wire.wording import printable
 
 T = TypeVar("T")
@@ -201,8 +201,8 @@ def own_code(config: AgentConfig) -> Iterator[str]:
             yield from (f"the link fault {plugin.use}" for plugin in fault.own if ":" in plugin.use)
 
 
-MOST = 1e8
-"""Largest number (kW or kvar) that is sent; the plant knows the plausible ones."""
+POWER = Range(-1e8, 1e8)
+"""Powers (kW or kvar) that are sent; the plant knows the plausible ones."""
 
 
 def load_setting(factor: float | None, P_kW: float | None, Q_kvar: float | None) -> LoadSetting:
@@ -210,11 +210,9 @@ def load_setting(factor: float | None, P_kW: float | None, Q_kvar: float | None)
 
     UsageError if nothing is given, too much, or no number.
     """
-    for option, value in (("--factor", factor), ("--P", P_kW), ("--Q", Q_kvar)):
-        if value is not None and not (isfinite(value) and abs(value) <= MOST):
-            raise UsageError(f"{option}: must be a finite number, at most {MOST:g}, got {value:g}")
-    if factor is not None and (objection := FACTOR.objection(factor)):
-        raise UsageError(f"--factor: {objection}")
+    for option, value, allowed in (("--factor", factor, FACTOR), ("--P", P_kW, POWER), ("--Q", Q_kvar, POWER)):
+        if value is not None and (objection := allowed.objection(value)):
+            raise UsageError(f"{option}: {objection}")
     if factor is not None and (P_kW is not None or Q_kvar is not None):
         raise UsageError("--factor: goes with neither --P nor --Q; give the factor, or the power")
     if factor is None and P_kW is None and Q_kvar is None:

@@ -48,7 +48,7 @@ pytestmark = pytest.mark.usefixtures("elsewhere")
             "--factor: a factor on a load must not be negative, got -1; 0 to 10",
         ),
         (["load", "48", "--factor", "150"], "--factor: 150 is not plausible for a factor on a load (0 to 10)"),
-        (["load", "48", "--Q", "nan"], "--Q: must be a finite number, at most 1e+08, got nan"),
+        (["load", "48", "--Q", "nan"], "--Q: must be a finite number, got nan"),
     ],
 )
 def test_what_cannot_be_used_is_told_before_anything_starts(elsewhere: Path, words: list[str], said: str) -> None:
