@@ -18,8 +18,7 @@ from gridpeers.wire.trust.key_folder import tls_refusal
 REMINDER = 2.0
 """Time (s) after which a wait is reported again, then after twice as long, and so on."""
 
-FIRST_LOOK, RENEWAL = 1.0, 2.0
-"""Time (s) until the session is checked first, and between two checks: a link takes some 50 ms, or more under load."""
+FIRST_LOOK, RENEWAL = 1.0, 2.0  # Time (s) until the session is checked first, and between two checks
 
 
 class NobodyError(ValueError):

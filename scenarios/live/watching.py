@@ -196,10 +196,7 @@ class RunSubscriber:
             self.take(left)
 
     def _renew(self, now: float) -> None:
-        """Open a new session if a process that takes part has been silent for too long, or this host has moved.
-
-        A process takes part if its token is there, or if an agent that is heard uses it.
-        """
+        """Open a new session if a process, whose token is there or that an agent uses, is silent for too long."""
         heard = {name for name, at in self._heard_at.items() if now - at <= SILENT}
         there = {*([PLANT] if self._client.plant else []), *self._client.present}
         there.update(*(self._used.get(name, ()) for name in heard))
