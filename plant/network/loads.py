@@ -67,16 +67,8 @@ class LoadBranches:
         """Admittances (S) that the loads with limits have at nominal voltage, between the n nodes."""
         at, rows = self.law.limited_at, self.law.law
         y = (rows[:, 0] - 1j * rows[:, 1]) / rows[:, 2] ** 2
-        first, to = self.n_from[at], self.n_to[at]
-        between = to >= 0
-        entries = [
-            (first, first, self.a_from[at] ** 2 * y),
-            (to[between], to[between], (self.a_to[at] ** 2 * y)[between]),
-            (first[between], to[between], -(self.a_from[at] * self.a_to[at] * y)[between]),
-            (to[between], first[between], -(self.a_from[at] * self.a_to[at] * y)[between]),
-        ]
-        row, column, value = (np.concatenate([entry[k] for entry in entries]) for k in range(3))
-        return sp.csc_array((value, (row, column)), shape=(n, n))
+        C = self.incidence(n)[:, at]
+        return sp.csc_array(C @ sp.diags_array(y) @ C.T)
 
     def voltages(self, V: Complex) -> Complex:
         return np.asarray(self.a_from * V[self.n_from] - self.a_to * V[self.n_to], dtype=np.complex128)
