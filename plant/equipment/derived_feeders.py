@@ -10,8 +10,7 @@ from msgspec.structs import replace
 
 from gridpeers.plant.equipment import Feeder, InverterRow, Switch
 from gridpeers.plant.equipment.imported_equipment import LinearElement
-from gridpeers.plant.equipment.inverter_parameters import OwnParameters
-from gridpeers.plant.plant_config import FeederChanges
+from gridpeers.plant.plant_config import FeederChanges, InverterChange
 from gridpeers.wire.messages import MOST_INVERTERS
 
 
@@ -38,15 +37,10 @@ def changed(feeder: Feeder, changes: FeederChanges) -> Feeder:
 
 
 def _inverter(row: InverterRow, changes: FeederChanges) -> InverterRow:
-    own = changes.inverters.get(row.name)
-    return replace(
-        row,
-        m_p=row.m_p * changes.m_p_factor if own is None or own.m_p is None else own.m_p,
-        m_q=row.m_q * changes.m_q_factor if own is None or own.m_q is None else own.m_q,
-        P_rated=row.P_rated if own is None or own.P_rated is None else own.P_rated,
-        parameters=row.parameters if own is None or own.parameters is None else own.parameters,
-        own=OwnParameters() if own is None else own.own,
-    )
+    change = changes.inverters.get(row.name, InverterChange())
+    values = {"m_p": row.m_p * changes.m_p_factor, "m_q": row.m_q * changes.m_q_factor, "own": change.own}
+    given = {name: getattr(change, name) for name in ("m_p", "m_q", "P_rated", "parameters")}
+    return replace(row, **values | {name: value for name, value in given.items() if value is not None})
 
 
 def _at_frequency(feeder: Feeder, f_nom: float) -> Feeder:
