@@ -89,16 +89,11 @@ class LiveNetwork:
         V_b, theta, V = self.V_branch[branches], units.theta(), units.V.copy()
         still = np.ones(self.reduction.count, complex)
         scale = float(units.V_b.max())
-        for attempt in range(4):
-            self.net = self.reduction.linearise(V_b, self.source_voltage, theta)
-            m = V_b.size
-            x = np.concatenate([V_b.real, V_b.imag])
-            I_b = np.empty(m, complex)
-            status = solve_network(self.net, units.J, still, x, I_b, units.V, TOLERANCE * scale)
-            if status >= 0:
-                V_b = x[:m] + 1j * x[m:]
-                break
-            V_b = self.circuit.V_branch[branches] * (1.0 - 0.1 * attempt) * np.exp(1j * self._island_angle()[branches])
+        self.net = self.reduction.linearise(V_b, self.source_voltage, theta)
+        m = V_b.size
+        x, I_b = np.concatenate([V_b.real, V_b.imag]), np.empty(m, complex)
+        if solve_network(self.net, units.J, still, x, I_b, units.V, TOLERANCE * scale) >= 0:
+            V_b = x[:m] + 1j * x[m:]
         else:
             units.V[:] = V
             V_b = self._solve_islands(self.V_branch[branches])
