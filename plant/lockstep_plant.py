@@ -177,7 +177,6 @@ class LockstepPlant(PlantNode):
         self._gather(now)
 
     def _ask_again(self, now: float) -> None:
-        """Ask again for nameplates or `Ready` that have not come; keep agents that wait informed."""
         self._ask_at = now + AGAIN
         if self.phase == "preparing":
             self._publish_aside(self.keys.control, self._prepare_bytes)
@@ -287,7 +286,6 @@ class LockstepPlant(PlantNode):
         self._publish(self.keys.control, self._prepare_bytes)
 
     def _let_leave_and_join(self, now: float) -> None:
-        """Perform the scheduled leaves and deaths of this tick, and start to wait for its newcomers."""
         leave, join, die = self._schedule.pop(self.tick, TickActions())
         when = f"at t = {self.t:g} s, as the scenario says"
         for name in leave:

@@ -55,8 +55,6 @@ IDLE = "; its agent is idle, its inverter stays on primary droop"  # end of the 
 
 
 class PlantNode(Node):
-    """The plant as a participant of a run."""
-
     def __init__(self, config: PlantConfig, plant: PlantLike, links: Links | None) -> None:
         super().__init__(PLANT, config.run)
         for name in config.agents:

@@ -66,8 +66,6 @@ its own, a millisecond or two in which the plant does not step."""
 
 
 class RealtimePlant(PlantNode):
-    """The plant under real time; parameters as of `PlantNode`."""
-
     def __init__(self, config: PlantConfig, plant: LivePlant, links: Links | None = None) -> None:
         if not config.speed > 0.0:
             raise ValueError(f"speed: must be positive, got {config.speed:g} s/s; 1 is real time")
@@ -289,7 +287,6 @@ class RealtimePlant(PlantNode):
         self._operate(lambda: self.plant.connect(name, on), now)
 
     def _let_leave_and_join(self) -> None:
-        """Ask the agents that leave at this tick by the scenario to do so, and report those that are to be started."""
         leave, join, _ = self._schedule.pop(self.tick, TickActions())  # in real time an agent dies as a process
         for name in leave:
             if instance := self.members.instance(name):

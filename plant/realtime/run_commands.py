@@ -22,8 +22,6 @@ AGAIN = 1.0  # time (s, wall) after which a command that was not acknowledged is
 
 
 class LinkCommandSender:
-    """Has the links to the plant, `links`, and those to all agents carry out commands."""
-
     def __init__(self, epoch: int, keys: Keys, links: Links | None, publish: Callable[[str, bytes], None]) -> None:
         self._epoch, self._keys, self._links, self._publish = epoch, keys, links, publish
         self._given: list[LinkRequest] = []

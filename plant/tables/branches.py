@@ -140,7 +140,6 @@ def read_line_configs(buses: BusTable) -> dict[str, LineConfig] | None:
 
 
 def read_lines(buses: BusTable, configs: dict[str, LineConfig] | None) -> tuple[Line, ...]:
-    """Read lines.csv; lengths in m."""
     lines: dict[str, Line] = {}
     for row in buses.table("lines.csv", columns.LineColumns, required=not buses.imported):
         it, name, config, phases = row.columns, row.columns.line, row.columns.config, row.columns.phases
@@ -176,7 +175,6 @@ def read_switches(buses: BusTable) -> tuple[Switch, ...]:
 
 
 def read_regulators(buses: BusTable) -> tuple[Regulator, ...]:
-    """Read regulators.csv; one row for all phases on the same tap."""
     regulators: list[Regulator] = []
     seen: set[tuple[str, str]] = set()
     for row in buses.table("regulators.csv", columns.RegulatorColumns):
@@ -220,7 +218,6 @@ def read_transformers(buses: BusTable) -> tuple[Transformer, ...]:
 
 
 def read_elements(buses: BusTable) -> tuple[LinearElement, ...]:
-    """Read elements.csv, of a feeder that comes from another program."""
     elements: dict[str, LinearElement] = {}
     for row in buses.table("elements.csv", columns.ElementColumns):
         it = row.columns

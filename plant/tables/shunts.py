@@ -31,7 +31,6 @@ TAKEN = {
 
 
 def read_loads(buses: BusTable, file: str, *, required: bool = True) -> tuple[Load, ...]:
-    """Read a load set: powers at nominal voltage, per phase (Y) or per pair of phases (D)."""
     loads: list[Load] = []
     for row in buses.table(file, columns.LoadColumns, required=required):
         it, bus = row.columns, buses.find(row)
@@ -55,7 +54,6 @@ def read_loads(buses: BusTable, file: str, *, required: bool = True) -> tuple[Lo
 
 
 def read_load_parts(buses: BusTable, file: str) -> tuple[LoadPart, ...]:
-    """Read load_parts_SET.csv: the parts of loads, between two phases of a bus, or a phase and ground."""
     parts: list[LoadPart] = []
     for row in buses.table(file, columns.LoadPartColumns):
         it, bus = row.columns, buses.find(row)
@@ -231,7 +229,6 @@ def _rating(bus: Bus, phases: str, load: float) -> Plausible:
 
 
 def _require_name(row: CsvRow[Any], name: str) -> None:
-    """Note a problem if an inverter's name cannot be a part of a key, or already means something else there."""
     try:
         check_name("name", name)
     except ValueError:
@@ -245,7 +242,6 @@ def _require_name(row: CsvRow[Any], name: str) -> None:
 
 
 def read_source(buses: BusTable) -> Source | None:
-    """Read source.csv: the substation, at most one."""
     found: Source | None = None
     for row in buses.table("source.csv", columns.SourceColumns):
         bus = buses.find(row)

@@ -40,7 +40,6 @@ def write_feeder(feeder: Feeder, folder: Path) -> None:
 
 
 def _tables(feeder: Feeder) -> Iterator[tuple[str, list[Row]]]:
-    """Yield the file and the rows of each table that the feeder has."""
     kV = sqrt(3.0) / 1e3
     yield "buses.csv", [(it.name, it.phases, it.V_nom * kV, it.zone, it.x, it.y) for it in feeder.buses]
     if feeder.elements or not feeder.lines:
