@@ -200,21 +200,12 @@ class Network:
         return self._assemble(parts)
 
     def _impedance_loads(self) -> sp.csc_array:
-        branches = self._load_branches([load.model == "Z" for load in self.feeder.loads])
-        parts = []
         # A Z load comes out of _load_branches with its nominal power in S, as a constant-power load would.
-        for n_from, n_to, S, V in zip(branches.n_from, branches.n_to, branches.law.S, branches.V_nom, strict=True):
-            y = S.conjugate() / V**2
-            if n_to < 0:
-                parts.append(([int(n_from)], np.array([[y]])))
-            else:
-                parts.append(([int(n_from), int(n_to)], np.array([[y, -y], [-y, y]])))
-        for part in self.feeder.load_parts:
-            if part.is_impedance:
-                nodes = [self.index(part.bus, phase) for phase in part.ends if phase]
-                y = part.S.conjugate() / part.V_nom**2
-                parts.append((nodes, np.array([[y, -y], [-y, y]])[: len(nodes), : len(nodes)]))
-        return self._assemble(parts)
+        branches = self._load_branches([load.model == "Z" for load in self.feeder.loads])
+        C = branches.incidence(len(self.nodes))
+        Y = sp.csc_array(C @ sp.diags_array(np.conj(branches.law.S) / branches.V_nom**2) @ C.T)
+        parts = [part for part in self.feeder.load_parts if part.is_impedance]
+        return Y + self._load_part_branches(parts).nominal_admittance(len(self.nodes)) if parts else Y
 
     def _load_part_branches(self, parts: list[LoadPart]) -> LoadBranches:
         first = np.array([self.index(part.bus, part.ends[0]) for part in parts], np.int64)
