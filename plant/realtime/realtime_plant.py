@@ -21,9 +21,10 @@ from typing import Literal
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_interface import LivePlant
 from gridpeers.plant.plant_node import CLOSING, STAYS, PlantNode, TickActions
+from gridpeers.plant.realtime import run_commands
 from gridpeers.plant.realtime.pacer import RealTimePacer
 from gridpeers.plant.realtime.recorder_feed import KEPT_BYTES, KEPT_BYTES_RECORDED, RecorderFeed
-from gridpeers.plant.realtime.run_commands import LinkCommandSender, RunCommands
+from gridpeers.plant.realtime.run_commands import LinkCommandSender
 from gridpeers.plant.realtime.silence_detector import SilenceDetector
 from gridpeers.plant.telemetry_reporter import measurement_of
 from gridpeers.wire.codec import RejectedError, encode
@@ -89,7 +90,6 @@ class RealtimePlant(PlantNode):
         self._refusals = 0
         self._refusal_limit = RateLimit(REFUSALS, REFUSAL_INTERVAL)
         self._warnings = RateLimit(burst=5)
-        self._commands = RunCommands(self)
         self._command_limit = RateLimit(burst=COMMANDS, interval=COMMAND_INTERVAL)
         self._stays = False  # whether the end is kept back only for recorders
         self.timed: TimedTraffic | None = None  # notes the plant's messages and tokens; None if nobody records them
@@ -333,10 +333,10 @@ class RealtimePlant(PlantNode):
     def _on_command(self, command: Command, payload: bytes, now: float) -> None:
         if self._command_limit.admit(command.verb, now) is None:
             raise RejectedError("excess", f'more than {COMMANDS} commands "{command.verb}" at once')
-        answer = self._commands.answer(command, now)
+        answer = run_commands.answer(self, command, now)
         self._publish(self.keys.answer(command.reply_to), encode(answer))
         if answer.ok:
-            self._commands.follow_up(command, now)
+            run_commands.follow_up(self, command, now)
         if command.verb == "telemetry" and self.phase != "running":
             self.recorder_feed.replay()
 

@@ -98,101 +98,100 @@ class LinkCommandSender:
 MOST_SWITCHES, MOST_LOADS = 500, 150  # most of them in a status, which must fit into an answer
 
 
-class RunCommands:
-    def __init__(self, node: RealtimePlant) -> None:
-        self._node = node
+def answer(node: RealtimePlant, command: Command, now: float) -> Answer:
+    """Carry a command out, as far as that goes before its answer; return the answer."""
+    data = dict[str, Any]()
+    try:
+        if node.phase not in ("gathering", "running") and command.verb != "telemetry":
+            raise ValueError("the run is ending")
+        if command.verb == "status":
+            text, data = f"run {node.config.run} is {node.phase} at t = {node.t:.2f} s", _status(node)
+        elif command.verb in ("link", "links"):
+            text, data = _command_links(node, command, now)
+        else:
+            text = _say(node, command)
+        ok = True
+    except ValueError as error:
+        text, ok = str(error), False
+    epoch, seq = node.config.epoch, command.seq
+    return Answer(sender=PLANT, epoch=epoch, seq=seq, t=node.t, ok=ok, text=printable(text), data=data)
 
-    def answer(self, command: Command, now: float) -> Answer:
-        """Carry a command out, as far as that goes before its answer; return the answer."""
-        node, data = self._node, dict[str, Any]()
-        try:
-            if node.phase not in ("gathering", "running") and command.verb != "telemetry":
-                raise ValueError("the run is ending")
-            if command.verb == "status":
-                text, data = f"run {node.config.run} is {node.phase} at t = {node.t:.2f} s", self.status()
-            elif command.verb in ("link", "links"):
-                text, data = self._command_links(command, now)
-            else:
-                text = self._say(command)
-            ok = True
-        except ValueError as error:
-            text, ok = str(error), False
-        epoch, seq = node.config.epoch, command.seq
-        return Answer(sender=PLANT, epoch=epoch, seq=seq, t=node.t, ok=ok, text=printable(text), data=data)
 
-    def follow_up(self, command: Command, now: float) -> None:
-        node = self._node
-        agents = node.members.nameplates
-        if command.verb == "link":
-            node.link_commands.send(agents, now)
-        elif command.verb == "links":
-            node.link_commands.ask(agents, node.t, command.reply_to)
-        elif command.verb == "down":
-            node.close("the run was ended by command", now)
+def follow_up(node: RealtimePlant, command: Command, now: float) -> None:
+    agents = node.members.nameplates
+    if command.verb == "link":
+        node.link_commands.send(agents, now)
+    elif command.verb == "links":
+        node.link_commands.ask(agents, node.t, command.reply_to)
+    elif command.verb == "down":
+        node.close("the run was ended by command", now)
 
-    def _say(self, command: Command) -> str:
-        """Carry out a command whose answer is a sentence alone."""
-        node, verb, argument = self._node, command.verb, command.argument
-        if verb == "telemetry":
-            if not (argument.isascii() and argument.isdigit() and len(argument) < 16):
-                raise ValueError(f'telemetry: "{argument[:20]}" is no number of a Telemetry; give one, e.g. 0')
-            return str(node.recorder_feed.again_from(int(argument)))
-        when = f"at t = {node.t:.2f} s"
-        if verb == "down":
-            return f"run {node.config.run} ends {when}"
-        if verb == "stop":
-            instance = node.members.instance(argument)
-            if not instance:
-                running = ", ".join(name for name in node.plant.inverters if node.members.instance(name)) or "none"
-                raise ValueError(f'no agent "{argument}" is running; running are: {running}')
-            node.stop(node.keys.stop_request(argument, instance), "stopped by command")
-            return f"{argument} was asked to leave {when}"
-        if verb == "load":
-            if command.load is None:
-                raise ValueError(f"load {argument}: nothing is to be set; give a factor, or real or reactive power")
-            return f"{node.plant.set_load(argument, command.load)}, {when}"
-        if verb == "synchronise":
-            node.plant.switch(argument, "close", synchronised=True)
-            return f"switch {argument}: close in step {when}"
-        if node.plant.switch(argument, verb):
-            return f"switch {argument} was {'open' if verb == 'open' else 'closed'} already {when}"
-        return f"switch {argument}: {verb} {when}"
 
-    def _command_links(self, command: Command, now: float) -> tuple[str, dict[str, Any]]:
-        """Return the command's effect in words; its number, its start (s), and the agents that are sent it.
+def _say(node: RealtimePlant, command: Command) -> str:
+    """Carry out a command whose answer is a sentence alone."""
+    verb, argument = command.verb, command.argument
+    if verb == "telemetry":
+        if not (argument.isascii() and argument.isdigit() and len(argument) < 16):
+            raise ValueError(f'telemetry: "{argument[:20]}" is no number of a Telemetry; give one, e.g. 0')
+        return str(node.recorder_feed.again_from(int(argument)))
+    when = f"at t = {node.t:.2f} s"
+    if verb == "down":
+        return f"run {node.config.run} ends {when}"
+    if verb == "stop":
+        instance = node.members.instance(argument)
+        if not instance:
+            running = ", ".join(name for name in node.plant.inverters if node.members.instance(name)) or "none"
+            raise ValueError(f'no agent "{argument}" is running; running are: {running}')
+        node.stop(node.keys.stop_request(argument, instance), "stopped by command")
+        return f"{argument} was asked to leave {when}"
+    if verb == "load":
+        if command.load is None:
+            raise ValueError(f"load {argument}: nothing is to be set; give a factor, or real or reactive power")
+        return f"{node.plant.set_load(argument, command.load)}, {when}"
+    if verb == "synchronise":
+        node.plant.switch(argument, "close", synchronised=True)
+        return f"switch {argument}: close in step {when}"
+    if node.plant.switch(argument, verb):
+        return f"switch {argument} was {'open' if verb == 'open' else 'closed'} already {when}"
+    return f"switch {argument}: {verb} {when}"
 
-        It holds from one control period after the due tick on: by then all agents have it.
-        """
-        node, agents = self._node, self._agents(present=True)
-        if command.verb == "links":
-            assert node.link_commands.links is not None  # a run without any is an error
-            return "the links are asked for their status", {"number": 0, "t": node.t, "asked": agents}
-        overdue = max(0, int((now - node.pacer.due) / node.pacer.period))
-        t = time_of(node.tick + 1 + overdue, node.config.T_c) if node.phase == "running" else node.t
-        request, text, receivers = node.link_commands.give(command.link_command, t, command.reply_to)
-        node.note_links(f"link command {request.seq}: {text}" + (f", from t = {t:.2f} s on" if receivers else ""))
-        return text, {"number": request.seq, "t": request.t, "asked": agents, "receivers": receivers}
 
-    def _agents(self, *, present: bool) -> list[str]:
-        met = self._node.members.nameplates
-        return [name for name in self._node.plant.inverters if (name in met) == present]
+def _command_links(node: RealtimePlant, command: Command, now: float) -> tuple[str, dict[str, Any]]:
+    """Return the command's effect in words; its number, its start (s), and the agents that are sent it.
 
-    def status(self) -> dict[str, Any]:
-        """Return the run's status: times in s, delays in s of wall time."""
-        node = self._node
-        return {
-            "run": node.config.run,
-            "phase": node.phase,
-            "t": node.t,
-            "tick": node.tick,
-            "end": node.config.end,
-            "speed": node.config.speed,
-            "pacing": msgspec.to_builtins(node.pacer.report()),
-            "agents": self._agents(present=True),
-            "absent": self._agents(present=False),
-            "events": msgspec.to_builtins(node.events),
-            "switches": dict(islice(node.plant.switches.items(), MOST_SWITCHES)),
-            "loads": {name: [S.real, S.imag] for name, S in islice(node.plant.loads.items(), MOST_LOADS)},
-            "impaired": list(node.link_commands.impaired(node.t)),
-            "rejected": sum(node.rejects.counts.values()),
-        }
+    It holds from one control period after the due tick on: by then all agents have it.
+    """
+    agents = _agents(node, present=True)
+    if command.verb == "links":
+        assert node.link_commands.links is not None  # a run without any is an error
+        return "the links are asked for their status", {"number": 0, "t": node.t, "asked": agents}
+    overdue = max(0, int((now - node.pacer.due) / node.pacer.period))
+    t = time_of(node.tick + 1 + overdue, node.config.T_c) if node.phase == "running" else node.t
+    request, text, receivers = node.link_commands.give(command.link_command, t, command.reply_to)
+    node.note_links(f"link command {request.seq}: {text}" + (f", from t = {t:.2f} s on" if receivers else ""))
+    return text, {"number": request.seq, "t": request.t, "asked": agents, "receivers": receivers}
+
+
+def _agents(node: RealtimePlant, *, present: bool) -> list[str]:
+    met = node.members.nameplates
+    return [name for name in node.plant.inverters if (name in met) == present]
+
+
+def _status(node: RealtimePlant) -> dict[str, Any]:
+    """Return the run's status: times in s, delays in s of wall time."""
+    return {
+        "run": node.config.run,
+        "phase": node.phase,
+        "t": node.t,
+        "tick": node.tick,
+        "end": node.config.end,
+        "speed": node.config.speed,
+        "pacing": msgspec.to_builtins(node.pacer.report()),
+        "agents": _agents(node, present=True),
+        "absent": _agents(node, present=False),
+        "events": msgspec.to_builtins(node.events),
+        "switches": dict(islice(node.plant.switches.items(), MOST_SWITCHES)),
+        "loads": {name: [S.real, S.imag] for name, S in islice(node.plant.loads.items(), MOST_LOADS)},
+        "impaired": list(node.link_commands.impaired(node.t)),
+        "rejected": sum(node.rejects.counts.values()),
+    }
