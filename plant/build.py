@@ -49,18 +49,7 @@ def _feeder(config: PlantConfig) -> Feeder:
 
 def load_kernels() -> None:
     """Build and step a plant of our feeder, unless its step would have to be compiled, which takes up to a minute."""
-    # a check compiles the operating point alone
-    if not is_compiled(run_steps.__name__):
-        return
-    settings = PlantSettings()
-    config = PlantConfig(
-        run="none",
-        settings=settings,
-        agents=(),
-        T_c=settings.h,
-        end=None,
-        record_step=settings.h,
-        deadline=1.0,
-        listen=(),
-    )
-    build_plant(config).advance()
+    if is_compiled(run_steps.__name__):  # a check compiles the operating point alone
+        settings = PlantSettings()
+        network = Network(read_feeder(settings.feeder, settings.load_set))
+        Plant(network, settings, settings.h, settings.h).advance()

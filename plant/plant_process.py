@@ -25,9 +25,8 @@ from gridpeers.wire.wording import not_importable
 
 
 def build(config: PlantConfig) -> LivePlant:
-    from gridpeers.plant.build import (
-        start_plant,  # numba and scipy take a second: import them only once the session is open
-    )
+    # numba and scipy take a second: they are imported only once the session is open
+    from gridpeers.plant.build import start_plant
 
     return start_plant(config)
 
