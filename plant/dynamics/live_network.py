@@ -79,8 +79,12 @@ class LiveNetwork:
         self.reduction = self.reduced(circuit)
 
     def guess(self) -> None:
-        """Start the next solution from the last voltages, or from nominal ones where these were almost 0."""
-        nominal = self.circuit.V_branch * np.exp(1j * self._island_angle())
+        """Start the next solution from the last voltages, or where these were almost 0 from nominal ones in step."""
+        theta = self._inverters.theta() - np.angle(PHASES)[self._inverters.phase]
+        angle = np.array([theta[k] if k >= 0 else 0.0 for k in self.reduction.leader])
+        C = self.circuit.C.tocsc()
+        first = C.indices[C.indptr[:-1]] if C.shape[1] else np.zeros(0, np.int64)
+        nominal = self.circuit.V_branch * np.exp(1j * angle[self.reduction.label[first]])
         self.V_branch = np.where(np.abs(self.V_branch) > 0.1 * np.abs(nominal), self.V_branch, nominal)
 
     def solve(self) -> None:
@@ -157,14 +161,6 @@ class LiveNetwork:
         angle = np.where(leader >= 0, self._inverters.theta()[leader] - self.net.theta_lin, 0.0)
         turned: Complex = (self.x[:m] + 1j * self.x[m:]) * np.exp(1j * angle)[self.reduction.branch_island]
         return turned
-
-    def _island_angle(self) -> Real:
-        """Return the angle (rad) of each branch's island frame; 0 where the island has a source or no GFM."""
-        theta = self._inverters.theta() - np.angle(PHASES)[self._inverters.phase]
-        angle = np.array([theta[k] if k >= 0 else 0.0 for k in self.reduction.leader])
-        C = self.circuit.C.tocsc()
-        first = C.indices[C.indptr[:-1]] if C.shape[1] else np.zeros(0, np.int64)
-        return np.asarray(angle[self.reduction.label[first]])
 
 
 def unsettled_island(net: Reduced, units: Units, x: Real, tolerance: float) -> int:

@@ -40,13 +40,6 @@ class PowerFlow:
         theta = np.zeros(len(self.units))
         return self.reduction.linearise(self.V_b, self.circuit.source_voltage, theta)
 
-    def _renew(self, J: Complex) -> None:
-        """Move the tangent to where Newton's method leads: across a limit of the loads' law it does not itself."""
-        self.V_b, failed = self.reduction.solve_islands(J, self.circuit.source_voltage, self.V_b)
-        if failed:
-            raise self._no_power_flow()
-        self.net = self._linearise()
-
     def solve(self, J: Complex, P: Real, Q: Real, frozen: Flags) -> tuple[Complex, Complex]:
         """Return injections and voltages where every inverter that is not frozen delivers P + jQ (pu)."""
         units, m = self.units, self.V_b.size
@@ -71,10 +64,11 @@ class PowerFlow:
                 tolerance,
             )
             if rounds == NO_NETWORK:
-                if renewed:
+                # a tangent does not lead across a limit of the loads' law; Newton's method does
+                self.V_b, failed = self.reduction.solve_islands(J, self.circuit.source_voltage, self.V_b)
+                if failed or renewed:
                     raise self._no_power_flow()
-                renewed = True
-                self._renew(J)
+                self.net, renewed = self._linearise(), True
                 continue
             left, renewed = left - rounds, False
             self.V_b = x[:m] + 1j * x[m:]

@@ -34,16 +34,13 @@ class Islands:
     def names(self, reduction: Reduction) -> tuple[list[str], list[bool]]:
         """Return each inverter's island (`GRID`, or the first inverter's name) and whether the substation feeds it."""
         if self._named is None or self._named[0] is not reduction:
-            self._named = reduction, self._names(reduction)
+            label = reduction.inverter_island.tolist()
+            fed = [bool(reduction.has_source[k]) for k in label]
+            first: dict[int, str] = {}
+            for k, name, sourced in zip(label, self._inverters, fed, strict=True):
+                first.setdefault(k, GRID if sourced else name)
+            self._named = reduction, ([first[k] for k in label], fed)
         return self._named[1]
-
-    def _names(self, reduction: Reduction) -> tuple[list[str], list[bool]]:
-        label = reduction.inverter_island.tolist()
-        fed = [bool(reduction.has_source[k]) for k in label]
-        first: dict[int, str] = {}
-        for k, name, sourced in zip(label, self._inverters, fed, strict=True):
-            first.setdefault(k, GRID if sourced else name)
-        return [first[k] for k in label], fed
 
     def report(self, t: float, closed: frozenset[str], reduction: Reduction) -> list[PlantEvent]:
         """Return the events at t (s) of changed islands and newly de-energised buses, with these switches closed."""

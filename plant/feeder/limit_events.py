@@ -127,29 +127,25 @@ class LoadLimits:
         for k in np.flatnonzero(now != self._beyond).tolist():
             groups.setdefault((self._jumps[k].limit, bool(now[k])), []).append(self._jumps[k])
         self._beyond = now
-        return [
-            event
-            for (limit, beyond), jumps in groups.items()
-            for event in self._events(t, limit, beyond=beyond, jumps=jumps)
-        ]
+        events = []
+        for (limit, beyond), jumps in groups.items():
+            crossed = dict.fromkeys(jump.name for jump in jumps)
+            names = [name for name in crossed if t - self._last.get(name, -np.inf) > CROSSING_PAUSE]
+            self._last.update(dict.fromkeys(crossed, t))
+            if not names:
+                continue
+            within, outside = (sum(jump.S[k] for jump in jumps if jump.name in names) for k in (0, 1))
+            change = (outside - within if beyond else within - outside) / (within if beyond else outside)
+            way = "rises above" if (LAW_LIMITS[limit] > 0) == beyond else "falls below"
+            text = (
+                f"voltage of {first_of(names, SHOWN)} {way} {limit}, where the law of such a load jumps: "
+                f"{abs(change):.0%} {'more' if change > 0.0 else 'less'} apparent power at once"
+            )
+            events.append(PlantEvent(t=t, kind="limit", subject=names[0], text=text))
+        return events
 
     def _are_beyond(self, magnitude: Real) -> Flags:
         return np.asarray(self._side * (magnitude - self._V) > 0.0)
-
-    def _events(self, t: float, limit: str, *, beyond: bool, jumps: list[_Jump]) -> list[PlantEvent]:
-        crossed = dict.fromkeys(jump.name for jump in jumps)
-        names = [name for name in crossed if t - self._last.get(name, -np.inf) > CROSSING_PAUSE]
-        self._last.update(dict.fromkeys(crossed, t))
-        if not names:
-            return []
-        within, outside = (sum(jump.S[k] for jump in jumps if jump.name in names) for k in (0, 1))
-        change = (outside - within if beyond else within - outside) / (within if beyond else outside)
-        way = "rises above" if (LAW_LIMITS[limit] > 0) == beyond else "falls below"
-        text = (
-            f"voltage of {first_of(names, SHOWN)} {way} {limit}, where the law of such a load jumps: "
-            f"{abs(change):.0%} {'more' if change > 0.0 else 'less'} apparent power at once"
-        )
-        return [PlantEvent(t=t, kind="limit", subject=names[0], text=text)]
 
 
 def _jumps(network: Network) -> list[_Jump]:
