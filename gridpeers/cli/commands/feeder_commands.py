@@ -227,38 +227,8 @@ def glm(
     typer.echo(f"Model: {shown(file)}; GridLAB-D writes the voltages of its start to {file.stem}_voltages.csv")
 
 
-GROWN = """\
-# {copies} copies of {feeder}, made by `gridpeers feeder grow`: all lose the substation at once and stay joined.
-name = "{name}"
-title = "{inverters} inverters in {copies} joined copies of {feeder}"
-
-[plant]
-feeder = "{name}"
-
-[time]
-T_c_s = {T_c}
-end_s = 6.0
-
-[[event]]
-label = "islanding"
-t_s = 1.0
-open = [{switches}]
-
-[case.none]
-title = "droop alone"
-secondary = "none"
-graph = "none"
-
-[case.ring]
-title = "agents in a ring"
-secondary = "all"
-graph = "ring"
-
-[case.clustered]
-title = "all agents of a microgrid, and all leaders"
-secondary = "all"
-graph = "clustered"
-"""
+GROWN = Path(__file__).parents[1] / "grown_feeder.toml"
+"""Text of the scenario that `grow` writes, with fields in braces."""
 
 
 @app.command()
@@ -290,7 +260,7 @@ def grow(
             names = [one.alias or one.name for one in tables.switches]
             fail([f'--switch: no switch "{switch}"; {suggestion(switch, names, "switches")}'], BAD_INPUT)
         of_copies = (f"{copy_name(found.from_bus, k)}-{copy_name(found.to_bus, k)}" for k in range(1, copies + 1))
-        text = GROWN.format(
+        text = GROWN.read_text(encoding="utf-8").format(
             feeder=feeder,
             name=grown.name,
             copies=copies,
