@@ -10,8 +10,10 @@ from time import monotonic
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from gridpeers.scenarios.run_request import Progress as TellCase
 from gridpeers.scenarios.short_texts import duration
+
+TellCase = Callable[[str, float, float], None]
+"""Takes a case, the time that it has reached and its end (s)."""
 
 TellPart = Callable[[str, float], None]
 """Takes the present work, with its part behind a comma, and the amount of all that is done."""

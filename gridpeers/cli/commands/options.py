@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gridpeers.cli.usage import BAD_INPUT, BROKEN, CLAIM_FAILED, INTERRUPTED, TERMINATED, fail
-from gridpeers.scenarios.drivers.free_endpoint import ListenError
 from gridpeers.scenarios.live.run_address import (
     ENDPOINT,
     RUN,
@@ -25,17 +24,13 @@ from gridpeers.scenarios.live.run_address import (
     objection,
     with_protocol,
 )
-from gridpeers.scenarios.live.run_client import NobodyError, RunClient
-from gridpeers.scenarios.live.run_requests import RefusedError
-from gridpeers.scenarios.results.run_files import FolderError
-from gridpeers.wire.driver.process import ConfigurationError
-from gridpeers.wire.driver.session import SessionError
 from gridpeers.wire.keys import Role
 from gridpeers.wire.trust.credentials import Credentials
 from gridpeers.wire.trust.key_folder import COMMANDING, KeysError, open_credentials
 
 if TYPE_CHECKING:
     from gridpeers.scenarios.live.live_processes import ProcessOutcome
+    from gridpeers.scenarios.live.run_client import RunClient
 
 Run = Annotated[str, typer.Option(metavar="NAME", help="Name of the run; runs of other names do not meet.")]
 Connect = Annotated[
@@ -69,6 +64,8 @@ class LiveRun:
     @contextmanager
     def client(self, *, meet_agents: bool = False, acts: bool = False) -> Iterator[RunClient]:
         """Yield a client to the run once its plant is there; one that `acts` changes something, which no viewer may."""
+        from gridpeers.scenarios.live.run_client import RunClient  # with Zenoh, which the help does without
+
         check_wait(self.wait)
         roles: tuple[Role, ...] = COMMANDING if acts else ("operator", "viewer")
         where = address(self.run, self.connect, Access(self.keys, self.member, self.insecure), roles)
@@ -127,18 +124,17 @@ def opened(access: Access, roles: tuple[Role, ...], name: str = "") -> Credentia
 @contextmanager
 def usage_errors() -> Iterator[None]:
     """End the command with one line and exit code 2 on a usage error, or if the run is not there."""
+    from gridpeers.scenarios.drivers.free_endpoint import ListenError
+    from gridpeers.scenarios.live.run_client import NobodyError
+    from gridpeers.scenarios.live.run_requests import RefusedError
+    from gridpeers.scenarios.results.run_files import FolderError
+    from gridpeers.wire.driver.process import ConfigurationError
+    from gridpeers.wire.driver.session import SessionError
+
+    of_run = (ConfigurationError, FolderError, KeysError, ListenError, NobodyError, RefusedError, SessionError)
     try:
         yield
-    except (
-        ConfigurationError,
-        FolderError,
-        KeysError,
-        ListenError,
-        NobodyError,
-        RefusedError,
-        SessionError,
-        UsageError,
-    ) as error:
+    except (*of_run, UsageError) as error:
         fail([str(error)], BAD_INPUT)
 
 

@@ -6,7 +6,7 @@ import socket
 from contextlib import nullcontext
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated, Literal, NoReturn
+from typing import TYPE_CHECKING, Annotated, Literal, NoReturn
 
 import typer
 
@@ -26,19 +26,13 @@ from gridpeers.cli.usage import (
     require_loadable,
     terminal,
 )
-from gridpeers.plant.equipment import Feeder
-from gridpeers.plant.simulators import SIMULATORS
 from gridpeers.rooms import ROOMS
-from gridpeers.runs.choices import Pace, check_how
-from gridpeers.scenarios.drivers.free_endpoint import free_endpoint, local_endpoint
-from gridpeers.scenarios.results.file_sizes import file_sizes, require_room
-from gridpeers.scenarios.results.run_files import RUNS, new_folder, shown
-from gridpeers.scenarios.run import run as run_scenario
-from gridpeers.scenarios.run_request import BrokenRunError, Driver, LawStopError, Request
-from gridpeers.scenarios.schema import ScenarioError, ScenarioModel
-from gridpeers.scenarios.schema.configs import configs, secured
-from gridpeers.scenarios.schema.participants import inverters_of
-from gridpeers.wire.trust.key_folder import KeysError
+
+if TYPE_CHECKING:
+    from gridpeers.plant.equipment import Feeder
+    from gridpeers.runs.choices import Pace
+    from gridpeers.scenarios.run_request import Driver
+    from gridpeers.scenarios.schema import ScenarioModel
 
 
 def run(
@@ -105,7 +99,7 @@ def run(
         fail(["--broker: goes with a plant in a HELICS federation; add --plant helics"], BAD_INPUT)
     if port is not None and not view:
         fail(["--port: goes with a page; add --view"], BAD_INPUT)
-    pace = Pace(clock=clock, speed=speed, strict=strict, processes=processes, keys=keys)
+    pace: Pace = {"clock": clock, "speed": speed, "strict": strict, "processes": processes, "keys": keys}
     page = ROOMS.resolve("page_socket")(port) if view else None
     carry_out(chosen(spec, case, seed), feeder, driver, out, pace, require_checks=require_checks, page=page)
 
@@ -126,6 +120,15 @@ def carry_out(
 
     A `page` is opened at its socket, and follows the run.
     """
+    from gridpeers.plant.simulators import SIMULATORS
+    from gridpeers.runs.choices import check_how
+    from gridpeers.scenarios.drivers.free_endpoint import free_endpoint, local_endpoint
+    from gridpeers.scenarios.results.file_sizes import file_sizes, require_room
+    from gridpeers.scenarios.results.run_files import RUNS, new_folder, shown
+    from gridpeers.scenarios.run import run as run_scenario
+    from gridpeers.scenarios.run_request import BrokenRunError, LawStopError, Request
+    from gridpeers.scenarios.schema import ScenarioError
+
     try:
         check_how(driver, pace, spec, dash="--")
     except ScenarioError as error:
@@ -159,7 +162,7 @@ def carry_out(
             why = f"FAILED  {error}" if by_law else f"the run broke: {error}"
             fail([why, *([left] if folder.is_dir() else [])], CLAIM_FAILED if by_law else BROKEN)
         from gridpeers.scenarios.checks.check_registry import LAW_FAILED
-        from gridpeers.scenarios.results.report import show
+        from gridpeers.scenarios.results.report import show  # with numpy, which no run waits for
 
         show(report, console)
     failed = any(verdict.status == "FAIL" for verdict in report.verdicts) or report.fails(LAW_FAILED)
@@ -169,6 +172,10 @@ def carry_out(
 
 def _check_keys(folder: Path, spec: ScenarioModel, feeder: Feeder) -> None:
     """End with every problem of the certificates that a run needs, before anything starts; say which end soon."""
+    from gridpeers.scenarios.schema.configs import configs, secured
+    from gridpeers.scenarios.schema.participants import inverters_of
+    from gridpeers.wire.trust.key_folder import KeysError
+
     inverters = tuple(row.name for row in inverters_of(spec, feeder))
     notes: dict[str, None] = {}
     try:
