@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import json
 import os
 import platform
 import shutil
@@ -13,6 +12,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import msgspec
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from gridpeers import Verdict
@@ -200,17 +200,12 @@ def machine() -> str:
 def metrics_json(whole: Reproduction) -> str:
     """Return the text of metrics.json: every number of the tables beside the paper's, every verdict, every measure."""
     claims = [
-        {
-            "part": result.part.name,
-            "claim": verdict.claim.name,
-            "text": verdict.claim.text,
-            "source": verdict.claim.source,
-            "status": verdict.status,
-            "found": verdict.found,
-            "reason": verdict.claim.known_miss if verdict.status == "MISS" else "",
-        }
+        {"part": result.part.name, "claim": claim.name, "text": claim.text, "source": claim.source}
+        | {"status": verdict.status, "found": verdict.found}
+        | {"reason": claim.known_miss if verdict.status == "MISS" else ""}
         for result in whole.results
         for verdict in result.verdicts
+        for claim in (verdict.claim,)
     ]
     topology = [
         {"links": run.links, "connected": run.connected}
@@ -233,16 +228,8 @@ def metrics_json(whole: Reproduction) -> str:
         "runs": {result.part.name: result.metrics for result in whole.results if result.metrics},
         "topology": topology,
     }
-    return json.dumps(_plain(document), indent=2, allow_nan=False) + "\n"
-
-
-def _plain(value: Any) -> Any:
-    """Return the same with null in place of nan."""
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    return None if isinstance(value, float) and value != value else value
+    text = msgspec.json.encode(document, enc_hook=float)  # of numpy's numbers; nan becomes null
+    return msgspec.json.format(text, indent=2).decode() + "\n"
 
 
 def _number(result: PartResult, cell: Cell) -> dict[str, Any]:
