@@ -108,13 +108,10 @@ def show(keys: _Keys = Path()) -> None:
         typer.echo(f"site {known.site}, {LIST} is version {known.version}{authority}")
         width = max(len(member.name) for member in known.members)
         for member in sorted(known.members, key=lambda member: (member.role, member.name)):
-            if member.revoked:
-                state = "revoked"
-            else:
+            key, state, here = f"{member.name}.key", "revoked", ""
+            if not member.revoked:
                 state = f"{'expired ' if member.expires < now else 'valid    until'} {member.expires}"
-            here = "" if member.revoked or not (keys / f"{member.name}.key").is_file() else ", key here"
-            if here and f"{member.name}.key" in warnings:
-                here += ", but see below"
+                here = ", key here" * (keys / key).is_file() + ", but see below" * (key in warnings)
             typer.echo(f"{member.role:9} {member.name:{width}}  {state}{here}")
         for warning in warnings.values():
             typer.echo(f"WARNING  {warning}")
