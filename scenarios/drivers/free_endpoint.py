@@ -28,13 +28,11 @@ class ListenError(ValueError):
 
 
 class ZenohEndpoint(NamedTuple):
-    """A Zenoh endpoint, e.g. tcp/127.0.0.1:7447."""
-
     protocol: str
     host: str
     """Name or address; an IPv6 address in brackets."""
     port: int
-    rest: str = ""
+    rest: str
     """Zenoh's own suffix, e.g. "#iface=eth0"."""
 
     def __str__(self) -> str:
@@ -82,13 +80,10 @@ def free_endpoint(text: str = "tcp/127.0.0.1:0", *, option: str = "listen") -> s
 
 
 def _way_out(host: str, error: OSError) -> str:
-    if isinstance(error, socket.gaierror):
-        return f"no address is known of {host}; give one of this host's own, or 0.0.0.0 for all of them"
-    if error.errno == errno.EADDRNOTAVAIL:
+    if isinstance(error, socket.gaierror) or error.errno == errno.EADDRNOTAVAIL:
         return f"{host} is no address of this host; give one that it has, or 0.0.0.0 (IPv6: [::]) for all of them"
     other = "choose another port, or 0 for a free one, here and for those that connect to it"
     if error.errno == errno.EADDRINUSE:
-        down = command_line("down")
-        ends = f"{down} ends a live run; a frozen plant goes on with kill -CONT, or ends by its process id"
+        ends = f"{command_line('down')} ends a live run; a frozen plant goes on with kill -CONT"
         return f"end what uses it ({ends}), or {other}"
     return other

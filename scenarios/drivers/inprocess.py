@@ -176,7 +176,7 @@ def run_inprocess(
     plant: PlantLike | None = None,
     messages: bool = False,
 ) -> Outcome:
-    """Run a scenario in this process and this thread; agents start in their order, those that join later included.
+    """Run a scenario in this process and this thread.
 
     A given `plant` is used instead of building the configuration's. With `messages`, plant and agents exchange them
     even where these decide nothing. A plant without solution is an outcome, a bad feeder or name an exception.

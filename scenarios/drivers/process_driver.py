@@ -54,12 +54,11 @@ def run_processes(
 ) -> Outcome:
     """Run a scenario with a plant process and processes of agents, in simulated or in real time.
 
-    In real time the death of an agent is only an event, and the scenario's kills and pauses are real signals. Agents
-    that join start when the plant awaits them. The plant listens at its `listen`, or at a free port, and the agents'
-    `connect` is filled in. `on_start` is called once all processes are started, in the `start_order`. `shared` is the
-    number of processes that agents share, 0 for one each. `star` lets all processes link to the plant alone in
-    simulated time (docs/protocol.md). ListenError or SessionError, with nothing started, if the port is in use or Zenoh
-    is missing.
+    In real time the death of an agent is only an event, and the scenario's kills and pauses are real signals. The plant
+    listens at its `listen`, or at a free port. `on_start` is called once all processes are started, in the
+    `start_order`. Agents share `shared` processes, 0 gives each its own. `star` lets all processes link to the plant
+    alone in simulated time (docs/protocol.md). ListenError or SessionError, with nothing started, if the port is in use
+    or Zenoh is missing.
     """
     agents = {config.name: config for config in agent_configs}
     wall = plant_config.clock == "wall"

@@ -75,11 +75,11 @@ class FaultInjector:
 
 
 class Supervisor:
-    """Start the plant and its agents, inject the process faults of the scenario, and end every process.
+    """Start the plant and its agents, inject the process faults of the scenario; leaving its context ends them all.
 
-    Leaving its context ends all processes. `on_exit`, and `on_word` with the words of the starting plant, are called
-    from other threads. The second life of inv1 logs to `inv1-2.log`. Agents share `shared` processes, 0 gives each its
-    own; one that the scenario starts, stops, kills or pauses has its own in any case.
+    `on_exit`, and `on_word` with the words of the starting plant, are called from other threads. The second life of
+    inv1 logs to `inv1-2.log`. Agents share `shared` processes, 0 gives each its own; one that the scenario starts,
+    stops, kills or pauses has its own in any case.
     """
 
     def __init__(

@@ -25,7 +25,6 @@ ASTRAY_SIMULATED = 10.0
 
 LONGEST = 60.0
 
-
 Recordable = Telemetry | LinkReport | Journal | LinkRequest
 
 
@@ -50,7 +49,7 @@ class TelemetryStream:
         self._acknowledged = -1
 
     def take(self, message: Recordable, now: float) -> list[Recordable]:
-        """Note a message (s, monotonic); return the messages that can be recorded now, in order."""
+        """Note a message at `now` (s, monotonic); return the messages that can be recorded, in order."""
         self._heard_at = now
         if self._gap_since is not None:
             return []  # it comes again, in its order

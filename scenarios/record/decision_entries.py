@@ -1,13 +1,12 @@
 """The journal entries that say how agents decide: where each is in the file, and where parts of a journal are lost.
 
-In simulated time an entry holds until the next one of its agent, which may be minutes away: the parts of the file are
-gone through once, and the places of the entries are kept. In wall-clock time each decision has an entry of its own, and
-the file is only gone through once it turns out to be damaged.
+In simulated time an entry holds until the next one of its agent, which may be minutes away: one pass over the file
+notes the places of the entries. In wall-clock time each decision has its own entry.
 """
 
 from __future__ import annotations
 
-from bisect import bisect_left, bisect_right
+from bisect import bisect_right, insort
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from functools import lru_cache, partial
@@ -76,14 +75,12 @@ def inside(holes: Sequence[Hole], t: float) -> bool:
 
 
 class DecisionEntries:
-    """Find how an agent decided, and where the record lacks it."""
-
     def __init__(self, index: MessageIndex) -> None:
         self._index, self._info = index, index.info
         self._simulated = self._info.simulated
         self._parts = 0
-        self._places: dict[str, tuple[list[int], list[int]]] = {}
-        """By agent: the first tick of each part that has entries of it, and the numbers of these parts."""
+        self._places: dict[str, list[tuple[int, int]]] = {}
+        """By agent: the first tick of each part that has entries of it, and the number of this part."""
         self._coverage: dict[str, JournalCoverage] = {}
         self._holes: dict[str, Sequence[Hole]] = {}
         self._in_part = lru_cache(maxsize=64)(self._read_part)
@@ -94,11 +91,11 @@ class DecisionEntries:
         Where entries are lost, another one may have held: ask `knows` first.
         """
         self._go_through()
-        first_ticks, parts = self._places.get(agent, ([], []))
-        place = bisect_right(first_ticks, tick) - 1
+        places = self._places.get(agent, [])
+        place = bisect_right(places, (tick, self._parts)) - 1
         if place < 0:
             return None
-        entries = self._in_part(parts[place])[agent]
+        entries = self._in_part(places[place][1])[agent]
         return entries[max(each for each in entries if each <= tick)]
 
     def knows(self, agent: str, t: float) -> bool:
@@ -107,10 +104,9 @@ class DecisionEntries:
         return t <= self._covered(agent).known_until + 1e-9 and not inside(self.holes(agent), t)
 
     def holes(self, node: str) -> Sequence[Hole]:
-        """Return the run times (s) between which it is not known how an agent decided, as the file is damaged there.
+        """Return the run times (s) between which decisions of an agent, or messages of the plant, are lost.
 
-        Of the plant: between which it is not known what it sent and heard. A decision of simulated time starts from the
-        state of the tick before, which the plant has noted.
+        A decision of simulated time starts from the state of the tick before, which the plant has noted.
         """
         if not (self._simulated or self._index.file.holes):
             return ()
@@ -124,11 +120,7 @@ class DecisionEntries:
         return self._holes[node]
 
     def lost_at(self, agent: str, t: float, last: float | None) -> bool:
-        """Return whether the decision of an agent in force at a run time (s) is lost.
-
-        `last` is the run time (s) of its last one up to then that is there; None if there is none. A decision is in
-        force for a control period.
-        """
+        """Return whether the decision of an agent in force at t (s) is lost; `last` is the time of the last known."""
         T_c = self._info.T_c
         at = time_of(int(t / T_c + 1e-6), T_c) if self._simulated else t - T_c + INSTANT
         return any(
@@ -148,15 +140,15 @@ class DecisionEntries:
         for part in range(self._parts, self._index.parts):
             first_in_part: dict[str, int] = {}
             for journal in self._index.journals_in(part):
-                first = self._first_tick(journal) if self._simulated and journal.sender != PLANT else None
+                first = None
+                if self._simulated and journal.sender != PLANT:
+                    entries = self._index.entries_in(journal)
+                    first = next((entry.tick for entry in entries if isinstance(entry, Decision)), None)
                 if first is not None:
                     first_in_part.setdefault(journal.sender, first)
                 self._covered(journal.sender).take(journal, partial(self._span, journal, first))
             for name, first in first_in_part.items():
-                first_ticks, parts = self._places.setdefault(name, ([], []))
-                at = bisect_left(first_ticks, first)
-                first_ticks.insert(at, first)
-                parts.insert(at, part)
+                insort(self._places.setdefault(name, []), (first, part))
         self._parts = self._index.parts
 
     def _span(self, journal: Journal, first: int | None) -> Hole | None:
@@ -168,9 +160,6 @@ class DecisionEntries:
             return None if first is None else (time_of(first, T_c), journal.t)
         ticks = [entry.tick for entry in self._index.entries_in(journal) if isinstance(entry, Exchange)]
         return (time_of(ticks[0], T_c), time_of(ticks[-1], T_c)) if ticks else None
-
-    def _first_tick(self, journal: Journal) -> int | None:
-        return next((entry.tick for entry in self._index.entries_in(journal) if isinstance(entry, Decision)), None)
 
     def _read_part(self, part: int) -> dict[str, dict[int, Decision]]:
         found: dict[str, dict[int, Decision]] = defaultdict(dict)

@@ -30,8 +30,7 @@ from gridpeers.wire.messages import AnyMessage, Journal, Measurement, State
 M = TypeVar("M", bound=AnyMessage)
 
 LATE = 2.0
-"""Longest time (s of run time; of wall time in wall-clock runs) after which an entry of a journal may come into the
-record."""
+"""Longest time (s; of wall time in wall-clock runs) after which an entry of a journal may come into the record."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,8 +79,8 @@ class MessageIndex:
         self._late = LATE * max(1.0, speed) if wall else max(LATE, REPORT_TICKS * self.info.T_c)
         """As `LATE`, of run time: in simulated time reports come every so many ticks."""
         self._reach = max(0.0, 2.0 * speed - 1.0)
-        """How much further than its own time a message is looked for (s of run time): a journal comes up to a second of
-        wall time after what it is about, and so does that of the sender."""
+        """How much further than its own time a message is looked for (s of run time): journals come up to a second of
+        wall time late."""
         self.part = lru_cache(maxsize=40)(self._read_part)  # more than `near` yields for a message: 20 in real time
 
     @property

@@ -116,21 +116,18 @@ TOPICS: dict[type[Telemetry] | type[Journal] | type[LinkReport] | type[LinkReque
 }
 """Topic of each message that the plant publishes for recorders. Their payloads are in the record as they were sent."""
 
+_INTEGER, _TEXT = {"type": "integer"}, {"type": "string"}
 _EVENTS = {
     "type": "object",
     "title": "foxglove.Log",
     "description": "An event of the plant, of the roster or of links; a row of events.csv.",
     "properties": {
-        "timestamp": {
-            "type": "object",
-            "description": "Run time.",
-            "properties": {"sec": {"type": "integer"}, "nsec": {"type": "integer"}},
-        },
-        "level": {"type": "integer", "description": "2: information, 3: warning."},
-        "message": {"type": "string", "description": "One sentence."},
-        "name": {"type": "string", "description": "Kind of the event."},
-        "file": {"type": "string", "description": "The switch, island or agent concerned."},
-        "line": {"type": "integer"},
+        "timestamp": {"type": "object", "properties": dict.fromkeys(("sec", "nsec"), _INTEGER)},
+        "level": _INTEGER | {"description": "2: information, 3: warning."},
+        "message": _TEXT,
+        "name": _TEXT | {"description": "Kind of the event."},
+        "file": _TEXT | {"description": "The switch, island or agent concerned."},
+        "line": _INTEGER,
     },
 }
 

@@ -119,8 +119,7 @@ class RunRecord:
     def heard(self, agent: str, *, since: float = 0.0, until: float = inf) -> Iterator[MessageOnWire]:
         """Yield messages as an agent, or the plant, heard them, in the order of their arrival.
 
-        In simulated time these are, for each decision, the states of the tick before, or those that emulated links had
-        brought by then. Raise RecordFileError if there was no such agent.
+        Raise RecordFileError if there was no such agent.
         """
         self._require(agent)
         _check_times(since=since, until=until)
@@ -185,11 +184,8 @@ class RunRecord:
             why = self.damage[0] if self.damage else "parts of journals never came into it"
             raise RecordFileError(f"{self.path}: it lacks how {agent} decided at t = {t:g} s: {why}")
         if found is None:
-            if (first := next(self.decisions(agent), None)) is not None:
-                more = f"; its first decision is of t = {first.t:.2f} s"
-            else:
-                decided = [name for name in self.agents if next(self.decisions(name), None) is not None]
-                more = f", nor later; agents that decided: {short(decided) if decided else 'none'}"
+            first = next(self.decisions(agent), None)
+            more = ", nor later" if first is None else f"; its first decision is of t = {first.t:.2f} s"
             raise RecordFileError(f"{self.path}: {agent} had not decided anything by t = {t:g} s{more}")
         return found
 

@@ -229,31 +229,7 @@ real time, where they take a quarter of the file at 0.01 s. All rows are in the 
 
 
 def nanoseconds(t: float) -> int:
-    """Return a run time (s) as time in a record: whole nanoseconds since t = 0."""
     return round(t * NANO)
-
-
-def row_json(row: Sequence[float], inverters: Sequence[str], quantities: Sequence[str]) -> bytes:
-    """Return a row of telemetry as JSON; null stands for a number that is not finite."""
-    t, *values = row
-    number = len(quantities)
-    parts = (values[i : i + number] for i in range(0, len(values), number))
-    named = {name: dict(zip(quantities, part, strict=True)) for name, part in zip(inverters, parts, strict=True)}
-    return msgspec.json.encode({"t_s": t} | named)
-
-
-def event_json(event: PlantEvent) -> bytes:
-    """Return an event as a `foxglove.Log`, which viewers list."""
-    at = nanoseconds(event.t)
-    log = {
-        "timestamp": {"sec": at // NANO, "nsec": at % NANO},
-        "level": 3 if event.kind == "warning" else 2,
-        "message": event.text,
-        "name": event.kind,
-        "file": event.subject,
-        "line": 0,
-    }
-    return msgspec.json.encode(log)
 
 
 class Recording:
@@ -283,15 +259,34 @@ class Recording:
             self._t = message.t
         at = nanoseconds(self._t if isinstance(message, LinkReport) else message.t)
         self._writer.add(TOPICS[type(message)], at, message.seq, payload_of(message))
-        if not isinstance(message, Telemetry):
-            return
-        for row in message.rows:
-            if row[0] >= self._next:
-                at = nanoseconds(row[0])
-                self._next = (at + self._step) / NANO - 0.5 / NANO
-                self._writer.add("physics", at, 0, row_json(row, message.inverters, self._quantities))
-        for event in message.events:
-            self._writer.add("events", nanoseconds(event.t), 0, event_json(event))
+        if isinstance(message, Telemetry):
+            for row in message.rows:
+                if row[0] >= self._next:
+                    self._add_row(message.inverters, row)
+            for event in message.events:
+                self._add_event(event)
+
+    def _add_row(self, inverters: Sequence[str], row: Sequence[float]) -> None:
+        """Add a row for viewers; null stands for a number that is not finite."""
+        at, number = nanoseconds(row[0]), len(self._quantities)
+        self._next = (at + self._step) / NANO - 0.5 / NANO
+        starts = range(1, len(row), number)
+        parts = (dict(zip(self._quantities, row[i : i + number], strict=True)) for i in starts)
+        named = dict(zip(inverters, parts, strict=True))
+        self._writer.add("physics", at, 0, msgspec.json.encode({"t_s": row[0]} | named))
+
+    def _add_event(self, event: PlantEvent) -> None:
+        """Add an event as a `foxglove.Log`, which viewers list."""
+        at = nanoseconds(event.t)
+        log = {
+            "timestamp": {"sec": at // NANO, "nsec": at % NANO},
+            "level": 3 if event.kind == "warning" else 2,
+            "message": event.text,
+            "name": event.kind,
+            "file": event.subject,
+            "line": 0,
+        }
+        self._writer.add("events", at, 0, msgspec.json.encode(log))
 
     def close(self) -> None:
         self._writer.close()
