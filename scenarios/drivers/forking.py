@@ -64,27 +64,24 @@ class ForkServer:
         ForkServerError if the server cannot fork, or is gone.
         """
         reading, writing = os.pipe()
-        spoken = os.pipe() if speaks else None
-        output = log.fileno() if spoken is None else spoken[1]
+        hearing, speaking = os.pipe() if speaks else (-1, log.fileno())
         answer: dict[str, Any] = {"error": "the fork server is gone"}
         try:
-            socket.send_fds(self._control, [json.dumps(list(words)).encode()], [reading, output, log.fileno()])
+            socket.send_fds(self._control, [json.dumps(list(words)).encode()], [reading, speaking, log.fileno()])
             if data := self._control.recv(4096):
                 answer = json.loads(data)
         except OSError as error:
             self.close()  # what it forks now, nobody would know of
             answer = {"error": str(error)}
         finally:
-            os.close(reading)
-            if spoken is not None:
-                os.close(spoken[1])
-        if "pid" not in answer:
-            os.close(writing)
-            if spoken is not None:
-                os.close(spoken[0])
-            raise ForkServerError(answer["error"])
-        heard = None if spoken is None else os.fdopen(spoken[0], "rb")
-        return ForkedProcess(answer["pid"], os.fdopen(writing, "wb"), heard)
+            for end in (reading, speaking) if speaks else (reading,):
+                os.close(end)
+        stdin, stdout = os.fdopen(writing, "wb"), os.fdopen(hearing, "rb") if speaks else None
+        if "pid" in answer:
+            return ForkedProcess(answer["pid"], stdin, stdout)
+        for pipe in filter(None, (stdin, stdout)):
+            pipe.close()
+        raise ForkServerError(answer["error"])
 
     def __enter__(self) -> ForkServer:
         return self

@@ -166,14 +166,12 @@ class MessageIndex:
     def _sent(self, entry: Entry) -> Iterator[tuple[str, bytes, AnyMessage | None, float | None]]:
         """Yield key, bytes, message and time (s, monotonic) of each message in an entry, as far as it has them."""
         if isinstance(entry, Exchange):
-            kinds: tuple[tuple[type[Measurement] | type[State], Sequence[object]], ...]
-            kinds = ((Measurement, entry.measurements), (State, entry.states))
-            for kind, raws in kinds:
-                for raw in raws:
-                    message = message_of(raw, kind, self.info)
-                    key = f"measurement/{message.to}" if isinstance(message, Measurement) else ""
-                    key = key or (f"state/{message.sender}" if message else "")
-                    yield key, raw if isinstance(raw, bytes) else b"", message, None
+            kinds = [(Measurement, raw) for raw in entry.measurements] + [(State, raw) for raw in entry.states]
+            for kind, raw in kinds:
+                message = message_of(raw, kind, self.info)
+                key = f"measurement/{message.to}" if isinstance(message, Measurement) else ""
+                key = key or (f"state/{message.sender}" if message else "")
+                yield key, raw if isinstance(raw, bytes) else b"", message, None
         elif isinstance(entry, SentMessage) or (isinstance(entry, ReceivedMessage) and not entry.rejected):
             at = entry.at if isinstance(entry, SentMessage) else None
             yield entry.key, entry.payload, sound(entry.payload), at

@@ -112,12 +112,12 @@ class _FileIndex:
 class RecordWriter:
     """Write one record: `add` its messages, then `close` it.
 
-    Raise OSError if the file cannot be made. Later errors end the record: `failure` has the reason.
+    Raise OSError if the file cannot be made. Later errors end the record: `failure` says so.
     """
 
     def __init__(self, path: Path, info: RecordInfo, channels: tuple[RecordChannel, ...]) -> None:
         self.path = path
-        self.failure = ""
+        self._why = ""
         """Why the record ended early; empty while it goes on, and after a whole one."""
         self.ended = 0
         self._index = _FileIndex(path.parent)  # should the system give no file for it, there is no empty record
@@ -145,9 +145,14 @@ class RecordWriter:
             self._thread = threading.Thread(target=self._write_all, name="record", daemon=True)
             self._thread.start()
 
+    @property
+    def failure(self) -> str:
+        """Sentence on why the record ended early; empty if it did not."""
+        return self._why and f"the record {self.path.name} ends at {self.ended / 1e9:.2f} s: {self._why}"
+
     def add(self, topic: Topic, t: int, number: int, data: bytes) -> None:
         """Take a message of run time t (ns); it is on the disk within a second."""
-        if self.failure:
+        if self._why:
             return
         with self._lock:
             self._waiting.append((topic, t, number, data))
@@ -168,9 +173,9 @@ class RecordWriter:
         self._wake.set()
         if self._thread is not None:
             self._thread.join()
-        elif not self.failure:
+        elif not self._why:
             self._write()
-        if not self.failure:
+        if not self._why:
             try:
                 self._writer.finish()  # type: ignore[no-untyped-call,unused-ignore]  # as mcap declares it
                 self._file.flush()
@@ -180,7 +185,7 @@ class RecordWriter:
         self._file.close()
 
     def _write_all(self) -> None:
-        while not self.failure:
+        while not self._why:
             self._wake.wait(PERIOD)
             self._wake.clear()
             closing = self._closed.is_set()
@@ -215,7 +220,7 @@ class RecordWriter:
         self._writer.flush()  # type: ignore[no-untyped-call,unused-ignore]  # as mcap declares it
 
     def _fail(self, why: str) -> None:
-        self.failure = self.failure or why
+        self._why = self._why or why
         with self._lock:
             self._waiting.clear()
             self._bytes = 0
@@ -232,33 +237,22 @@ def nanoseconds(t: float) -> int:
     return round(t * NANO)
 
 
-class Recording:
-    """Record one case: give it all that the plant publishes for recorders, then close it.
-
-    Raise OSError if the file cannot be made.
-    """
+class Recording(RecordWriter):
+    """Record one case: give it all that the plant publishes for recorders, then close it."""
 
     def __init__(self, folder: Path, info: RecordInfo, quantities: Sequence[str]) -> None:
-        self._writer = RecordWriter(folder / FILE, info, channels(info.inverters, tuple(quantities)))
+        super().__init__(folder / FILE, info, channels(info.inverters, tuple(quantities)))
         self._quantities = quantities
         self._step = nanoseconds(LIVE_VIEW_STEP if info.clock == "wall" else VIEW_STEP)
         self._t = self._next = 0.0
         """Time (s) of the last telemetry, and from which on a row is the next for viewers."""
-
-    @property
-    def failure(self) -> str:
-        """Sentence on why the record ended early; empty if it did not."""
-        writer = self._writer
-        if not writer.failure:
-            return ""
-        return f"the record {writer.path.name} ends at {writer.ended / 1e9:.2f} s: {writer.failure}"
 
     def __call__(self, message: Telemetry | Journal | LinkReport | LinkRequest) -> None:
         """Record a message of the plant for recorders; reports on links have no time of their own."""
         if isinstance(message, Telemetry):
             self._t = message.t
         at = nanoseconds(self._t if isinstance(message, LinkReport) else message.t)
-        self._writer.add(TOPICS[type(message)], at, message.seq, payload_of(message))
+        self.add(TOPICS[type(message)], at, message.seq, payload_of(message))
         if isinstance(message, Telemetry):
             for row in message.rows:
                 if row[0] >= self._next:
@@ -273,7 +267,7 @@ class Recording:
         starts = range(1, len(row), number)
         parts = (dict(zip(self._quantities, row[i : i + number], strict=True)) for i in starts)
         named = dict(zip(inverters, parts, strict=True))
-        self._writer.add("physics", at, 0, msgspec.json.encode({"t_s": row[0]} | named))
+        self.add("physics", at, 0, msgspec.json.encode({"t_s": row[0]} | named))
 
     def _add_event(self, event: PlantEvent) -> None:
         """Add an event as a `foxglove.Log`, which viewers list."""
@@ -286,7 +280,4 @@ class Recording:
             "file": event.subject,
             "line": 0,
         }
-        self._writer.add("events", at, 0, msgspec.json.encode(log))
-
-    def close(self) -> None:
-        self._writer.close()
+        self.add("events", at, 0, msgspec.json.encode(log))

@@ -64,7 +64,7 @@ def test_on_a_full_disk_the_file_ends_with_a_whole_chunk(tmp_path: Path, monkeyp
     one.close()
     one.add("telemetry", 3 * 10**9, 2, b"third")
 
-    assert one.failure == "No space left on device"
+    assert one.failure == "the record run.mcap ends at 1.00 s: No space left on device"
     assert one.ended == 10**9
     file = RecordFile(tmp_path / "run.mcap")
     assert [(each.t, each.data) for each in file.messages()] == [(10**9, b"first")]
