@@ -35,8 +35,8 @@ _IN_ORDER = {IN_ORDER + status: status for status in (OK, BAD_CONFIG, BROKE)}
 class Child:
     """A started process, named after its inverter, or "plant"; its configuration goes to it as one line of JSON.
 
-    `on_exit`, and `on_word` for every line of its standard output, are called from another thread. With a server, whose
-    command is `-m` and a module, it is forked instead of started as a new interpreter.
+    `on_exit`, and `on_word` for every line of its standard output, are called from another thread. A server forks it;
+    else it is a new interpreter.
     """
 
     def __init__(

@@ -201,15 +201,8 @@ def run_inprocess(
             try:
                 plant = start_plant(plant_config)
             except RuntimeError as error:
-                return Outcome(
-                    broke=f"plant: cannot start: {error}",
-                    reproducible=False,
-                    events=(),
-                    notes=(),
-                    ticks=0,
-                    start_s=perf_counter() - began,
-                    run_s=0.0,
-                )
+                why, took = f"plant: cannot start: {error}", perf_counter() - began
+                return Outcome(broke=why, reproducible=False, events=(), notes=(), ticks=0, start_s=took, run_s=0.0)
             stack.callback(plant.close)
         stack.callback(close_laws, laws)
         stack.enter_context(_all_so_far_stays())

@@ -34,8 +34,7 @@ def with_recorder(config: PlantConfig, *, waits: bool = False) -> PlantConfig:
 class TelemetryClient:
     """Pass on each message that the plant publishes for recorders, in its order, and keep the state of the run.
 
-    It asks again for missing messages, and opens a new session when the old one brings nothing any more. The plant
-    waits for a recorder of its name before the start, and in simulated time for its acknowledgements.
+    It asks again for missing messages, and opens a new session when the old one brings nothing any more.
     """
 
     def __init__(
@@ -100,7 +99,8 @@ class TelemetryClient:
         if not self._closed:
             now = monotonic()
             if self._stream.is_astray(now):
-                self.renew_session()
+                self._session.close()  # the plant publishes again what it had on its way
+                self._session = self._open()
             question = self._core.question(now)
             if question is not None:
                 self._session.publish(self._core.keys.request, question)
@@ -111,11 +111,6 @@ class TelemetryClient:
         if self.latest is not None and not self.ended:
             event = PlantEvent(t=self.t, kind="law", subject=agent, text=f"{agent}: its process {end}")
             self._on_message(replace(self.latest, rows=(), events=(event,), awaited=(), quiet=(), others=0))
-
-    def renew_session(self) -> None:
-        """Go on with a new session: the plant publishes again what the old one had on its way."""
-        self._session.close()
-        self._session = self._open()
 
     def close(self) -> None:
         """Close the session, and with it the token: the plant knows then that the last telemetry is here."""

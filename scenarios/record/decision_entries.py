@@ -27,8 +27,7 @@ INSTANT = 1e-6  # Run time (s) far below any control period
 class JournalCoverage:
     """Follow the parts of one journal by their numbers, and find where some are lost.
 
-    A periodic journal, such as that of an agent with emulated links, has parts all the time. Any other has one with
-    each change, which says nothing about the time since the part before.
+    A periodic journal has parts all the time; any other has one with each change.
     """
 
     def __init__(self, *, periodic: bool) -> None:

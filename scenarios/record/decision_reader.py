@@ -22,7 +22,7 @@ from gridpeers.wire.messages import OFF, PLANT, Measurement, Nameplate, State
 from gridpeers.wire.timing import time_of
 
 _REACH = 2.0
-"""Time (s) before a lie's moment in which the true state is looked for first."""
+"""Time (s) before the moment of a lie in which the true state is sought first."""
 
 _NOTHING = Decision(0, 0, [], [], [], [])
 

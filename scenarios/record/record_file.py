@@ -1,9 +1,8 @@
 """Read the file of a record, whole or cut off, without trusting anything in it; and find it.
 
 The file is a sequence of MCAP records, each with its length before it. A process that is killed leaves the last one
-half written, and no index at the end. So no chunk is found by the index: the reader goes from record to record, which
-takes one look at each chunk of about a second, and stops where the file ends or makes no sense. There it can go on
-later, if the run is still recorded.
+half written, and no index at the end. So the reader does not use the index: it goes from record to record up to the
+end, and on from there later, if the run is still recorded.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Write the record of one case while it runs: chunks, each on the disk within a second of its first message.
 
-A thread of its own encodes, compresses and writes, so that the run waits for no disk; a run in one process writes in
-between. A full or broken disk ends the record with one sentence, and the run goes on. What is in the file can be read
-whatever ends the process.
+A thread encodes, compresses and writes, so that the run waits for no disk; a run in one process writes in between. A
+full or broken disk ends the record with one sentence, and the run goes on.
 """
 
 from __future__ import annotations
