@@ -60,6 +60,11 @@ class FeederImport:
         problem = f"{named or subject}: {text}"
         self.problems.append(f"{place}: {problem}" if place else problem)
 
+    def refuse_class(self, name: str) -> None:
+        """Refuse an element of a class that has no counterpart here."""
+        remedy = f'leave it out (leave_out=["{name}"]), and put an inverter there if it generates'
+        self.refuse(name, f"class {name.partition('.')[0]} is not taken over; {remedy}")
+
     def raise_problems(self) -> None:
         if self.problems:
             raise FeederError(self.file, tuple(self.problems))

@@ -125,10 +125,3 @@ WATCHING = frozenset(
     ]
 )
 """Classes that measure, or act only later or on what is refused anyway: they have no part in the network."""
-
-GENERATION = frozenset(  # classes whose place an inverter of ours can take
-    [
-        *("inverter", "inverter_dyn", "inverter_DYN", "solar", "battery", "energy_storage", "diesel_dg"),
-        *("windturb_dg", "rectifier", "sync_ctrl", "controller_dg", "dc_dc_converter", "central_dg", "microturbine"),
-    ]
-)

@@ -23,7 +23,6 @@ from gridpeers.bridges.gridlabd.glm_elements import SPLIT, GlmBranches, letters_
 from gridpeers.bridges.gridlabd.glm_text import (
     CHILD_OF_BUS,
     DATA,
-    GENERATION,
     LINEAR,
     LINES,
     SWITCHES,
@@ -43,10 +42,6 @@ LIVE = 0.5
 BALANCED = 1e-7  # largest unbalance (pu) of the substation's voltage that is rounding
 OBJECT = re.compile(r"\(obj=\d+;([^)]+)\)")  # an object in a message of GridLAB-D's
 
-REFUSED = {  # words for some classes that are not taken over, and what to do
-    **dict.fromkeys(GENERATION, "class {} is not taken over; {} or put an inverter there"),
-    "player": "what a player changes in time is not taken over; {1}",
-}
 NOTED = {"volt_var_control": "what it controls stays as it is", "fuse": "stays as it is"}
 KNOWN = DATA | WATCHING | LINEAR | SWITCHES | NOTED.keys() | set(CHILD_OF_BUS)
 
@@ -155,8 +150,7 @@ class _GlmReader:
                 if kind in NOTED:
                     self._found.notes.append(f"{called}: {NOTED[kind]}")
                 elif kind not in KNOWN:
-                    text = REFUSED.get(kind, "objects of class {} are not supported; {}")
-                    self._found.refuse(called, text.format(kind, f'leave it out (leave_out=["{called}"])'))
+                    self._found.refuse_class(called)
 
     def _note_settling(self) -> None:
         settling = self._model.get("settling")

@@ -31,9 +31,6 @@ NOTED = {  # classes that change others by themselves, and what becomes of these
 SILENT = METERS | {"regcontrol", "capcontrol", "load"}
 """Classes without anything to do or to say: controls that have acted in the snapshot, and loads, which come apart."""
 
-REFUSED = dict.fromkeys(("windgen", "indmach012", "isource"), "class {} is not taken over; {} or put an inverter there")
-"""Classes whose place an inverter of ours can take."""
-
 
 def main() -> None:
     serve("the OpenDSS engine", read_circuit)
@@ -73,7 +70,6 @@ def read_circuit(request: dict[str, Any], tell: Tell) -> FeederImport:
     for name in there:
         tell(f"{path.name}: {name}")
         kind = name.partition(".")[0]
-        hint = f'leave it out (leave_out=["{name}"])'
         if kind in LINEAR:
             taken.add(name)
         elif kind == "vsource":
@@ -83,8 +79,7 @@ def read_circuit(request: dict[str, Any], tell: Tell) -> FeederImport:
         elif kind in NOTED:
             found.notes.append(f"{name}: {NOTED[kind]}")
         elif kind not in SILENT:
-            refusal = REFUSED.get(kind, "elements of class {} are not supported; {}")
-            found.refuse(name, refusal.format(kind, hint))
+            found.refuse_class(name)
     found.add_loads([*read_loads(engine, left_out, taken.bus_names, found), *generated])
     lines = [name for name in there if name.startswith("line.")]
     for name in wanted:

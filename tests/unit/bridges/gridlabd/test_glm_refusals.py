@@ -57,7 +57,7 @@ ONE_LINE = {
         + HEAD
         + CENTRE_TAP
         + "object house { name h1; parent tm; }\n",
-        'feeder.glm:24: house.h1: objects of class house are not supported; leave it out (leave_out=["house.h1"])',
+        'feeder.glm:24: house.h1: class house is not taken over; leave it out (leave_out=["house.h1"])',
     ),
     "an inverter": (
         "module generators;\n"
@@ -123,7 +123,7 @@ def test_all_that_is_not_supported_comes_at_once(tmp_path: Path) -> None:
 
     said = refused.value.problems
     assert len(said) == 4
-    assert any("player.p1: what a player changes in time is not taken over" in problem for problem in said)
+    assert any("player.p1: class player is not taken over; leave it out" in problem for problem in said)
     feeder = read_glm(path, leave_out=["player.*", "load.delta"])
     assert {part.S for part in feeder.load_parts if part.name == "load.wye"} >= {9e4 + 1e4j}
     assert all(part.name != "load.delta" for part in feeder.load_parts)

@@ -28,10 +28,10 @@ ONE_LINE = {
     ),
     "a control of storage": (
         "New Storage.s bus1=c kv=0.48 kwrated=50 kwhrated=100\nNew StorageController.k element=Line.head elementlist=s",
-        "storagecontroller.k: elements of class storagecontroller are not supported; leave it out",
+        "storagecontroller.k: class storagecontroller is not taken over; leave it out",
     ),
     "IndMach012": ("New IndMach012.m bus1=c kv=0.48 kva=50", 'leave_out=["indmach012.m"]'),
-    "UPFC": ("New UPFC.u bus1=c bus2=d refkv=0.277", "elements of class upfc are not supported"),
+    "UPFC": ("New UPFC.u bus1=c bus2=d refkv=0.277", "class upfc is not taken over"),
     "two sources": ("New Vsource.two bus1=c basekv=0.48", "vsource.two: a second source"),
     "a line of no length": ("New Line.z bus1=c bus2=d r1=0.1 x1=0.1 length=0", 'Matrix Inversion Error for Line "z"'),
     "a load on a missing phase": (
