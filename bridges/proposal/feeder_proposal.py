@@ -252,18 +252,6 @@ class NoSwitchError(NoProposalError):
         super().__init__(f"no switch cuts half of the load off the substation; {hint}")
 
 
-class TooLargeError(NoProposalError):
-    """An inverter would be larger than its voltage allows; so many inverters as `needed` may be enough."""
-
-    def __init__(self, row: InverterRow, most: float, load: float, count: int) -> None:
-        self.needed = ceil(count * row.P_rated / most)
-        super().__init__(
-            f"{count} inverters for the load of {load / 1e3:.0f} kW need one of {row.P_rated / 1e3:.0f} kW at bus "
-            f"{row.bus}, where {most / 1e3:.0f} kW are plausible; give more --inverters, if there are buses for "
-            "them, or another --switch"
-        )
-
-
 RATING = 1.3
 """Rating of all inverters of a section beside its load at nominal voltage, were all phases loaded as the heaviest."""
 IMPORTED = 0.1  # part of the load, less the fixed generation, that comes over the islanding switch before it opens
@@ -292,12 +280,18 @@ def propose(feeder: Feeder, count: int | None = None) -> Proposal:
     """
     needed = 0
     while True:
-        try:
-            return _propose(feeder, count or needed or None)
-        except TooLargeError as error:
-            if count is not None or error.needed <= needed:  # there are no buses for more
-                raise
-            needed = error.needed
+        proposal = _propose(feeder, count or needed or None)
+        large = max(proposal.inverters, key=lambda row: row.P_rated / most_rated(row.V_nom))
+        most, number, before = most_rated(large.V_nom), len(proposal.inverters), needed
+        if large.P_rated <= most:
+            return proposal
+        needed = ceil(number * large.P_rated / most)
+        if count is not None or needed <= before:  # there are no buses for more
+            raise NoProposalError(
+                f"{number} inverters for the load of {proposal.load / 1e3:.0f} kW need one of "
+                f"{large.P_rated / 1e3:.0f} kW at bus {large.bus}, where {most / 1e3:.0f} kW are plausible; give more "
+                "--inverters, if there are buses for them, or another --switch"
+            )
 
 
 def _propose(feeder: Feeder, count: int | None) -> Proposal:
@@ -353,9 +347,6 @@ def _propose(feeder: Feeder, count: int | None) -> Proposal:
                         neutral=neutral_for("", rows[bus], "ABC", neutrals.get(bus, "")),
                     )
                 )
-    large = max(inverters, key=lambda row: row.P_rated / most_rated(row.V_nom))
-    if large.P_rated > (most := most_rated(large.V_nom)):
-        raise TooLargeError(large, most, total, len(inverters))
     total_rated = sum(row.P_rated for row in inverters)
     P_set0 = (1.0 - IMPORTED) * max(total - generation, 0.0) / total_rated
     return Proposal(switch, tuple(inverters), round(P_set0, 3), total, heaviest)
