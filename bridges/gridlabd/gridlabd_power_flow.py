@@ -218,14 +218,14 @@ class PowerFlowModel:
             result |= self._solver_tables()
         return result
 
-    def _objects(self) -> list[dict[str, Any]]:
-        found = []
+    def _objects(self) -> dict[str, tuple[str, str, tuple[float, float]]]:
+        """Return class, parent and coordinates of each object."""
+        found = {}
         for name, kind in self._classes.items():
             head = self._core.head(name)
             parent = ObjectHead.from_address(head.parent).name.decode() if head.parent else ""
-            place = (head.longitude, head.latitude)
-            known = all(map(math.isfinite, place))
-            found.append({"name": name, "class": kind, "parent": parent, "place": place if known else (0.0, 0.0)})
+            known = math.isfinite(head.longitude) and math.isfinite(head.latitude)
+            found[name] = kind, parent, (head.longitude, head.latitude) if known else (0.0, 0.0)
         return found
 
     def _keep_quiet(self) -> None:

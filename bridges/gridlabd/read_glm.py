@@ -97,8 +97,8 @@ class _GlmReader:
         self._model = model
         found = self._found = FeederImport(path.name)
         found.name, found.f_nom = path.stem, model["f_nom"]
-        self._classes = {row["name"]: row["class"] for row in model["objects"]}
-        self._parents = {row["name"]: row["parent"] for row in model["objects"]}
+        self._classes = {name: kind for name, (kind, _, _) in model["objects"].items()}
+        self._parents = {name: parent for name, (_, parent, _) in model["objects"].items()}
         self._buses = {bus["name"]: bus for bus in model["buses"]}
         places = {name: text.place(name) for name in self._classes}
         found.places = {each: at for n, at in places.items() if at for each in (self._called(n), f"bus {n}")}
@@ -136,9 +136,8 @@ class _GlmReader:
             )
         found.raise_problems()
         self._add_source(branches)
-        at = {row["name"]: row["place"] for row in model["objects"]}
         for name, bus in self._buses.items():
-            found.buses[bus["bus"]] = (bus["V_nom"], *at[name])
+            found.buses[bus["bus"]] = (bus["V_nom"], *model["objects"][name][2])
         if all(self._classes[name] == "player" for name in self._left_out):  # else they are those of another network
             found.V = {(self._buses[bus]["bus"], letter): each for (bus, letter), each in V.items()}
         return found

@@ -51,9 +51,8 @@ def read_circuit(request: dict[str, Any], tell: Tell) -> FeederImport:
     engine = DssEngine(found, tell)
     engine.read(path, Path.cwd())
     circuit = engine.circuit
-    names = (str(name).lower().rpartition(".") for name in circuit.YNodeOrder)
-    order = [(bus, int(number)) for bus, _, number in names]
-    for bus in dict.fromkeys(bus for bus, number in order if number > len(NODES)):
+    nodes = [str(name).lower().rpartition(".") for name in circuit.YNodeOrder]
+    for bus in dict.fromkeys(bus for bus, _, number in nodes if int(number) > len(NODES)):
         found.refuse(f"bus {bus}", f"nodes above {len(NODES)} are not supported; give its nodes lower numbers")
     found.raise_problems()
     found.name, found.f_nom = str(circuit.Name), float(circuit.Solution.Frequency)
@@ -63,9 +62,8 @@ def read_circuit(request: dict[str, Any], tell: Tell) -> FeederImport:
     left_out = found.leave_out(everything, request["leave_out"], "PVSystem.pv1")
     there = [name for name in everything if name not in left_out]
     taken = DssElements(engine, found, wanted)
-    nodes = [(taken.bus_names[bus], letter_of(number)) for bus, number in order]
-    taken.order = nodes
-    found.V = dict(zip(nodes, complexes(circuit.YNodeVarray).tolist(), strict=True))
+    taken.order = [(taken.bus_names[bus], letter_of(int(number))) for bus, _, number in nodes]
+    found.V = dict(zip(taken.order, complexes(circuit.YNodeVarray).tolist(), strict=True))
     generated: list[LoadPart] = []
     for name in there:
         tell(f"{path.name}: {name}")
