@@ -18,12 +18,8 @@ if TYPE_CHECKING:
 CheckStatus = Literal["passed", "failed", "not judged", "off"]  # Off: the scenario takes it out of the verdict
 
 SHOWN_VIOLATIONS = 20  # Most violations that a verdict keeps; it counts up to `MOST_VIOLATIONS`
-
-MOST_VIOLATIONS = 1_000_000
-"""Violations after which a check is asked for no more: some seconds, and a check that never ends yields ever more."""
-
-INTERRUPTED = "interrupted"
-"""Reason of a check that was not judged because somebody ended the run while it, or one before it, judged."""
+MOST_VIOLATIONS = 1_000_000  # After so many a check is asked for no more: one that never ends yields ever more
+INTERRUPTED = "interrupted"  # Reason of a check that was not judged because somebody ended the run before
 
 
 class NotJudgedError(Exception):

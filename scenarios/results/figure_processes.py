@@ -1,7 +1,6 @@
 """Draw the figures of a run on all cores, by processes that have imported matplotlib while the run went on.
 
-Matplotlib takes 0.25 s to import and 1 s to draw the figures of a case, longer than the case takes. Nothing else is
-left to do then, so that each core draws a part of them.
+Matplotlib takes 0.25 s to import and 1 s to draw the figures of a case, longer than the case takes.
 """
 
 from __future__ import annotations

@@ -23,8 +23,7 @@ NUMBER = 18  # Bytes of a number in history.csv with its comma: 17.5 measured ov
 VERDICT, VERDICT_UNDER_WAY = 36, 26
 """Bytes of a message's row in links.csv, and in the file that keeps it while the case runs."""
 
-RECORDED_NUMBER = 6
-"""Bytes of a number of telemetry in run.mcap, compressed: 5.2 to 7.5 measured with the rows for viewers."""
+RECORDED_NUMBER = 6  # Bytes of a number of telemetry in run.mcap, compressed: 5.2 to 7.5 measured
 
 RECORDED_DECISION = {"simulated": 75, "wall": 150}
 """Bytes of a decision in run.mcap with its measurement and its state, compressed, by kind of time: 50 (75 in one

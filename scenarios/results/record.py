@@ -1,8 +1,7 @@
 """Record one case of a run, by any driver: history.csv, events.csv and the files of its links, or all in memory.
 
-Nothing is ever half-written under its own name: rows go to `history.partial.csv` while the case runs, and the file
-gets its name when the last row is there. The rows of a broken case keep the partial name. A recorder with a
-folder keeps no rows in memory: a run that lasts for hours takes no more than a short one.
+Rows go to `history.partial.csv` while the case runs, which gets its name when the last row is there, and keeps the
+partial one if the case breaks.
 """
 
 from __future__ import annotations
@@ -18,7 +17,6 @@ import msgspec
 from gridpeers.scenarios.results.link_record import LinkRecord
 from gridpeers.scenarios.results.run_files import csv_text, write_whole
 from gridpeers.wire.messages import Journal, LinkReport, LinkRequest, PlantEvent, Telemetry
-from gridpeers.wire.wording import not_importable
 
 if TYPE_CHECKING:
     from gridpeers.scenarios.record.record_info import RecordInfo
@@ -69,10 +67,9 @@ def header(inverters: tuple[str, ...]) -> tuple[str, ...]:
 class Recorder:
     """Record one case: call it with every message that the plant publishes for recorders, then `finish()`.
 
-    With a folder it writes history.csv, events.csv, links.csv and links.json and keeps no rows; without one it keeps
-    the rows in memory and writes nothing. The hash of the bytes of history.csv is the same either way. Rows may be
-    missing (`gaps`) in a run whose recorder was out of reach; else that is an error. `record` is the run of a run.mcap
-    beside.
+    With a folder it writes history.csv, events.csv, links.csv and links.json and keeps no rows, so that hours take no
+    more memory than seconds; without one it keeps the rows and writes nothing. The hash is the same either way. Rows
+    may be missing (`gaps`) in a run whose recorder was out of reach. `record` is the run of a run.mcap beside.
     """
 
     def __init__(self, folder: Path | None = None, *, gaps: bool = False, record: RecordInfo | None = None) -> None:
@@ -86,12 +83,10 @@ class Recorder:
         self._not_recorded = ""
         """Why there is no run.mcap though one was asked for."""
         if folder is not None and record is not None:
-            try:
-                from gridpeers.scenarios.record.record_writer import Recording
+            from gridpeers.scenarios.record.record_writer import Recording  # imports mcap, which a sweep does without
 
+            try:
                 self._recording = Recording(folder, record, QUANTITIES)
-            except ImportError as error:
-                self._not_recorded = f"there is no run.mcap: {not_importable(error)}"
             except OSError as error:
                 self._not_recorded = f"there is no run.mcap: it cannot be made: {error.strerror}"
         self._finished = False

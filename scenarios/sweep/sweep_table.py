@@ -47,7 +47,6 @@ INDEXES = {
 }
 
 GRAPH_WORDS = {"graph.links": "links of the graph", "graph.lambda_2": "algebraic connectivity, lambda_2"}
-"""Axis labels for the parameters of drawn graphs, which no scenario file has."""
 
 
 def unit_of(name: str) -> str:
