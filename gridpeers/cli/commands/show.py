@@ -34,8 +34,7 @@ def check(
     """Check a scenario file and its feeder for problems.
 
     All problems come at once. A file without any is tried: whether its feeder has an operating point to start from.
-    Notes tell what its events de-energise, which agents lie, where a graph bears fewer liars than
-    its law should, and how to run it if it asks for certificates.
+    Notes tell what its events de-energise, which agents lie, and where a graph bears fewer liars than its law should.
 
     Exit code: 0 it can be run, 2 it has problems.
 

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import re
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -126,27 +125,6 @@ def test_a_viewer_is_told_who_may_command(elsewhere: Path) -> None:
     assert invoke("keys", "revoke", "operator", "--keys", "lab")[0] == 0
     named = refused("down", "--keys", "lab", "--as", "viewer")
     assert f"{said}operator may: gridpeers keys issue NAME --role operator" in named
-
-
-def test_check_says_of_a_scenario_with_certificates_how_to_run_it(elsewhere: Path) -> None:
-    """The three commands of its note work as they stand; a scenario without `security` has no such note."""
-    tables = MTLS + '[[event]]\nlabel = "more"\nt_s = 0.06\njoin = ["inv10"]\n'
-    (elsewhere / "mtls.toml").write_text(tables)
-    (elsewhere / "open.toml").write_text(tables.replace("mtls", "none"))
-    code, said = invoke("check", "mtls.toml")
-
-    assert code == 0, said
-    note, line = said.splitlines()
-    commands = re.findall(r"gridpeers (.*?)(?:, then| \(|; )", note)
-    assert [words.split()[0] for words in commands] == ["keys", "keys", "run"], note
-    assert " (docs/security.md); --driver inprocess needs none" in note
-    assert invoke("check", "open.toml")[1] == line.replace("mtls.toml", "open.toml") + "\n"
-    for words in commands[:2]:
-        assert invoke(*words.split())[0] == 0, words
-    assert {f"inv{k}" for k in range(1, 11)} <= {
-        row.split()[1] for row in invoke("keys", "show", "--keys", "lab")[1].splitlines()
-    }
-    assert commands[2] == "run mtls.toml --keys lab"
 
 
 FAR, NEAR = "tcp/192.0.2.1:7447", "tcp/127.0.0.1:1"
