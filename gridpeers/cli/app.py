@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 import sys
 from contextlib import suppress
-from pathlib import Path
 
 from gridpeers.wire.driver.ending import leave, speaking
 from gridpeers.wire.driver.machine import raise_limit, too_few_files
@@ -52,16 +51,7 @@ def _main() -> None:
         except KeyboardInterrupt:
             fail(["interrupted; everything that was started has ended"], INTERRUPTED)
         except OSError as error:  # the machine refuses something: no memory for a process, no room on a disk
-            fail([too_few_files(error) or _without_folder() or str(error)], BROKEN)
-
-
-def _without_folder() -> str:
-    """Return what to do if the present folder has been removed; empty if it is there."""
-    try:
-        Path.cwd()
-    except FileNotFoundError:
-        return "the present folder is gone; change to one that is there (cd), and give the command again"
-    return ""
+            fail([too_few_files(error) or str(error)], BROKEN)
 
 
 def _start_ahead(words: list[str]) -> None:

@@ -291,23 +291,3 @@ def test_the_version_is_told_without_a_command() -> None:
     from importlib.metadata import version
 
     assert invoke("--version") == (0, f"gridpeers {version('gridpeers')}\n")
-
-
-def test_a_present_folder_that_is_gone_is_told_with_what_to_do(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Paths are sought from it, so any command may miss it."""
-    pytest.importorskip("cryptography", reason="certificates need the extra keys")
-    from gridpeers.cli import app
-
-    gone = tmp_path / "gone"
-    gone.mkdir()
-    monkeypatch.chdir(gone)
-    monkeypatch.setattr(sys, "argv", ["gridpeers", "keys", "init", "lab"])
-    monkeypatch.setattr(app, "leave", lambda status: None)  # which would end this process
-    gone.rmdir()
-    with pytest.raises(SystemExit) as ended:
-        app.main()
-
-    told = "gridpeers: the present folder is gone; change to one that is there (cd), and give the command again\n"
-    assert (ended.value.code, capsys.readouterr().err) == (3, told)
