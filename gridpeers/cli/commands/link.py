@@ -2,29 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.cli.commands.options import LiveRun, of_live_run
 from gridpeers.cli.suggestions import Commands
 from gridpeers.cli.usage import BROKEN, fail
-from gridpeers.netem.fault_schedule import Heal
-from gridpeers.netem.models.delay import DELAY, LONGEST_DELAY, Constant, RandomDelay, Uniform
-from gridpeers.netem.models.medium import Cut
-from gridpeers.netem.schema.fault import Fault
-from gridpeers.netem.schema.pattern import objections
-from gridpeers.scenarios.emulation.link_data import EVERYTHING, LinkCommand
 from gridpeers.scenarios.live.run_address import UsageError
-from gridpeers.scenarios.live.run_requests import (
-    check_link_command,
-    command_links,
-    link_states,
-    links_of_run,
-    links_text,
-)
-from gridpeers.wire.schema.table_schema import Plausible
+
+if TYPE_CHECKING:
+    from gridpeers.agents.agent_config import AgentConfig
+    from gridpeers.scenarios.emulation.link_data import LinkCommand
 
 link = typer.Typer(
     cls=Commands,
@@ -92,6 +81,8 @@ def cut(
 
     Example:  gridpeers link cut inv4 inv7 --for 5
     """
+    from gridpeers.netem.models.medium import Cut
+
     _give(links, "->" if one_way else "<->", {"cut": Cut(hold=hold)}, duration, live)
 
 
@@ -124,6 +115,8 @@ def show(live: LiveRun) -> None:
 
     Example:  gridpeers link show
     """
+    from gridpeers.scenarios.live.run_requests import link_states, links_text
+
     with live.client() as client:
         t, states, silent = link_states(client)
         typer.echo(links_text(live.run, t, states), nl=False)
@@ -132,6 +125,9 @@ def show(live: LiveRun) -> None:
 
 
 def _delay(delay: float | None, jitter: float | None) -> dict[str, Any]:
+    from gridpeers.netem.models.delay import DELAY, LONGEST_DELAY, Uniform
+    from gridpeers.wire.schema.table_schema import Plausible
+
     if jitter is None:
         return {} if delay is None else {"delay": delay}
     if delay is None:
@@ -146,8 +142,6 @@ def _delay(delay: float | None, jitter: float | None) -> dict[str, Any]:
 
 
 def _pattern(links: list[str], arrow: str) -> str:
-    if not links:
-        return EVERYTHING
     if "-" in links:
         raise UsageError('LINKS: the shell took the arrow for a redirection; put the pattern in quotes: "inv1 -> inv4"')
     if len(links) == 2 and not any("->" in word for word in links):
@@ -161,7 +155,13 @@ def _pattern(links: list[str], arrow: str) -> str:
 
 def _give(links: list[str], arrow: str, fault: dict[str, Any] | None, duration: float | None, live: LiveRun) -> None:
     """Check a link command, give it, and print the receivers' answers; without a fault it heals."""
-    on = _pattern(links, arrow)
+    from gridpeers.netem.fault_schedule import Heal
+    from gridpeers.netem.schema.fault import Fault
+    from gridpeers.netem.schema.pattern import objections
+    from gridpeers.scenarios.emulation.link_data import EVERYTHING, LinkCommand
+    from gridpeers.scenarios.live.run_requests import check_link_command, command_links, links_of_run
+
+    on = _pattern(links, arrow) if links else EVERYTHING
     if wrong := objections(on, None, {}):
         raise UsageError(f"LINKS: {wrong[0]}")
     command = LinkCommand(
@@ -189,6 +189,8 @@ def _give(links: list[str], arrow: str, fault: dict[str, Any] | None, duration: 
 
 def _note_age(command: LinkCommand, agent: AgentConfig) -> None:
     """Print a note if agents will ignore states for their age."""
+    from gridpeers.netem.models.delay import Constant, RandomDelay
+
     delay = command.fault.models().get("delay") if command.fault is not None else None
     limit = agent.control.degraded_communication.max_age or agent.max_age
     usual = delay.delay_s if isinstance(delay, Constant) else 0.0
