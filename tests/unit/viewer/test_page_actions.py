@@ -89,7 +89,7 @@ def commands(monkeypatch: pytest.MonkeyPatch) -> list[Command]:
     told: list[Command] = []
     monkeypatch.setattr(Plant, "commands", told, raising=False)
     monkeypatch.setattr("gridpeers.viewer.page_actions.RunClient", Plant)
-    monkeypatch.setattr("gridpeers.cli.commands.options.RunClient", Plant)
+    monkeypatch.setattr("gridpeers.scenarios.live.run_client.RunClient", Plant)
     return told
 
 
