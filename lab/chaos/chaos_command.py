@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from gridpeers.lab.chaos.campaign import Campaign
-    from gridpeers.scenarios.schema import ScenarioModel
 
 _PACKAGES = {"hypothesis": "the schedules", "joblib": "the runs over all cores"}
 
@@ -81,7 +80,12 @@ def chaos(
     """
     spec, feeder = load(scenario)
     spec = chosen(spec, case or list(spec.cases)[-1], None)
-    _refuse_unless_possible(scenario, spec, case, driver)
+    if len(spec.cases) > 1:
+        fail([f"--case: takes one case, got {case}"], BAD_INPUT)
+    if (simulator := spec.plant.simulator) != "gridpeers":
+        fail([f'{scenario}: plant.simulator = "{simulator}" lets nobody leave or join; use "gridpeers"'], BAD_INPUT)
+    if spec.security == "mtls" and driver == "processes":
+        fail([f'{scenario}: security = "mtls" needs certificates, which chaos does not take; leave it out'], BAD_INPUT)
     if dask and driver == "processes":
         fail(["--dask: its workers run each run in one process; leave --driver processes out"], BAD_INPUT)
     require(
@@ -147,16 +151,6 @@ def chaos(
         typer.echo(line)
     typer.echo(f"\nResults: {shown(path)}/")
     raise typer.Exit(CLAIM_FAILED if campaign.violated else PASSED)
-
-
-def _refuse_unless_possible(scenario: str, spec: ScenarioModel, case: str | None, driver: str) -> None:
-    if len(spec.cases) > 1:
-        fail([f"--case: takes one case, got {case}"], BAD_INPUT)
-    if spec.plant.simulator != "gridpeers":
-        simulator = spec.plant.simulator
-        fail([f'{scenario}: plant.simulator = "{simulator}" lets nobody leave or join; use "gridpeers"'], BAD_INPUT)
-    if spec.security == "mtls" and driver == "processes":
-        fail([f'{scenario}: security = "mtls" needs certificates, which chaos does not take; leave it out'], BAD_INPUT)
 
 
 def _try_undisturbed(console: Console, campaign: Campaign) -> None:

@@ -30,14 +30,11 @@ TRIES = 150
 
 MOST_DISTURBANCES = 10
 
-LONGEST_S = 2.0
-
-AFTER_S = 0.5
+BEGIN_S, AFTER_S, LONGEST_S = 0.2, 0.5, 2.0
+"""Times (s): the earliest beginning, the latest one after the scenario's own last change, the longest disturbance."""
 
 MOST_LOADS = 20
 """Most loads that a step changes: a quarter of those of the standard feeder."""
-
-BEGIN_S = 0.2
 
 _FAR = 7_203_117_000_000_061
 """A number that no program is likely to contain. hypothesis prefers integers that it finds in the source code of

@@ -23,8 +23,6 @@ voltage controllers and the GFL's volt-var take. So the law
 
 with n ticks of link delay is followed from a random start on the plant's tick-by-tick response; the last seconds show
 its slowest mode.
-
-MQSI over time is not predicted.
 """
 
 from __future__ import annotations

@@ -37,17 +37,10 @@ def counterfactual_figure(was: Drawing, would_be: Drawing, words: str, since: fl
         if since > 0.0:
             for panel in figure.axes:
                 panel.axvline(since, color=ORANGE, linewidth=1.0, zorder=1)
-            late = since > 0.7 * float(top.get_xlim()[1])
-            top.annotate(
-                "changed",
-                (since, 0.04),
-                xycoords=top.get_xaxis_transform(),
-                xytext=(-4.0 if late else 4.0, 0.0),
-                textcoords="offset points",
-                ha="right" if late else "left",
-                color=ORANGE,
-                fontsize="small",
-            )
+            side = "right" if since > 0.7 * float(top.get_xlim()[1]) else "left"
+            place = {"transform": top.get_xaxis_transform(), "ha": side}
+            top.text(since, 0.04, " changed ", color=ORANGE, fontsize="small", **place)
+        legend_below(figure, top)
     return figure
 
 
