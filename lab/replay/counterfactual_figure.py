@@ -40,7 +40,6 @@ def counterfactual_figure(was: Drawing, would_be: Drawing, words: str, since: fl
             side = "right" if since > 0.7 * float(top.get_xlim()[1]) else "left"
             place = {"transform": top.get_xaxis_transform(), "ha": side}
             top.text(since, 0.04, " changed ", color=ORANGE, fontsize="small", **place)
-        legend_below(figure, top)
     return figure
 
 
