@@ -38,8 +38,8 @@ def counterfactual_figure(was: Drawing, would_be: Drawing, words: str, since: fl
             for panel in figure.axes:
                 panel.axvline(since, color=ORANGE, linewidth=1.0, zorder=1)
             side = "right" if since > 0.7 * float(top.get_xlim()[1]) else "left"
-            place = {"transform": top.get_xaxis_transform(), "ha": side}
-            top.text(since, 0.04, " changed ", color=ORANGE, fontsize="small", **place)
+            mark = top.text(since, 0.04, " changed ", color=ORANGE, fontsize="small", ha=side)
+            mark.set_transform(top.get_xaxis_transform())
     return figure
 
 
