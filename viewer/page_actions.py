@@ -100,12 +100,9 @@ class ActionClient:
         command = action.link_command()
         check_link_command(command, links_of_run(client)[0])
         result = command_links(client, command)
-        wrong = [f"{name}: {why}" for name, why in result.refused.items()]
-        if result.silent:
-            wrong.append(f"not acknowledged by {', '.join(result.silent)}; is it frozen? It will be told again")
-        if wrong:
-            raise UsageError(f"{result.text}; {'; '.join(wrong)}")
-        return f"{result.text}; from t = {result.t:.2f} s on" if result.changes_links else result.text
+        if result.failures:
+            raise UsageError("; ".join([result.text, *result.failures]))
+        return result.text
 
     def close(self) -> None:
         if self._client is not None:

@@ -5,10 +5,9 @@ from __future__ import annotations
 import secrets
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from math import inf
 from time import monotonic
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, NamedTuple, TypeVar
 
 import msgspec
 
@@ -68,37 +67,58 @@ def request(
     """Give the plant a command; return its answer, and those of its `receivers` that come in time.
 
     The command has a number that nobody else knows, which the plant repeats: anybody may have answers sent here.
-    Acknowledgements have the number that the plant's answer names. A question is asked again until its answer comes.
+    Acknowledgements have the number that the plant's answer names. Only a question is asked again.
     """
     number = secrets.randbelow(MOST_COUNT)
     command = Command(sender="visitor", epoch=0, seq=number, t=0.0, reply_to=client.id, verb=verb, **command_fields)
-    answer: Answer | None = None
+    answers: list[Answer] = []
     came: dict[int, dict[str, LinkAcknowledgement]] = defaultdict(dict)
-    acknowledged: dict[str, LinkAcknowledgement] = {}
-    now = ask_at = monotonic()
-    end = now + wait
-    while now < end:
-        if now >= ask_at:
-            client.publish(client.keys.for_verb(verb), encode(command))
-            ask_at = now + ASKED_AGAIN if verb in ("status", "links") else inf
-        for key, payload, _ in client.take(min(end, ask_at) - now):
-            message = client.read(key, payload)
-            if isinstance(message, LinkAcknowledgement):
-                came[message.seq][message.sender] = message
-            elif isinstance(message, Answer) and message.seq == number:
-                if not message.ok:
-                    raise RefusedError(message.text)
-                answer, end, ask_at = message, monotonic() + ACKNOWLEDGED, inf
-                named = message.data.get("number")
-                acknowledged = came[named] if isinstance(named, int) else {}  # anybody may have sent the answer
-        if answer is not None and acknowledged.keys() >= receivers(answer):
-            break
-        now = monotonic()
-    if answer is None:
+
+    def take(key: str, payload: bytes) -> None:
+        message = client.read(key, payload)
+        if isinstance(message, LinkAcknowledgement):
+            came[message.seq][message.sender] = message
+        elif isinstance(message, Answer) and message.seq == number:
+            answers.append(message)
+
+    def give() -> None:
+        client.publish(client.keys.for_verb(verb), encode(command))
+
+    again = ASKED_AGAIN if verb in ("status", "links") else inf
+    if not _hear(client, take, lambda: bool(answers), wait, give, again):
         raise NobodyError(
             f"the plant of {client.where} is there but has not answered within {wait:.3g} s; is it frozen?"
         )
+    answer = answers[0]
+    if not answer.ok:
+        raise RefusedError(answer.text)
+    awaited, named = receivers(answer), answer.data.get("number")
+    acknowledged = came[named] if isinstance(named, int) else {}  # anybody may have sent the answer
+    _hear(client, take, lambda: acknowledged.keys() >= awaited, ACKNOWLEDGED)
     return answer, acknowledged
+
+
+def _hear(
+    client: RunClient,
+    take: Callable[[str, bytes], None],
+    done: Callable[[], bool],
+    wait: float,
+    ask: Callable[[], None] = lambda: None,
+    again: float = inf,
+) -> bool:
+    """Ask, and `again` (s) later, and take what comes until it is `done`; return False if that takes `wait` (s)."""
+    now = ask_at = monotonic()
+    end = now + wait
+    while not done():
+        if now >= end:
+            return False
+        if now >= ask_at:
+            ask()
+            ask_at = now + again
+        for key, payload, _ in client.take(min(end, ask_at) - now):
+            take(key, payload)
+        now = monotonic()
+    return True
 
 
 def plant_status(client: RunClient, wait: float = ANSWER) -> PlantStatus:
@@ -159,21 +179,17 @@ def configurations(client: RunClient, name: str = "", wait: float = ANSWER) -> d
     known: dict[str, AgentConfig] = {}
     credentials = client.where.credentials
     is_agent = credentials is not None and credentials.own.role == "agent"
-    key = client.keys.config(name if is_agent else "*")
-    now = ask_at = monotonic()
-    end = now + wait
-    while not (name in known if name else known):
-        if now >= end:
-            what = f"the configuration of {name}" if name else "a configuration"
-            raise NobodyError(f"no answer: the plant of {client.where} has not sent {what} within {wait:.3g} s")
-        if now >= ask_at:
-            client.fetch(key)
-            ask_at = now + ASKED_AGAIN
-        for _, payload, _ in client.take(min(end, ask_at) - now):
-            config = read_config(payload)
-            if config is not None:
-                known[config.name] = config
-        now = monotonic()
+
+    def ask_plant() -> None:
+        client.fetch(client.keys.config(name if is_agent else "*"))
+
+    def take(_: str, payload: bytes) -> None:
+        if config := read_config(payload):
+            known[config.name] = config
+
+    if not _hear(client, take, lambda: name in known if name else bool(known), wait, ask_plant, ASKED_AGAIN):
+        what = f"the configuration of {name}" if name else "a configuration"
+        raise NobodyError(f"no answer: the plant of {client.where} has not sent {what} within {wait:.3g} s")
     return known
 
 
@@ -230,27 +246,15 @@ class _LinkReply(msgspec.Struct, frozen=True):
     asked: tuple[str, ...]
     receivers: tuple[str, ...] = ()
 
-    @property
-    def reached(self) -> tuple[str, ...]:
-        """Receivers of a command that take part: the plant, and the agents that it has sent the command."""
-        return tuple(name for name in self.receivers if name == PLANT or name in self.asked)
 
-
-@dataclass(frozen=True, kw_only=True)
-class LinkCommandResult:
-    t: float
+class LinkCommandResult(NamedTuple):
     text: str
-    """Its effect in words: a heal names only links that had a fault."""
-    acknowledged: tuple[str, ...]
-    silent: tuple[str, ...]
-    """Receivers that take part and have not answered in time."""
-    absent: tuple[str, ...]
+    """Its effect in words, and from when on; a heal names only links that had a fault."""
+    acknowledged: list[str]
+    absent: list[str]
     """Receivers without an agent: the plant tells the agent when it comes."""
-    refused: Mapping[str, str]
-
-    @property
-    def changes_links(self) -> bool:
-        return bool(self.acknowledged or self.silent or self.absent or self.refused)
+    failures: list[str]
+    """Sentences on receivers that refused, or that take part and have not answered in time."""
 
 
 def links_of_run(client: RunClient) -> tuple[EmulationConfig, AgentConfig]:
@@ -274,22 +278,31 @@ def check_link_command(command: LinkCommand, setup: EmulationConfig | None) -> N
 
 def command_links(client: RunClient, command: LinkCommand) -> LinkCommandResult:
     """Give a command and wait until every receiver concerned has taken it, or for `ACKNOWLEDGED` seconds."""
-    answer, reply, answers = _request(client, "link", link_command=command.to_tree())
-    refused = {name: answers[name].text for name in reply.reached if name in answers and not answers[name].ok}
-    silent = tuple(name for name in reply.reached if name != PLANT and name not in answers)
+
+    def agents(answer: Answer) -> set[str]:  # for itself the plant has answered
+        reply = data_of(client, answer, _LinkReply)
+        return {*reply.receivers} & {*reply.asked}
+
+    answer, answers = request(client, agents, verb="link", link_command=command.to_tree())
+    reply = data_of(client, answer, _LinkReply)
+    reached = [name for name in reply.receivers if name == PLANT or name in reply.asked]
+    silent = [name for name in reached if name != PLANT and name not in answers]
+    refused = {name: answers[name].text for name in reached if name in answers and not answers[name].ok}
+    failures = [f"{name}: {why}" for name, why in refused.items()]
+    if silent:
+        failures.append(f"not acknowledged by {', '.join(silent)}; is it frozen? It will be told again")
     return LinkCommandResult(
-        t=reply.t,
-        text=answer.text,
-        acknowledged=tuple(name for name in reply.reached if name not in refused and name not in silent),
-        silent=silent,
-        absent=tuple(name for name in reply.receivers if name not in reply.reached),
-        refused=refused,
+        text=f"{answer.text}; from t = {reply.t:.2f} s on" if reply.receivers else answer.text,
+        acknowledged=[name for name in reached if name not in refused and name not in silent],
+        absent=[name for name in reply.receivers if name not in reached],
+        failures=failures,
     )
 
 
-def link_states(client: RunClient) -> tuple[float, dict[tuple[str, str], LinkStatus], tuple[str, ...]]:
+def link_states(client: RunClient) -> tuple[float, dict[tuple[str, str], LinkStatus], list[str]]:
     """Return the run time (s), the state of every link that has or had a fault, and the receivers without an answer."""
-    _, reply, answers = _request(client, "links")
+    answer, answers = request(client, lambda it: {*data_of(client, it, _LinkReply).asked, PLANT}, verb="links")
+    reply = data_of(client, answer, _LinkReply)
     statuses: dict[tuple[str, str], LinkStatus] = {}
     for name, acknowledgement in answers.items():
         if acknowledgement.ok:
@@ -298,20 +311,7 @@ def link_states(client: RunClient) -> tuple[float, dict[tuple[str, str], LinkSta
             except msgspec.DecodeError:  # counts as no answer
                 continue
             statuses |= {(src, name): state for src, state in of_sender.items()}
-    return reply.t, statuses, tuple(name for name in reply.asked if name not in answers)
-
-
-def _request(
-    client: RunClient, verb: Verb, **command_fields: Any
-) -> tuple[Answer, _LinkReply, dict[str, LinkAcknowledgement]]:
-    def receivers(answer: Answer) -> set[str]:
-        reply = data_of(client, answer, _LinkReply)
-        if verb == "link":  # for itself the plant has answered
-            return {*reply.reached} - {PLANT}
-        return {*reply.asked, PLANT}
-
-    answer, answers = request(client, receivers, verb=verb, **command_fields)
-    return answer, data_of(client, answer, _LinkReply), answers
+    return reply.t, statuses, [name for name in reply.asked if name not in answers]
 
 
 def links_text(run: str, t: float, states: Mapping[tuple[str, str], LinkStatus]) -> str:

@@ -174,17 +174,14 @@ def _give(links: list[str], arrow: str, fault: dict[str, Any] | None, duration: 
         setup, agent = links_of_run(client)
         check_link_command(command, setup)
         result = command_links(client, command)
-    typer.echo(f"{result.text}; from t = {result.t:.2f} s on" if result.changes_links else result.text)
+    typer.echo(result.text)
     if result.acknowledged:
         typer.echo(f"acknowledged: {', '.join(result.acknowledged)}")
     if result.absent:
         typer.echo(f"no agent yet, told when it comes: {', '.join(result.absent)}")
     _note_age(command, agent)
-    failed = [f"{name}: {why}" for name, why in result.refused.items()]
-    if result.silent:
-        failed.append(f"not acknowledged by {', '.join(result.silent)}; is it frozen? It will be told again")
-    if failed:
-        fail(failed, BROKEN)
+    if result.failures:
+        fail(result.failures, BROKEN)
 
 
 def _note_age(command: LinkCommand, agent: AgentConfig) -> None:
