@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.equipment.connectivity import switch_names
@@ -37,21 +37,22 @@ def few(lines: Sequence[str]) -> str:
     return f"{'; '.join(lines[:_SHOWN])}{more}"
 
 
+State = Literal["measured", "too_short", "not_reached", "unrecorded"]
+"""A window is "too_short" if the next event ended it before values can be steady, and "unrecorded" if rows are missing
+at its end, where it is measured."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Departures:
-    """The departures of a run from its scenario, and its windows of measurement, each kind in the order of time."""
-
     events: tuple[PlantEvent, ...]
     live: Mapping[str, str]
     """By label, the operations of each event that people made."""
-    measured: tuple[Window, ...]
+    windows: tuple[tuple[Window, State], ...]
     disturbed: tuple[Window, ...]
     """Measured windows of the scenario that end after the first departure, or miss rows."""
-    too_short: tuple[Window, ...]
-    """Windows that the next event ended before the values could be steady."""
-    not_reached: tuple[Window, ...]
-    unrecorded: tuple[Window, ...]
-    """Windows without numbers, as rows are missing at their end, where they are measured."""
+
+    def those(self, *states: State) -> tuple[Window, ...]:
+        return tuple(window for window, state in self.windows if state in states)
 
     def lines(self, end: float = inf) -> list[str]:
         return [line_of(event).strip() for event in self.events if event.t < end]
@@ -81,124 +82,115 @@ def compare(
     """
     meant = windows([(event.label, event.t_s) for event in scenario.events], scenario.time.end_s)
     scripted = windows(as_they_came(scenario, events), scenario.time.end_s)
-    switched = tuple(_switched(scenario, feeder, events))
-    commands = (event for event in events if event.kind == "link" and event.subject == "links")
-    departures = sorted((*switched, *_moved(scenario, feeder, events, meant, ended), *commands), key=lambda one: one.t)
-    first = departures[0].t if departures else ended
+    departures = sorted(_departures(scenario, feeder, events, meant, ended), key=lambda one: one.t)
+    switched = [event for event in departures if event.kind in ("switch", "load")]
     live = {t: f"live at {round(t, 3):.12g} s" for t in dict.fromkeys(event.t for event in switched)}
     starts = [window.start for window in scripted]
     opening = [t for t in live if all(abs(t - start) > NEAR for start in starts)]
-    reached, not_reached = [], []
+    starts += opening
+    came, not_reached = [], []
     for plan, window in zip(meant, scripted, strict=True):
         cut = [t for t in opening if window.start < t < window.end - NEAR]
         if cut or plan.end <= ended + NEAR:
-            reached.append(replace(window, end=cut[0]) if cut else window)
+            came.append(replace(window, end=cut[0]) if cut else window)
         else:
             not_reached.append(plan)
-    starts += opening
     for t in opening:
         end = min((start for start in starts if start > t), default=ended)
-        reached.append(Window(label=live[t], start=t, end=min(end, ended)))
-    reached.sort(key=lambda window: window.start)
+        came.append(Window(label=live[t], start=t, end=min(end, ended)))
     shortest = max(STEADY, 2.0 * scenario.time.record_s) - NEAR
-    too_short = [one for one in reached if one not in scripted and one.end - one.start < shortest]
-    whole = [one for one in reached if one not in too_short]
-    unrecorded = [one for one in whole if any(a < one.end and b > one.end - STEADY - NEAR for a, b in missing)]
-    measured = tuple(one for one in whole if one not in unrecorded)
-    labels = {window.label for window in measured}
+
+    def state(window: Window) -> State:
+        if window not in scripted and window.end - window.start < shortest:
+            return "too_short"
+        holed = any(a < window.end and b > window.end - STEADY - NEAR for a, b in missing)
+        return "unrecorded" if holed else "measured"
+
+    reached = [(window, state(window)) for window in sorted(came, key=lambda window: window.start)]
+    measured = {window.label for window, state in reached if state == "measured"}
+    first = departures[0].t if departures else ended
     return Departures(
         events=tuple(departures),
         live={label: "; ".join(one.text for one in switched if one.t == t) for t, label in live.items()},
-        measured=measured,
+        windows=(*reached, *((window, "not_reached") for window in not_reached)),
         disturbed=tuple(
             window
             for window in meant
-            if window.label in labels
+            if window.label in measured
             and (first < window.end - NEAR or any(a < window.end and b > window.start for a, b in missing))
         ),
-        too_short=tuple(too_short),
-        not_reached=tuple(not_reached),
-        unrecorded=tuple(unrecorded),
     )
 
 
-def _switched(scenario: ScenarioModel, feeder: Feeder, events: Iterable[PlantEvent]) -> Iterator[PlantEvent]:
-    """Yield the switches that people operated and the loads that they set; opening an open switch changes nothing."""
-    switches, loads = switch_names(feeder), named_loads(feeder)
-    planned: list[tuple[object, str, float, float]] = []
-    for event in scenario.events:
-        latest = event.t_s + (scenario.plant.sync_check.timeout if event.synchronised else 0.0)
-        planned += [(False, switches[name], event.t_s, event.t_s) for name in event.open]
-        planned += [(True, switches[name], event.t_s, latest) for name in event.close]
-        planned += [("load", load_name(loads, text), event.t_s, event.t_s) for text in event.load]
-    for came in events:
-        if came.kind not in ("switch", "load") or came.text.endswith(" already"):
-            continue
-        done: tuple[object, str] = ("load", came.subject)
-        if came.kind == "switch":
-            done = is_closed(came), switches.get(came.subject, came.subject)
-        if not any(done == (*what,) and since - NEAR < came.t < until + NEAR for *what, since, until in planned):
-            yield came
+class _Planned(NamedTuple):
+    """A switch, a load or an agent that the scenario changes."""
 
-
-class _Due(NamedTuple):
-    """A move of an agent that the scenario asks people, or the driver, to make."""
-
-    verb: str
-    """As the plant's events say it: "left", "joined" or "died"."""
+    done: str
+    """As the plant's events say it: "closed", "opened", "load", "left", "joined" or "died"."""
     name: str
     since: float
     until: float
     """Times (s) between which it may happen."""
     complaint: str = ""
-    """Text of the departure if it has not happened by the deadline (s); "" if it need not."""
-    deadline: float = inf
+    """Text of the departure if people, or the driver, have not done it in time; "" if it need not happen."""
 
 
-def _moved(
-    scenario: ScenarioModel, feeder: Feeder, events: Iterable[PlantEvent], meant: Sequence[Window], ended: float
+def _planned(
+    scenario: ScenarioModel, feeder: Feeder, switches: Mapping[str, str], meant: Sequence[Window]
+) -> Iterator[_Planned]:
+    loads = named_loads(feeder)
+    for event, window in zip(scenario.events, meant, strict=True):
+        t, start, end = event.t_s, window.start, window.end
+        latest = t + (scenario.plant.sync_check.timeout if event.synchronised else 0.0)
+        yield from (_Planned("opened", switches[name], t, t + NEAR) for name in event.open)
+        yield from (_Planned("closed", switches[name], t, latest + NEAR) for name in event.close)
+        yield from (_Planned("load", load_name(loads, text), t, t + NEAR) for text in event.load)
+        for name in event.leave:
+            yield _Planned("left", name, start, end, f"{name} was to leave, and nobody had it leave in time")
+        for name in event.join:
+            yield _Planned("joined", name, start, end, f"{name} was to join, and nobody started it in time")
+    (case,) = scenario.cases
+    for node in netem_of(scenario, case).nodes:
+        if node.kill:
+            yield _Planned("died", node.name, node.from_s, inf, f"{node.name} was to be killed, and was not")
+        elif node.pause:  # an agent paused for longer than Zenoh's lease counts as dead, until it goes on
+            yield from (_Planned(done, node.name, node.from_s, inf) for done in ("died", "joined"))
+
+
+def _departures(
+    scenario: ScenarioModel, feeder: Feeder, events: Sequence[PlantEvent], meant: Sequence[Window], ended: float
 ) -> Iterator[PlantEvent]:
-    due = [*_due(scenario, meant)]
+    """Yield each event that the scenario does not have, and one for each change that people left undone."""
+    switches = switch_names(feeder)
+    planned = [*_planned(scenario, feeder, switches, meant)]
     (case,) = scenario.cases
     netem = netem_of(scenario, case)
     faults = [entry for entries in LISTS for entry in getattr(netem, entries.name)]
     first = {row.name for row in feeder.inverters}
     for event in events:
-        if event.kind != "roster" or _AGAIN.match(event.text):
+        done, name = "", event.subject
+        if event.kind == "switch" and not event.text.endswith(" already"):  # to open an open switch changes nothing
+            done, name = "closed" if is_closed(event) else "opened", switches.get(name, name)
+        elif event.kind == "load" and not event.text.endswith(" already"):
+            done = "load"
+        elif event.kind == "roster" and not _AGAIN.match(event.text):
+            if _SILENCE.match(event.text) and any(
+                fault.from_s <= event.t < (inf if fault.to_s is None else fault.to_s + _NOTICED) for fault in faults
+            ):
+                continue  # a fault of the scenario may silence agents
+            match = re.match(rf"{re.escape(name)} (joined|left|died)", event.text)
+            done = match[1] if match else ""
+            if event.t == 0.0 and done and name in first:
+                continue  # another event, "started without", names the agents that are absent at the start
+        elif (event.kind, name) != ("link", "links"):
             continue
-        if _SILENCE.match(event.text) and any(
-            fault.from_s <= event.t < (inf if fault.to_s is None else fault.to_s + _NOTICED) for fault in faults
-        ):
-            continue  # a fault of the scenario may silence agents
-        match = re.match(rf"{re.escape(event.subject)} (joined|left|died)", event.text)
-        verb = match[1] if match else ""
-        if event.t == 0.0 and verb and event.subject in first:
-            continue  # another event, "started without", names the agents that are absent at the start
-        planned = [
-            one
-            for one in due
-            if (one.verb, one.name) == (verb, event.subject) and one.since - NEAR <= event.t < one.until
-        ]
-        if not planned:
+        it = next(
+            (it for it in planned if (it.done, it.name) == (done, name) and it.since - NEAR <= event.t < it.until), None
+        )
+        if it is None:
             yield event
-        elif planned[0].complaint:
-            due.remove(planned[0])
-    for one in due:
-        if one.complaint and one.deadline <= ended + NEAR:
-            yield PlantEvent(t=one.since, kind="roster", subject=one.name, text=one.complaint)
-
-
-def _due(scenario: ScenarioModel, meant: Sequence[Window]) -> Iterator[_Due]:
-    for event, window in zip(scenario.events, meant, strict=True):
-        start, end = window.start, window.end
-        for name in event.leave:
-            yield _Due("left", name, start, end, f"{name} was to leave, and nobody had it leave in time", end)
-        for name in event.join:
-            yield _Due("joined", name, start, end, f"{name} was to join, and nobody started it in time", end)
-    (case,) = scenario.cases
-    for node in netem_of(scenario, case).nodes:
-        if node.kill:
-            yield _Due("died", node.name, node.from_s, inf, f"{node.name} was to be killed, and was not", node.from_s)
-        elif node.pause:  # an agent paused for longer than Zenoh's lease counts as dead, until it goes on
-            yield _Due("died", node.name, node.from_s, inf)
-            yield _Due("joined", node.name, node.from_s, inf)
+        elif it.complaint:
+            planned.remove(it)
+    for it in planned:
+        if it.complaint and (it.since if it.until == inf else it.until) <= ended + NEAR:
+            yield PlantEvent(t=it.since, kind="roster", subject=it.name, text=it.complaint)

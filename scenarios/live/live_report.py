@@ -73,7 +73,7 @@ def write_report(metrics: RunMetrics, recorded: Recorded, pacing: Pacing | None,
     """
     scenario, feeder, (case,) = metrics.scenario, metrics.feeder, metrics.scenario.cases
     departures = compare(scenario, feeder, recorded.events, recorded.ended, recorded.missing)
-    record = CaseRecord.of(scenario, feeder, case, recorded, departures.measured)
+    record = CaseRecord.of(scenario, feeder, case, recorded, departures.those("measured"))
     record = replace(record, history=taken_part(scenario, feeder, record.history))
     findings = find(scenario, feeder, {case: record})
     stop = JudgingStop(StoppedError, KeyboardInterrupt)
@@ -109,28 +109,28 @@ def _live_table(recorded: Recorded, departures: Departures) -> dict[str, object]
         "ended_s": recorded.ended,
         "windows": {
             window.label: {"t_s": window.start, "end_s": window.end, "what": departures.live[window.label]}
-            for window in departures.measured
+            for window in departures.those("measured")
             if window.label in departures.live
         },
-        "too_short": _labels(departures.too_short),
-        "not_reached": _labels(departures.not_reached),
+        "too_short": _labels(departures.those("too_short")),
+        "not_reached": _labels(departures.those("not_reached")),
         "disturbed": _labels(departures.disturbed),
         "departures": departures.lines(),
     }
     if recorded.missing:
         table["missing"] = [{"after_s": a, "before_s": b} for a, b in recorded.missing]
-        table["unrecorded"] = _labels(departures.unrecorded)
+        table["unrecorded"] = _labels(departures.those("unrecorded"))
     return table
 
 
 def _notes(scenario: ScenarioModel, recorded: Recorded, departures: Departures) -> Iterable[str]:
-    ended, end_s = f"{recorded.ended:.2f} s", scenario.time.end_s
+    ended, end_s, measured = f"{recorded.ended:.2f} s", scenario.time.end_s, departures.those("measured")
     if not scenario.events and not departures.live:
         yield "the scenario has no event, and nobody made one, so there is no window to measure in"
-    elif departures.not_reached:
-        what = "they have no numbers" if departures.measured else "nothing was measured"
-        yield f"ended at {ended}, before the end of {_named(departures.not_reached)}: {what}"
-    elif end_s < recorded.ended and all(window.end <= end_s for window in departures.measured):
+    elif not_reached := departures.those("not_reached"):
+        what = "they have no numbers" if measured else "nothing was measured"
+        yield f"ended at {ended}, before the end of {_named(not_reached)}: {what}"
+    elif end_s < recorded.ended and all(window.end <= end_s for window in measured):
         yield f"measured up to {end_s:g} s, where the scenario ends; the history goes on to {ended}"
     if departures.live:
         lines = [f"{label}: {what}" for label, what in departures.live.items()]
@@ -138,10 +138,10 @@ def _notes(scenario: ScenarioModel, recorded: Recorded, departures: Departures) 
     if recorded.missing:
         spans = ", ".join(f"{before:.2f} and {after:.2f} s" for before, after in recorded.missing)
         yield f"rows are missing between {spans}, as the record was out of the plant's reach"
-    if departures.unrecorded:
-        yield f"without rows where they are measured, so without numbers: {_named(departures.unrecorded)}"
-    if departures.too_short:
-        yield f"too short to be measured: {_named(departures.too_short)}"
+    if unrecorded := departures.those("unrecorded"):
+        yield f"without rows where they are measured, so without numbers: {_named(unrecorded)}"
+    if too_short := departures.those("too_short"):
+        yield f"too short to be measured: {_named(too_short)}"
     if recorded.record_failure:
         yield f"{recorded.record_failure}; the run went on without it"
     yield from late_moves(scenario, recorded.events)

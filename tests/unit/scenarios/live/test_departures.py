@@ -162,9 +162,9 @@ def test_a_live_switch_opens_a_window_as_the_scenarios_events_do(
     """Each window lasts to the next event, whoever made it; its label says by whom."""
     opened = compare(*one_case("islanding"), events, ended)
 
-    assert ", ".join(f"{one.label} {one.start:g}-{one.end:g}" for one in opened.measured) == measured
-    assert ", ".join(one.label for one in opened.too_short) == too_short
-    assert ", ".join(one.label for one in opened.not_reached) == not_reached
+    assert ", ".join(f"{one.label} {one.start:g}-{one.end:g}" for one in opened.those("measured")) == measured
+    assert ", ".join(one.label for one in opened.those("too_short")) == too_short
+    assert ", ".join(one.label for one in opened.those("not_reached")) == not_reached
 
 
 @pytest.fixture(scope="module")
