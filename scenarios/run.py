@@ -94,7 +94,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
     pacing: dict[str, Pacing] = {}
     for case in scenario.cases:
         recorded[case], outcome = run_case(request, case, text, progress)
-        from gridpeers.scenarios.results.history import CaseRecord, as_they_came, late_moves
+        from gridpeers.scenarios.results.history import as_they_came, late_moves
 
         notes += [f"case {case}: {note}" for note in (*outcome.notes, *recorded[case].link_lines)]
         if outcome.pacing is not None:
@@ -117,8 +117,10 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
     from gridpeers.scenarios.results.recorded_events import law_failures
     from gridpeers.scenarios.results.report import RunReport, plain
 
-    cases = {case: CaseRecord.of(scenario, request.feeder, case, record) for case, record in recorded.items()}
-    findings = find(scenario, request.feeder, cases)
+    cases = {
+        case: CheckedCase.of(scenario, request.feeder, case, record, folder / case) for case, record in recorded.items()
+    }
+    findings = find(cases)
     compared: dict[str, Departures] = {}
     if request.clock == "wall":
         from gridpeers.scenarios.live.departures import compare
@@ -140,10 +142,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
         facts[case] = case_facts(record, pacing.get(case), **unlike)
     write_whole(folder / "metrics.json", metrics_json(request, findings, facts))
     stop = JudgingStop()
-    checks = {
-        case: judge_case(CheckedCase.of(scenario, request.feeder, case, record, folder / case), stop)
-        for case, record in cases.items()
-    }
+    checks = {name: judge_case(case, stop) for name, case in cases.items()}
     write_whole(folder / FILE, verdicts_json(checks))
     if request.clock == "wall":
         notes.append("in wall-clock time no two runs are the same: each has its own delays")
@@ -156,10 +155,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
             from gridpeers.scenarios.results.plots.drawing import drawing_of
 
             last = recorded[list(recorded)[-1]]  # in wall-clock time each case has its own events
-            histories = {case: record.history for case, record in cases.items()}
-            events = {case: record.events for case, record in cases.items()}
-            came = as_they_came(scenario, last.events)
-            drawing = drawing_of(scenario, request.feeder, histories, events, came)
+            drawing = drawing_of(scenario, cases, as_they_came(scenario, last.events))
             beside.enter_context(drawn_on_all_cores(drawing, folder / "plots"))
         benchmark = NO_BENCHMARK if disturbed else benchmark_of(scenario.paper)
         own = () if disturbed else judged(findings, claims_of(scenario))

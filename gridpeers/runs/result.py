@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import sys
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import cached_property
 from io import BytesIO
 from pathlib import Path
@@ -26,7 +27,7 @@ from gridpeers.scenarios.live.live_report import live_drawing
 from gridpeers.scenarios.record.record_info import LIVE
 from gridpeers.scenarios.results.claims import Verdict, benchmark_of, judge, judged
 from gridpeers.scenarios.results.findings import Findings, find
-from gridpeers.scenarios.results.history import CaseRecord, History, as_they_came, read_history, windows
+from gridpeers.scenarios.results.history import History, as_they_came, read_history, windows
 from gridpeers.scenarios.results.plots.drawing import Drawing, drawing_of
 from gridpeers.scenarios.results.recorded_events import law_failures
 from gridpeers.scenarios.schema import scenario_model as model
@@ -133,7 +134,7 @@ class Results(_FromFolder, Mapping[str, "Result"]):
         """The measures as claims judge them; ValueError of a live run, whose windows people made."""
         if self.driver == LIVE:
             raise ValueError("this was a live run: its windows are those that people made, see metrics")
-        return find(self.spec, self._feeder, {case: result.case_record for case, result in self.items()})
+        return find({case: result.checked_case for case, result in self.items()})
 
     @property
     def verdicts(self) -> tuple[Verdict, ...]:
@@ -149,10 +150,9 @@ class Results(_FromFolder, Mapping[str, "Result"]):
         *_, last = cases.values()  # in real time each case has its own events
         if self.driver == LIVE:
             departures = compare(spec, self._feeder, last.plant_events, float(last.record.t[-1]))
-            return live_drawing(departures, spec, self._feeder, last.record, last.plant_events)
-        histories = {case: result.record for case, result in cases.items()}
-        events = {case: result.plant_events for case, result in cases.items()}
-        return drawing_of(spec, self._feeder, histories, events, as_they_came(spec, last.plant_events))
+            return live_drawing(departures, replace(last.checked_case, scenario=spec))
+        recorded = {case: result.checked_case for case, result in cases.items()}
+        return drawing_of(spec, recorded, as_they_came(spec, last.plant_events))
 
     def __repr__(self) -> str:
         return f"<Results {self.spec.name}: cases {', '.join(self)}; {self.driver}>"
@@ -251,17 +251,19 @@ class Result(_FromFolder):
         return list(self._whole.get("disturbed", ()))
 
     @cached_property
-    def case_record(self) -> CaseRecord:
-        """The case with the windows of its scenario's events, as metrics and checks take it."""
-        came = windows(as_they_came(self.spec, self.plant_events), self.spec.time.end_s)
-        measured = frames.windows_of(self._whole)
-        saved = {label: of["messages_saved"] for label, of in measured.items() if of.get("messages_saved")}
-        return CaseRecord(history=self.record, windows=came, events=self.plant_events, messages_saved=saved)
-
-    @cached_property
     def checked_case(self) -> CheckedCase:
-        """The case as checks see it: what a check of one's own is called with."""
-        return CheckedCase.of(self.spec, self._feeder, self.case, self.case_record, self.folder / self.case)
+        """The case as metrics and checks see it: what a check of one's own is called with."""
+        measured = frames.windows_of(self._whole)
+        return CheckedCase(
+            scenario=self.spec,
+            feeder=self._feeder,
+            case=self.case,
+            history=self.record,
+            windows=windows(as_they_came(self.spec, self.plant_events), self.spec.time.end_s),
+            events=self.plant_events,
+            messages_saved={label: of["messages_saved"] for label, of in measured.items() if of.get("messages_saved")},
+            folder=self.folder / self.case,
+        )
 
     @cached_property
     def check_verdicts(self) -> tuple[CheckVerdict, ...]:

@@ -22,7 +22,6 @@ from gridpeers.scenarios.checks.check_registry import LAW_FAILED
 from gridpeers.scenarios.checks.check_verdict import SHOWN_VIOLATIONS, CheckVerdict
 from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.checks.judging import judge_case
-from gridpeers.scenarios.results.history import CaseRecord
 from gridpeers.scenarios.results.island_membership import closed_switches
 from gridpeers.scenarios.results.recorded_events import tripped_by, tripped_inverters
 from gridpeers.scenarios.run import run_case
@@ -193,8 +192,8 @@ def _judged(
             recorded, outcome = run_case(request, base.case, "", lambda case, t, end: None, at_start)
             if recorded.record_failure:  # its checks could not judge it
                 raise MachineError(recorded.record_failure)
-            record = CaseRecord.of(scenario, base.feeder, base.case, recorded)
-            verdicts = judge_case(CheckedCase.of(scenario, base.feeder, base.case, record, folder / base.case))
+            case = CheckedCase.of(scenario, base.feeder, base.case, recorded, folder / base.case)
+            verdicts = judge_case(case)
             told = [event.text for event in recorded.events if event.kind == "law"]
             told += [*outcome.notes, *(it.reason for it in verdicts if it.status == "failed")]
             if lack := machine_error(*told):  # an agent may die, a law or a check fail, and the run goes on
@@ -222,7 +221,7 @@ def _judged(
         trips=sum(bool(tripped_by(event)) for event in recorded.events),
     )
     restored_s = restored_from(recorded.events, scenario.protection.enter_service)
-    history = record.history
+    history = case.history
     present = zip(history.inverters, history.present[-1].tolist(), strict=True)
     off = frozenset(name for name, on in present if not on)
     return JudgedRun(row, restored_s, collapses_at_changes(scenario, base.feeder, recorded.events), off, verdicts)

@@ -1,9 +1,9 @@
-"""A recorded case as its checks see it: rows, windows, islands, events, and the record of messages and decisions."""
+"""A recorded case as metrics and checks see it: rows, windows, islands, events, and messages with decisions."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -13,8 +13,19 @@ import numpy as np
 from gridpeers.plant.equipment import Feeder
 from gridpeers.scenarios.checks.check_registry import READERS
 from gridpeers.scenarios.checks.check_verdict import NotJudgedError, Violation
-from gridpeers.scenarios.results.history import CaseRecord, Flags, History, Nameplates, Window, read_only
-from gridpeers.scenarios.results.island_membership import island_intervals, islands_at_end, part_of
+from gridpeers.scenarios.results.history import (
+    Flags,
+    History,
+    Nameplates,
+    Window,
+    as_they_came,
+    history_of,
+    messages_saved,
+    read_only,
+    windows,
+)
+from gridpeers.scenarios.results.island_membership import IslandInterval, island_intervals, islands_at_end, part_of
+from gridpeers.scenarios.results.record import Recorded
 from gridpeers.scenarios.schema.configs import limits_of
 from gridpeers.scenarios.schema.participants import netem_of, without_agent
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
@@ -29,7 +40,7 @@ connected later than the scenario says, a load that somebody changed."""
 
 @dataclass(frozen=True)
 class IslandWindow:
-    """One island in the window of one event: its own columns of the window's rows, of which there is one at least."""
+    """One island in the window of one event: its own columns of the window's rows."""
 
     window: Window
     label: str
@@ -49,7 +60,7 @@ class IslandWindow:
 
 @dataclass(frozen=True, kw_only=True)
 class CheckedCase:
-    """One recorded case; checks only read it."""
+    """One recorded case; metrics and checks only read it."""
 
     scenario: ScenarioModel
     """As run."""
@@ -58,18 +69,31 @@ class CheckedCase:
     history: History
     """All rows, as read-only arrays (rows, inverters)."""
     windows: Sequence[Window]
-    events: tuple[PlantEvent, ...]
-    """Events of plant, roster and links."""
+    events: Sequence[PlantEvent]
+    """Events of plant, roster and links, in the order of time: switches make the islands."""
+    messages_saved: Mapping[str, float] = field(default_factory=dict)
+    """Share of states that the laws did not send, by window; empty if they sent all."""
     folder: Path | None = None
     """Folder with the record run.mcap; None for a run in memory."""
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "history", read_only(self.history))
+
     @classmethod
     def of(
-        cls, scenario: ScenarioModel, feeder: Feeder, case: str, record: CaseRecord, folder: Path | None = None
+        cls, scenario: ScenarioModel, feeder: Feeder, case: str, recorded: Recorded, folder: Path | None = None
     ) -> CheckedCase:
-        rows, windows, events = read_only(record.history), record.windows, tuple(record.events)
+        """Return a case as recorded, with the windows of the scenario's events as they came."""
+        came = windows(as_they_came(scenario, recorded.events), scenario.time.end_s)
         return cls(
-            scenario=scenario, feeder=feeder, case=case, history=rows, windows=windows, events=events, folder=folder
+            scenario=scenario,
+            feeder=feeder,
+            case=case,
+            history=history_of(recorded),
+            windows=came,
+            events=recorded.events,
+            messages_saved=messages_saved(scenario, feeder, case, recorded.quiet, came),
+            folder=folder,
         )
 
     @cached_property
@@ -118,23 +142,24 @@ class CheckedCase:
         return late
 
     @cached_property
-    def parts(self) -> tuple[IslandWindow, ...]:
-        """Each island with inverters at the end of each window, see `islands_at_end`.
+    def islands(self) -> tuple[IslandInterval, ...]:
+        return island_intervals(self.scenario, self.feeder, self.history.inverters, self.events)
 
-        An island that came about within a window is judged from then on (`rows_from`).
+    def seen_by(self, window: Window) -> History:
+        """Return the rows that a window is cut from: a live run may go on after the scenario's end."""
+        end = self.scenario.time.end_s
+        return read_only(self.history.until(end)) if window.end <= end < self.history.t[-1] else self.history
+
+    def parts(self, window: Window) -> list[IslandWindow]:
+        """Return each island with inverters at the end of a window, see `islands_at_end`.
+
+        An island that came about within the window is judged from then on (`rows_from`).
         """
-        intervals = island_intervals(self.scenario, self.feeder, self.history.inverters, self.events)
-        found = []
-        for window in self.windows:
-            rows = window.cut(self.history)
-            if not rows.t.size:
-                continue
-            at_end = islands_at_end(intervals, window)
-            for name, island in at_end.items():
-                history, nameplates = part_of(rows, self.nameplates, island.inverters)
-                label = window.label + (f", island of {name}" if len(at_end) > 1 else "")
-                found.append(IslandWindow(window, label, island.fed, history, nameplates))
-        return tuple(found)
+        rows, found = window.cut(self.seen_by(window)), []
+        for name, island in (at_end := islands_at_end(self.islands, window)).items():
+            label = window.label + (f", island of {name}" if len(at_end) > 1 else "")
+            found.append(IslandWindow(window, label, island.fed, *part_of(rows, self.nameplates, island.inverters)))
+        return found
 
     def killed(self, history: History) -> Flags:
         """Return which inverters of a history have an agent that the scenario has killed, by row; shape (T, N)."""

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import msgspec
 
-from gridpeers.plant.equipment import Feeder
 from gridpeers.scenarios.checks.check_verdict import FILE, verdicts_json
 from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.checks.judging import JudgingStop, judge_case
@@ -18,7 +17,7 @@ from gridpeers.scenarios.live.live_files import ended_scenario, write_scenario
 from gridpeers.scenarios.live.live_processes import ProcessOutcome
 from gridpeers.scenarios.results.claims import NO_BENCHMARK, benchmark_of
 from gridpeers.scenarios.results.findings import find
-from gridpeers.scenarios.results.history import CaseRecord, History, Window, as_they_came, late_moves
+from gridpeers.scenarios.results.history import Window, as_they_came, late_moves, messages_saved
 from gridpeers.scenarios.results.island_membership import taken_part
 from gridpeers.scenarios.results.metrics_file import RunMetrics, case_facts, metrics_json
 from gridpeers.scenarios.results.plots.drawing import Drawing, Mark, drawing_of
@@ -34,15 +33,15 @@ PRESENT = {"opened": "opens", "closed": "closes", "joined": "joins", "left": "le
 """Verbs of the plant's events, and the same in figures."""
 
 
-def live_drawing(
-    departures: Departures, scenario: ScenarioModel, feeder: Feeder, history: History, events: Sequence[PlantEvent]
-) -> Drawing:
-    (case,) = scenario.cases
-    reached = tuple(event for event in scenario.events if event.t_s < history.t[-1])
-    came = as_they_came(msgspec.structs.replace(scenario, events=reached), events)
-    drawing = drawing_of(scenario, feeder, {case: taken_part(scenario, feeder, history)}, {case: events}, came)
+def live_drawing(departures: Departures, case: CheckedCase) -> Drawing:
+    """Return the data of the figures of a live run, whose scenario has this case alone."""
+    scenario = case.scenario
+    reached = tuple(event for event in scenario.events if event.t_s < case.history.t[-1])
+    came = as_they_came(msgspec.structs.replace(scenario, events=reached), case.events)
+    taken = replace(case, history=taken_part(scenario, case.feeder, case.history))
+    drawing = drawing_of(scenario, {case.case: taken}, came)
     marks = [*drawing.events, *_marks(departures.events)]
-    return replace(drawing, events=marks, moves=any(event.kind == "inverter" for event in events))
+    return replace(drawing, events=marks, moves=any(event.kind == "inverter" for event in case.events))
 
 
 def _marks(departures: Iterable[PlantEvent]) -> Iterator[Mark]:
@@ -73,11 +72,14 @@ def write_report(metrics: RunMetrics, recorded: Recorded, pacing: Pacing | None,
     """
     scenario, feeder, (case,) = metrics.scenario, metrics.feeder, metrics.scenario.cases
     departures = compare(scenario, feeder, recorded.events, recorded.ended, recorded.missing)
-    record = CaseRecord.of(scenario, feeder, case, recorded, departures.those("measured"))
-    record = replace(record, history=taken_part(scenario, feeder, record.history))
-    findings = find(scenario, feeder, {case: record})
+    whole = CheckedCase.of(scenario, feeder, case, recorded, metrics.folder / case)
+    measured = departures.those("measured")
+    saved = messages_saved(scenario, feeder, case, recorded.quiet, measured)
+    rows = taken_part(scenario, feeder, whole.history)
+    taken = replace(whole, history=rows, windows=measured, messages_saved=saved)
+    findings = find({case: taken})
     stop = JudgingStop(StoppedError, KeyboardInterrupt)
-    checks = {case: judge_case(CheckedCase.of(scenario, feeder, case, record, metrics.folder / case), stop)}
+    checks = {case: judge_case(taken, stop)}
     report = RunReport(
         scenario=scenario.name,
         titles={case: scenario.cases[case].title},
@@ -100,7 +102,7 @@ def write_report(metrics: RunMetrics, recorded: Recorded, pacing: Pacing | None,
         return report
     from gridpeers.scenarios.results.plots.run_figures import draw_all  # matplotlib takes longest to import
 
-    draw_all(live_drawing(departures, scenario, feeder, record.history, recorded.events), metrics.folder / "plots")
+    draw_all(live_drawing(departures, taken), metrics.folder / "plots")
     return report
 
 

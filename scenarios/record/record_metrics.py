@@ -10,11 +10,12 @@ import msgspec
 
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.tables import FeederError, read_feeder
+from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.live.departures import compare
 from gridpeers.scenarios.record.record_file import RecordFileError
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.results.findings import find
-from gridpeers.scenarios.results.history import CaseRecord, History, Window, as_they_came, messages_saved, windows
+from gridpeers.scenarios.results.history import History, Window, as_they_came, messages_saved, windows
 from gridpeers.scenarios.results.island_membership import taken_part
 from gridpeers.scenarios.results.metrics import STEADY
 from gridpeers.scenarios.results.recorded_events import law_failures
@@ -22,7 +23,6 @@ from gridpeers.scenarios.results.report import RunReport
 from gridpeers.scenarios.schema import ScenarioError, ScenarioModel
 from gridpeers.scenarios.schema.configs import as_in
 from gridpeers.scenarios.schema.loading import read_tables
-from gridpeers.scenarios.schema.participants import with_agent
 from gridpeers.scenarios.schema.scenario_errors import Problems
 
 _Measured = tuple[History, Sequence[Window], list[str]]  # Rows and windows that are measured, and notes on them
@@ -38,13 +38,20 @@ def report_of(record: RunRecord) -> RunReport:
     case, events = record.info.case, record.events()
     history, opened, notes = (_simulated if record.info.simulated else _live)(record, scenario, feeder)
     quiet = [each for message in record.telemetry() for each in message.quiet]
-    saved = messages_saved(quiet, opened, len(with_agent(scenario, feeder, case)), scenario.time.T_c_s)
-    measured = CaseRecord(history=history, windows=opened, events=events, messages_saved=saved)
+    measured = CheckedCase(
+        scenario=scenario,
+        feeder=feeder,
+        case=case,
+        history=history,
+        windows=opened,
+        events=events,
+        messages_saved=messages_saved(scenario, feeder, case, quiet, opened),
+    )
     notes += [f"the run broke: {record.outcome}"] if record.outcome else []
     return RunReport(
         scenario=scenario.name,
         titles={case: scenario.cases[case].title},
-        findings=find(scenario, feeder, {case: measured}),
+        findings=find({case: measured}),
         verdicts=(),
         failures={case: law_failures(events)},
         notes=[f"case {case}: {note}" for note in (*notes, *record.damage)],

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gridpeers.plant.equipment import F_NOM, Feeder
+from gridpeers.plant.equipment import F_NOM
 from gridpeers.scenarios.results.claims import Published
-from gridpeers.scenarios.results.history import CaseRecord, Nameplates, read_only
-from gridpeers.scenarios.results.island_membership import island_intervals, islands_at_end, part_of
 from gridpeers.scenarios.results.metric import Measured, label, measured, metric_of
 from gridpeers.scenarios.results.metrics import Settling, Steady, measure
 from gridpeers.scenarios.results.window_metrics import WindowData
-from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.scenarios.schema.configs import limits_of
 from gridpeers.scenarios.schema.participants import without_agent
 from gridpeers.scenarios.schema.plugin_keys import metrics_of
+
+if TYPE_CHECKING:
+    from gridpeers.scenarios.checks.checked_case import CheckedCase
 
 SteadyValues = Mapping[str, Mapping[str, Steady]]
 
@@ -88,53 +89,47 @@ class Findings:
         return cell.event in self.results.get(cell.case, {}) and (not cell.island or cell.island in islands)
 
 
-def find(scenario: ScenarioModel, feeder: Feeder, cases: Mapping[str, CaseRecord]) -> Findings:
-    """Measure all cases of a run, live or not, with the metrics of every run and with the scenario's own.
-
-    A history may go on after the scenario's end; windows up to there see nothing of that.
-    """
+def find(cases: Mapping[str, CheckedCase]) -> Findings:
+    """Measure all cases of a run, live or not, with the metrics of every run and with the scenario's own."""
+    first = next(iter(cases.values()))
+    scenario, f_nom = first.scenario, first.f_nom
     results: dict[str, dict[str, Steady]] = {}
     settled: dict[str, dict[str, Settling]] = {}
     islands: dict[str, dict[str, dict[str, Steady]]] = {}
     available: dict[str, dict[str, float]] = {}
     own: dict[str, dict[str, Measured]] = {}
     metrics = [(name, metric_of(plugin)) for name, plugin in metrics_of(scenario)]
-    for case, record in cases.items():
-        everybody = Nameplates.of_columns(record.history.inverters, feeder)
-        nameplates = read_only(everybody.without(without_agent(scenario, case)))
-        results[case], settled[case], islands[case] = {}, {}, {}
-        own |= {case: {}} if metrics else {}
-        intervals = island_intervals(scenario, feeder, record.history.inverters, record.events)
-        within = record.history.until(scenario.time.end_s)
-        for window in record.windows:
-            history = within if window.end <= scenario.time.end_s else record.history
-            at_end = islands_at_end(intervals, window)
-            inside = window.cut(history)
-            parts = {
-                name: measure(*part_of(inside, nameplates, island.inverters), window, feeder.f_nom)
-                for name, island in at_end.items()
-                if len(at_end) > 1
+    for name, case in cases.items():
+        results[name], settled[name], islands[name] = {}, {}, {}
+        own |= {name: {}} if metrics else {}
+        for window in case.windows:
+            parts = case.parts(window)
+            several = {
+                part.nameplates.names[0]: measure(part.history, part.nameplates, window, f_nom)
+                for part in parts
+                if len(parts) > 1
             }
-            islands[case] |= {window.label: parts} if parts else {}
+            islands[name] |= {window.label: several} if several else {}
             data = WindowData.cut(
-                read_only(history),
+                case.seen_by(window),
                 window,
-                case=case,
-                islands=parts,
-                nameplates=nameplates,
-                f_nom=feeder.f_nom,
-                T_c=scenario.time.T_c_s,
-                messages_saved=record.messages_saved.get(window.label, 0.0),
+                case=name,
+                islands=several,
+                nameplates=case.nameplates,
+                f_nom=f_nom,
+                T_c=case.T_c,
+                messages_saved=case.messages_saved.get(window.label, 0.0),
             )
-            results[case][window.label], settled[case][window.label] = data.steady, data.settled
+            results[name][window.label], settled[name][window.label] = data.steady, data.settled
             if metrics:
                 with np.errstate(all="ignore"):  # a value that is no number has its reason
-                    own[case][window.label] = measured(metrics, data)
-        rating = dict(zip(everybody.names, everybody.s.tolist(), strict=True))
-        available[case] = {limit.inverter: limit.P_max / rating[limit.inverter] for limit in limits_of(scenario, case)}
+                    own[name][window.label] = measured(metrics, data)
+        rating = dict(zip(case.nameplates.names, case.nameplates.s.tolist(), strict=True))
+        available[name] = {limit.inverter: limit.P_max / rating[limit.inverter] for limit in limits_of(scenario, name)}
+    everybody = first.nameplates
     return Findings(
         results=results,
-        f_nom=feeder.f_nom,
+        f_nom=f_nom,
         P_set0=scenario.plant.P_set0_pu,
         GFL=tuple(name for name, GFM in zip(everybody.names, everybody.GFM, strict=True) if not GFM),
         settled=settled,
@@ -145,6 +140,6 @@ def find(scenario: ScenarioModel, feeder: Feeder, cases: Mapping[str, CaseRecord
             for case in cases
             if (without := without_agent(scenario, case))
         },
-        messages_saved={case: record.messages_saved for case, record in cases.items()},
+        messages_saved={name: case.messages_saved for name, case in cases.items()},
         own=own,
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -207,37 +207,15 @@ def late_moves(scenario: ScenarioModel, recorded: Iterable[PlantEvent]) -> list[
 
 
 def messages_saved(
-    quiet: Iterable[tuple[float, int]], windows: Sequence[Window], agents: int, T_c: float
+    scenario: ScenarioModel, feeder: Feeder, case: str, quiet: Sequence[tuple[float, int]], windows: Sequence[Window]
 ) -> dict[str, float]:
     """Return the share of states that the laws did not send, by window; nothing if they sent all."""
-    quiet = list(quiet)
     if not quiet:
         return {}
+    T_c, agents = scenario.time.T_c_s, len(with_agent(scenario, feeder, case))
     near = 0.5 * T_c
     saved = {}
     for window in windows:
         count = sum(n for t, n in quiet if window.start - near <= t < window.end - near)
         saved[window.label] = count / (agents * max(1, round((window.end - window.start) / T_c)))
     return saved
-
-
-@dataclass(frozen=True, kw_only=True)
-class CaseRecord:
-    """One recorded case, and the windows in which it is measured."""
-
-    history: History
-    windows: Sequence[Window]
-    events: Sequence[PlantEvent]
-    """Recorded events, in the order of time: their switches make the islands."""
-    messages_saved: Mapping[str, float] = field(default_factory=dict)
-    """Share of states that the laws did not send, by window; empty if they sent all."""
-
-    @classmethod
-    def of(
-        cls, scenario: ScenarioModel, feeder: Feeder, case: str, of: Recorded, opened: Sequence[Window] | None = None
-    ) -> CaseRecord:
-        """Return a case as recorded, with given windows, or with those of the scenario's events as they came."""
-        if opened is None:
-            opened = windows(as_they_came(scenario, of.events), scenario.time.end_s)
-        saved = messages_saved(of.quiet, opened, len(with_agent(scenario, feeder, case)), scenario.time.T_c_s)
-        return cls(history=history_of(of), windows=opened, events=of.events, messages_saved=saved)

@@ -16,9 +16,10 @@ from gridpeers.plant.build import build_plant
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.tables import read_feeder
+from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.results.findings import Findings, find
-from gridpeers.scenarios.results.history import CaseRecord, History
+from gridpeers.scenarios.results.history import History
 from gridpeers.scenarios.results.metrics import SHARING, SHARING_OF_ISLANDS
 from gridpeers.scenarios.results.record import Recorder
 from gridpeers.scenarios.results.recorded_events import ended_by_a_law, first_of, law_failures
@@ -88,9 +89,9 @@ def _run(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, His
     failed_check = bool(failed_laws) and judges_laws(scenario)
     recorded = recorder.finish(scenario.time.end_s, scenario.time.record_s)
     links = recorded.links
-    record = CaseRecord.of(scenario, feeder, case, recorded)
+    measured = CheckedCase.of(scenario, feeder, case, recorded)
     with np.errstate(all="ignore"):  # a value that is no number is None
-        found = find(scenario, feeder, {case: record})
+        found = find({case: measured})
     measures: dict[str, float | None] = {}
     own = found.own.get(case, {})
     for label in found.results[case]:
@@ -115,7 +116,7 @@ def _run(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, His
         link_warnings="; ".join((*links.warnings, *sorted(links.failures))),
         measures=measures,
     )
-    return done, record.history
+    return done, measured.history
 
 
 def _indexes(found: Findings, case: str, label: str) -> dict[str, Any]:

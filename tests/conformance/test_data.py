@@ -10,9 +10,10 @@ import pytest
 import gridpeers as gp
 from gridpeers.plant.tables.write import write_feeder
 from gridpeers.scenarios.catalogue_files import CATALOGUE
+from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.results.findings import find
-from gridpeers.scenarios.results.history import CaseRecord, Nameplates, history_of
+from gridpeers.scenarios.results.history import Nameplates, history_of
 from gridpeers.scenarios.results.metrics_file import RunMetrics, metrics_json
 from gridpeers.scenarios.results.record import Recorded, Recorder
 from gridpeers.scenarios.schema import load_scenario
@@ -70,8 +71,8 @@ def test_an_inverter_without_agent_keeps_its_set_points_and_is_left_out_of_the_s
     text = ISLANDING.replace('secondary = "all"', 'secondary = "all"\nwithout_agent = ["inv2"]').replace("7.0", "4.2")
     path = written(tmp_path, text)
     scenario, feeder = load_scenario(path)
-    record = CaseRecord.of(scenario, feeder, "IV", recorded(path, "IV"))
-    found, history = find(scenario, feeder, {"IV": record}), record.history
+    case = CheckedCase.of(scenario, feeder, "IV", recorded(path, "IV"))
+    found, history = find({"IV": case}), case.history
     steady = found.results["IV"]["event1"]
     ran = RunMetrics(scenario=scenario, feeder=feeder, driver="inprocess", folder=tmp_path)
 

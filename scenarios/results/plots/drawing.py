@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from gridpeers.plant.equipment import Feeder
 from gridpeers.scenarios.results.history import History, Nameplates
-from gridpeers.scenarios.results.island_membership import Island, IslandInterval, Islands, island_intervals
+from gridpeers.scenarios.results.island_membership import Island, IslandInterval, Islands
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.scenarios.schema.configs import limits_of
 from gridpeers.scenarios.schema.participants import without_agent
 from gridpeers.scenarios.schema.scenario_model import Event, LoadChange
 from gridpeers.scenarios.short_texts import in_order, short
-from gridpeers.wire.messages import PlantEvent
+
+if TYPE_CHECKING:
+    from gridpeers.scenarios.checks.checked_case import CheckedCase
 
 
 class Mark(NamedTuple):
@@ -68,30 +69,24 @@ class Drawing:
 
 
 def drawing_of(
-    scenario: ScenarioModel,
-    feeder: Feeder,
-    histories: Mapping[str, History],
-    recorded: Mapping[str, Iterable[PlantEvent]],
-    events: Sequence[tuple[str, float]],
+    scenario: ScenarioModel, cases: Mapping[str, CheckedCase], events: Sequence[tuple[str, float]]
 ) -> Drawing:
+    """Return the data of the figures of some cases, which are all that their scenario has."""
+    first = next(iter(cases.values()))
     what = {event.label: happening(event, scenario) for event in scenario.events}
     limited = dict.fromkeys(limit.inverter for case in scenario.cases for limit in limits_of(scenario, case))
-    islands = {
-        case: island_intervals(scenario, feeder, history.inverters, recorded[case])
-        for case, history in histories.items()
-    }
-    several = {case: [it for it in of if len(it.islands) > 1] for case, of in islands.items()}
+    several = {name: [it for it in case.islands if len(it.islands) > 1] for name, case in cases.items()}
     return Drawing(
-        histories=histories,
+        histories={name: case.history for name, case in cases.items()},
         titles={case: rule.title for case, rule in scenario.cases.items()},
-        nameplates=Nameplates.of_columns(next(iter(histories.values())).inverters, feeder),
+        nameplates=Nameplates.of_columns(first.history.inverters, first.feeder),
         events=[Mark(label, t, what.get(label, "")) for label, t in events],
-        f_nom=feeder.f_nom,
+        f_nom=first.f_nom,
         without_agent={case: without_agent(scenario, case) for case in scenario.cases},
         moves=any(event.leave or event.join for event in scenario.events),
         limited=tuple(limited),
         island_intervals={case: of for case, of in several.items() if of},
-        microgrid_of={row.name: row.microgrid for row in (*feeder.inverters, *feeder.spares)},
+        microgrid_of={row.name: row.microgrid for row in (*first.feeder.inverters, *first.feeder.spares)},
     )
 
 

@@ -4,9 +4,10 @@ from dataclasses import dataclass
 from functools import cache
 
 from gridpeers.papers.singhal2022.paper_benchmarks import CLAIMS
+from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.results.claims import judge
 from gridpeers.scenarios.results.findings import Findings, SteadyValues, find
-from gridpeers.scenarios.results.history import CaseRecord, History, Nameplates, windows
+from gridpeers.scenarios.results.history import History, Nameplates
 from gridpeers.scenarios.schema import load_scenario
 from tests.golden.catalogue.pins import ran
 
@@ -39,14 +40,12 @@ def experiment(name: str) -> Experiment:
     """Run all cases of a scenario."""
     scenario, feeder = load_scenario(name)
     nameplates = Nameplates.of(feeder.inverters)
-    events = [(event.label, event.t_s) for event in scenario.events]
     cases = {}
-    opened = windows(events, scenario.time.end_s)
     for case in scenario.cases:
         recorded, outcome = ran(name, case)
         assert not outcome.broke
         assert outcome.reproducible
-        history = History.of(nameplates.names, recorded.rows)
-        cases[case] = CaseRecord(history=history, windows=opened, events=recorded.events)
-    found = find(scenario, feeder, cases)
+        assert recorded.inverters == nameplates.names
+        cases[case] = CheckedCase.of(scenario, feeder, case, recorded)
+    found = find(cases)
     return Experiment(nameplates, {case: record.history for case, record in cases.items()}, found)

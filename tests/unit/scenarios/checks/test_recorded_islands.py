@@ -8,14 +8,18 @@ import pytest
 from msgspec.structs import replace as with_fields
 
 from gridpeers.plant.equipment.connectivity import islands_after
-from gridpeers.scenarios.checks.checked_case import CheckedCase
+from gridpeers.scenarios.checks.checked_case import CheckedCase, IslandWindow
 from gridpeers.scenarios.results.island_membership import closed_switches, switch_events
 from gridpeers.wire.messages import PlantEvent
 from tests.unit.scenarios.checks.cases import ran, verdict
 
 
+def _parts(case: CheckedCase, label: str) -> list[IslandWindow]:
+    return next(case.parts(window) for window in case.windows if window.label == label)
+
+
 def _islands(case: CheckedCase, label: str) -> set[tuple[str, ...]]:
-    return {part.history.inverters for part in case.parts if part.window.label == label}
+    return {part.history.inverters for part in _parts(case, label)}
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +34,7 @@ def test_a_switch_that_waits_for_ever_leaves_two_islands(waiting: CheckedCase) -
 
     assert _islands(waiting, "rejoining") == {alone, rest}
     assert verdict(waiting, "power_sharing").status == "passed"
-    assert "rejoining, island of inv4" in {it.label for it in waiting.parts}
+    assert "rejoining, island of inv4" in {it.label for it in _parts(waiting, "rejoining")}
 
 
 def test_a_switch_that_closes_late_makes_an_island_that_is_judged_from_then_on(waiting: CheckedCase) -> None:
@@ -38,7 +42,7 @@ def test_a_switch_that_closes_late_makes_an_island_that_is_judged_from_then_on(w
     text = "switch sw1_2 (832-832s) closed in step"
     late = PlantEvent(t=11.0, kind="switch", subject="832-832s", text=text, closed=True)
     closed = replace(waiting, events=(*waiting.events, late))
-    (part,) = (it for it in closed.parts if it.window.label == "rejoining")
+    (part,) = _parts(closed, "rejoining")
 
     assert len(_islands(closed, "rejoining")) == 1
     assert part.history.t[closed.rows_from(part, 2.0)][0] == pytest.approx(13.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +13,12 @@ import pytest
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem, NodeFault
 from gridpeers.plant.equipment import Feeder
+from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.live.departures import compare
 from gridpeers.scenarios.live.live_report import live_drawing, write_report
 from gridpeers.scenarios.results.findings import find
-from gridpeers.scenarios.results.history import CaseRecord, History, history_of, windows
+from gridpeers.scenarios.results.history import History, Window, windows
 from gridpeers.scenarios.results.metrics_file import RunMetrics, metrics_json
 from gridpeers.scenarios.results.record import Recorded, Recorder
 from gridpeers.scenarios.results.report import plain
@@ -177,6 +179,11 @@ def recorded() -> Recorded:
     return recorder.finish(8.0, plant.record_step)
 
 
+def case_of(history: History, opened: Sequence[Window], events: Sequence[PlantEvent]) -> CheckedCase:
+    scenario, feeder = one_case("islanding")
+    return CheckedCase(scenario=scenario, feeder=feeder, case="IV", history=history, windows=opened, events=events)
+
+
 def account(folder: Path, recorded: Recorded, until: float) -> tuple[dict[str, Any], str]:
     """metrics.json and report of a live run that ended then (s)."""
     scenario, feeder = one_case("islanding")
@@ -196,7 +203,7 @@ def test_a_live_run_that_was_left_alone_has_the_numbers_of_its_case(tmp_path: Pa
     run_inprocess(plant, agents, recorder)
     history = History.of(tuple(row.name for row in feeder.inverters), recorder.rows)
     came = windows([("event1", 1.0), ("event2", 4.0)], 7.0)
-    found = find(scenario, feeder, {"IV": CaseRecord(history=history, windows=came, events=recorder.events)})
+    found = find({"IV": case_of(history, came, recorder.events)})
     ran = RunMetrics(scenario=scenario, feeder=feeder, driver="inprocess", folder=tmp_path)
     expected = json.loads(metrics_json(ran, found, {"IV": {}}))["cases"]["IV"]
     metrics, report = account(tmp_path, recorded, 8.0)
@@ -270,9 +277,9 @@ def test_what_people_switched_is_measured_as_a_scenario_with_the_same_events_is(
     scenario, feeder = one_case("islanding")
     came = [("event1", 1.0), ("live at 2.5 s", 2.5), ("event2", 4.0), ("live at 7.5 s", 7.5)]
     history = History.of(switched.inverters, switched.rows)
-    whole = CaseRecord(history=history, windows=windows(came, 8.5), events=switched.events)
+    whole = case_of(history, windows(came, 8.5), switched.events)
     ran = RunMetrics(scenario=scenario, feeder=feeder, driver="inprocess", folder=tmp_path)
-    expected = json.loads(metrics_json(ran, find(scenario, feeder, {"IV": whole}), {"IV": {}}))["cases"]["IV"]
+    expected = json.loads(metrics_json(ran, find({"IV": whole}), {"IV": {}}))["cases"]["IV"]
     metrics, report = account(tmp_path, switched, 8.5)
     case = metrics["cases"]["IV"]
 
@@ -293,7 +300,7 @@ def test_figures_have_the_islands_that_a_person_made(switched: Recorded) -> None
     """From the moment at which the tie is opened to that at which it is closed; the scenario tells of neither."""
     scenario, feeder = one_case("islanding")
     departures = compare(scenario, feeder, switched.events, switched.ended)
-    drawing = live_drawing(departures, scenario, feeder, history_of(switched), switched.events)
+    drawing = live_drawing(departures, CheckedCase.of(scenario, feeder, "IV", switched))
     intervals = drawing.island_intervals["IV"]
 
     assert [(it.start, it.end, list(it.islands)) for it in intervals] == [
