@@ -6,7 +6,7 @@ import logging
 import re
 import sys
 import threading
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic
@@ -51,11 +51,18 @@ UNHEARD = "the plant has ended, and nothing was ever heard of it here: no link t
 LEAVING = 5.0
 """Time (s) that processes have to close by themselves once the plant has."""
 
+GOES_ON = "; the run goes on without it"
+
 _STOP = "stop"
 
 
 def say(line: str) -> None:
     print(line, flush=True)
+
+
+def _say_all(lines: Iterable[str]) -> None:
+    for line in lines:
+        say(line)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,40 +113,38 @@ class LiveRecorder:
         self.client.say(_STOP)
         self._thread.join()
         self.client.close()
-        for line in (*self._limit.left_out(), *self.client.rejects.take_lines()):
-            say(line)
-        if self._link_log is not None:
-            try:
-                for line in self._link_log.close(self.client.t):
-                    say(line)
-            except OSError as error:
-                self._fail("the link commands cannot be written", error)
-        if self._recorder is not None:
-            try:
-                self._finish(self._recorder)
-            except (RecordError, OSError) as error:
-                self._fail("the record cannot be written", error)
-            self._recorder.close()
+        _say_all((*self._limit.left_out(), *self.client.rejects.take_lines()))
+        if (link_log := self._link_log) is not None:
+            self._tried("the link commands cannot be written", lambda: _say_all(link_log.close(self.client.t)))
+        if (recorder := self._recorder) is not None:
+            self._tried("the record cannot be written", lambda: self._finish(recorder))
+            recorder.close()
 
     def note_crash(self, agent: str, end: str) -> None:
         """Note that the process of an agent crashed, with how it ended in words; from any thread."""
         self.client.say(f"{agent} {end}")
 
-    def _fail(self, what: str, why: object, consequence: str = "") -> None:
-        text = f"{what}: {getattr(why, 'strerror', None) or why}"
-        say(text + consequence)
-        self.failure = self.failure or text
+    def _tried(self, what: str, act: Callable[[], None], consequence: str = "") -> bool:
+        try:
+            act()
+        except (RecordError, OSError) as error:
+            text = f"{what}: {getattr(error, 'strerror', None) or error}"
+            say(text + consequence)
+            self.failure = self.failure or text
+            return False
+        return True
 
     def _finish(self, recorder: Recorder) -> None:
         """Give the files their names; those of a record that is not whole keep the partial ones."""
         if recorder.count < 2:
             say("nothing was recorded, so there are no numbers")
         elif not self.client.ended:
-            self._fail(f"the record ends at {recorder.ended:.2f} s", self.cut_short or "then no word came of the plant")
+            why = self.cut_short or "then no word came of the plant"
+            say(text := f"the record ends at {recorder.ended:.2f} s: {why}")
+            self.failure = self.failure or text
         else:
             self.recorded = recorder.finish(recorder.ended, recorder.record_step)
-            for line in self.recorded.link_lines:
-                say(line)
+            _say_all(self.recorded.link_lines)
 
     def _follow(self) -> None:
         while not self.client.ended:
@@ -151,27 +156,22 @@ class LiveRecorder:
 
     def _take(self, message: Recordable) -> None:
         """Say and record one message; an error in it must not end the recording of the others."""
-        on = "; the run goes on without it"
         try:
-            if isinstance(message, LinkRequest) and self._link_log is not None:
-                try:
-                    self._link_log(message)
-                except OSError as error:
-                    self._fail(f"the link commands end at {self.client.t:.2f} s", error, on)
+            link_log, recorder = self._link_log, self._recorder
+            if isinstance(message, LinkRequest) and link_log is not None:
+                what = f"the link commands end at {self.client.t:.2f} s"
+                if not self._tried(what, lambda: link_log(message), GOES_ON):
                     self._link_log = None
             if isinstance(message, Telemetry):
                 self._say_events(message)
-            if (recorder := self._recorder) is None:
+            if recorder is None:
                 return
             known, sound = len(recorder.missing), not recorder.record_failure
-            try:
-                recorder(message)
-            except (RecordError, OSError) as error:
-                self._fail(f"the record ends at {recorder.ended:.2f} s", error, on)
+            if not self._tried(f"the record ends at {recorder.ended:.2f} s", lambda: recorder(message), GOES_ON):
                 self._recorder = None
                 recorder.close()
             if sound and recorder.record_failure:
-                say(recorder.record_failure + on)
+                say(recorder.record_failure + GOES_ON)
             for before, after in recorder.missing[known:]:
                 say(f"rows between {before:.2f} and {after:.2f} s are missing: for so long no word came of the plant")
         except Exception as error:
@@ -184,8 +184,7 @@ class LiveRecorder:
             if event.kind not in self._silent and (line := self._limit.admit(line_of(event), monotonic())) is not None:
                 say(line)
         if telemetry.final:  # before the terminal says that the run has ended
-            for line in self._limit.left_out():
-                say(line)
+            _say_all(self._limit.left_out())
 
 
 def meaning(word: str, config: PlantConfig) -> str:

@@ -57,7 +57,7 @@ class RunClient:
 
     def renew(self) -> None:
         """Open a new session, as the old one does not bring the messages that it should."""
-        self._session.close()
+        self.close()
         self._open()
 
     def __enter__(self) -> RunClient:
@@ -143,7 +143,7 @@ class RunClient:
         NobodyError if there is no plant in time; at once if nobody there accepts the other's certificate.
         """
         began = monotonic()
-        look, reminder = began + FIRST_LOOK, REMINDER
+        look, reminder = FIRST_LOOK, REMINDER
         told: set[str] = set()
         others: set[str] = set()
 
@@ -151,24 +151,24 @@ class RunClient:
             return self.plant or not self._others <= others
 
         while True:
-            self.until(is_news, min(look, began + reminder, began + wait) - monotonic())
-            now = monotonic()
+            self.until(is_news, began + min(look, reminder, wait) - monotonic())
             if self.plant:
                 return
+            waited = monotonic() - began
             if is_news():
                 others |= self._others
                 tell(f"no plant yet of {self.where} (runs there: {', '.join(sorted(others))}); waits on")
-            if now - began >= wait:
+            if waited >= wait:
                 raise NobodyError(self._failure(wait))
-            if now >= look:
-                look = now + RENEWAL
+            if waited >= look:
+                look = waited + RENEWAL
                 if refused := self._refused():
                     raise NobodyError(refused)
                 if self._session.misplaced:
                     self.renew()
-            if now - began >= reminder:
+            if waited >= reminder:
                 reminder *= 2.0
-                tell(f"no plant yet of {self.where}; {now - began:.0f} of {wait:g} s waited")
+                tell(f"no plant yet of {self.where}; {waited:.0f} of {wait:g} s waited")
                 for line in self._link_faults():
                     if line not in told:
                         told.add(line)
@@ -186,44 +186,39 @@ class RunClient:
         return "\n".join(refusals) if all(refusals) else ""
 
     def _link_faults(self) -> list[str]:
-        credentials = self.where.credentials
-        if credentials is None:
+        if (credentials := self.where.credentials) is None:
             return []
-        vouched = self._session.vouches(PLANT)  # first: it looks at links that have just come, and notes their lines
+        own, vouched = credentials.own, self._session.vouches(PLANT)  # it looks at new links, and notes their lines
         self._refused_links += self._session.take_lines()
-        if self.runs or not vouched:
-            return [*self._refused_links]
-        own = credentials.own
-        return [
-            *self._refused_links,
+        silent = (
             f"the plant at {', '.join(self.where.connect)} takes the link, but nothing passes on it: it is still being "
             f"built, or its members.json revokes or lacks the certificate of {own.name}, which its output says; "
-            f"gridpeers keys issue {own.name} --role {own.role}, where the site was made, gives {own.name} a new one",
-        ]
+            f"gridpeers keys issue {own.name} --role {own.role}, where the site was made, gives {own.name} a new one"
+        )
+        return [*self._refused_links, *([silent] if vouched and not self.runs else [])]
 
     def _failure(self, wait: float) -> str:
         where = self.where
-        start = command_line("plant", "SCENARIO", *where.access.words)
         if self._session.peers():
             missing = f"no plant of {where} within {wait:g} s"
-            there = f" (runs there: {', '.join(sorted(self._others))})" if self._others else ""
+            runs = f"runs there: {', '.join(sorted(self._others))}" if self._others else ""
             if faults := self._link_faults():
-                return f"{missing}{there}: {'; '.join(faults)}"
+                return f"{missing}{runs and f' ({runs})'}: {'; '.join(faults)}"
             start = command_line("plant", "SCENARIO", "--run", where.run, *where.access.words)
-            there = there or " (no other run is there either)"
-            return f"{missing}{there}; start one ({start}), or give another name by --run"
+            there = runs or "no other run is there either"
+            return f"{missing} ({there}); start one ({start}), or give another name by --run"
         if refused := self._refused():
             return refused
-        mute = ", ".join(accepting(where.connect))
-        if not mute:
+        if mute := ", ".join(accepting(where.connect)):
+            keys = "is of a run without certificates" if where.credentials else "asks for --keys DIR and tls/..."
             return (
-                f"nothing answers at {', '.join(where.connect)} within {wait:g} s; start a plant there ({start}), "
-                "or say by --connect where it is"
+                f"something listens at {mute} but has said nothing within {wait:g} s; if it is a frozen plant, kill "
+                f"-CONT lets it go on; it may be a plant that {keys}; else say by --connect where the plant is"
             )
-        keys = "is of a run without certificates" if where.credentials else "asks for --keys DIR and tls/..."
+        start = command_line("plant", "SCENARIO", *where.access.words)
         return (
-            f"something listens at {mute} but has said nothing within {wait:g} s; if it is a frozen plant, kill -CONT "
-            f"lets it go on; it may be a plant that {keys}; else say by --connect where the plant is"
+            f"nothing answers at {', '.join(where.connect)} within {wait:g} s; start a plant there ({start}), "
+            "or say by --connect where it is"
         )
 
 
@@ -231,8 +226,7 @@ def _refusal(text: str, where: RunAddress) -> str:
     endpoint = parse_endpoint(text)
     if endpoint is None or not endpoint.connects:
         return ""
-    refusal = tls_refusal(endpoint.host.strip("[]"), endpoint.port, where.credentials, PROBE)
-    if not refusal:
+    if not (refusal := tls_refusal(endpoint.host.strip("[]"), endpoint.port, where.credentials, PROBE)):
         return ""
     advice = "say by --keys the folder of its site, or by --connect where the plant of this site is"
     if where.credentials is None:
