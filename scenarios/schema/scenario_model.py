@@ -215,7 +215,10 @@ class Processes(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     """TCP port of the plant on the loopback, the rendezvous of the run; 0 takes a free one."""
 
 
-NEEDS_KEYS = 'security = "mtls": say --keys DIR, the folder with the certificates (gridpeers keys init makes one)'
+NEEDS_KEYS = (
+    'security = "mtls": say --keys DIR, the folder with the certificates; gridpeers keys init DIR makes it, and '
+    "gridpeers keys issue NAME ... --keys DIR the certificates of agents"
+)
 """Error of a scenario that asks for certificates, where none were given."""
 
 
