@@ -18,15 +18,7 @@ from gridpeers.plant.plant_config import (
     PowerLimit,
     SwitchEvent,
 )
-from gridpeers.scenarios.schema.participants import (
-    deaths_of,
-    inverters_of,
-    is_calm,
-    netem_of,
-    schedule_of,
-    setup_of,
-    with_agent,
-)
+from gridpeers.scenarios.schema import participants
 from gridpeers.scenarios.schema.plugin_keys import graph_of, law_of
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.scenarios.schema.supply import load_events
@@ -42,9 +34,10 @@ def configs(
     run, endpoints = f"{scenario.name}-{case}", (endpoint,) if endpoint else ()
     time, rule = scenario.time, scenario.cases[case]
     graph, own_graph = graph_of(rule)
-    inverters, present = inverters_of(scenario, feeder), with_agent(scenario, feeder, case)
-    netem = netem_of(scenario, case)
-    links = {} if is_calm(netem) else setup_of(netem, scenario, feeder, real_nodes=real_nodes).to_tree()
+    inverters, present = participants.inverters_of(scenario, feeder), participants.with_agent(scenario, feeder, case)
+    netem = participants.netem_of(scenario, case)
+    setup = participants.setup_of(netem, scenario, feeder, real_nodes=real_nodes)
+    links = {} if participants.is_calm(netem) else setup.to_tree()
     rates = {node.name: node.skew.factor for node in netem.nodes if node.skew is not None}
     control = Control(
         secondary=rule.secondary,
@@ -78,7 +71,7 @@ def configs(
             spares=tuple(row.name for row in inverters if row.spare),
         ),
         agents=tuple(row.name for row in present if not row.spare),
-        schedule=(*schedule_of(scenario), *(() if real_nodes else deaths_of(netem))),
+        schedule=(*participants.schedule_of(scenario), *(() if real_nodes else participants.deaths_of(netem))),
         T_c=time.T_c_s,
         end=time.end_s,
         record_step=time.record_s,

@@ -14,27 +14,8 @@ from gridpeers.plant.equipment import F_NOM, Feeder
 from gridpeers.plant.simulators import SIMULATORS
 from gridpeers.plant.tables import FeederError, feeders, is_folder, read_feeder
 from gridpeers.scenarios.catalogue_files import CATALOGUE, names_in
-from gridpeers.scenarios.schema.checks import (
-    check_cases,
-    check_changes,
-    check_events,
-    check_limits,
-    check_moves,
-    check_names,
-    check_protection,
-    check_start,
-    check_step,
-    check_times,
-    name_of,
-)
+from gridpeers.scenarios.schema import checks, participants
 from gridpeers.scenarios.schema.configs import as_in
-from gridpeers.scenarios.schema.participants import (
-    check_agentless,
-    check_netem,
-    check_simulator,
-    inverters_of,
-    with_delays,
-)
 from gridpeers.scenarios.schema.plugin_keys import check_plugins, with_folders
 from gridpeers.scenarios.schema.scenario_errors import Problems, ScenarioError
 from gridpeers.scenarios.schema.scenario_model import AS_RUN, ScenarioModel
@@ -113,30 +94,31 @@ def check_tables(
     """
     scenario = read_tables(data, problems)
     if not scenario.name:
-        scenario = replace(scenario, name=name_of(path.stem))
-    check_times(scenario, problems)
-    check_names(scenario, problems)
+        scenario = replace(scenario, name=checks.name_of(path.stem))
+    checks.check_times(scenario, problems)
+    checks.check_names(scenario, problems)
     scenario = with_folders(scenario, path.parent)
     feeder_path = scenario.plant.feeder
     if feeder_path not in feeders() and is_folder(path.parent / feeder_path):  # processes may start elsewhere
         plant = replace(scenario.plant, feeder=str((path.parent / feeder_path).resolve()))
         scenario = replace(scenario, plant=plant)
-    scenario = with_delays(scenario, path.parent, problems)
+    scenario = participants.with_delays(scenario, path.parent, problems)
     feeder = _feeder_of(scenario, problems, read_feeder)
-    check_step(scenario, feeder, problems)
-    check_protection(scenario, feeder.f_nom if feeder else F_NOM, problems)
-    check_cases(scenario, tuple(row.name for row in inverters_of(scenario, feeder)) if feeder else (), problems)
+    checks.check_step(scenario, feeder, problems)
+    checks.check_protection(scenario, feeder.f_nom if feeder else F_NOM, problems)
+    inverters = participants.inverters_of(scenario, feeder) if feeder else ()
+    checks.check_cases(scenario, tuple(row.name for row in inverters), problems)
     check_plugins(scenario, feeder, problems)
-    check_events(scenario, problems)
-    check_simulator(scenario, problems)
-    check_netem(scenario, feeder, problems)
+    checks.check_events(scenario, problems)
+    participants.check_simulator(scenario, problems)
+    participants.check_netem(scenario, feeder, problems)
     if feeder:
-        check_changes(scenario, feeder, problems)
-        check_agentless(scenario, feeder, problems)
-        check_moves(scenario, feeder, problems)
-        check_limits(scenario, feeder, problems)
+        checks.check_changes(scenario, feeder, problems)
+        participants.check_agentless(scenario, feeder, problems)
+        checks.check_moves(scenario, feeder, problems)
+        checks.check_limits(scenario, feeder, problems)
         check_loads(scenario, feeder, problems)
-        check_start(scenario, feeder, problems)
+        checks.check_start(scenario, feeder, problems)
         check_supply(scenario, feeder, problems)
         if not problems.touch("plant.simulator"):
             SIMULATORS.resolve(scenario.plant.simulator).check(scenario, feeder, problems)
