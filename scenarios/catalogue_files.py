@@ -15,6 +15,5 @@ def names_in(folder: Path) -> tuple[str, ...]:
 
 
 def summaries() -> dict[str, tuple[str, tuple[str, ...]]]:
-    """Title and cases of every scenario of the catalogue, read without a check, which takes longer."""
     tables = {name: tomllib.loads((CATALOGUE / f"{name}.toml").read_text("utf-8")) for name in names_in(CATALOGUE)}
     return {name: (table["title"], tuple(table["case"])) for name, table in tables.items()}

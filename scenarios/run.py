@@ -64,7 +64,6 @@ def run(request: Request, progress: Progress) -> RunReport:
 
 
 def _logged(request: Request, progress: Progress) -> RunReport:
-    """Run all cases; what breaks them is in the log."""
     file = request.folder / "log" / "run.log"
     file.parent.mkdir()
     with file.open("w", encoding="utf-8", errors="backslashreplace") as log:

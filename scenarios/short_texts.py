@@ -34,7 +34,6 @@ def short(names: tuple[str, ...] | list[str]) -> str:
 
 
 _UNITS = ((120, 1, "s"), (7200, 60, "min"), (172_800, 3600, "h"), (math.inf, 86_400, "days"))
-"""Below which length (s) which unit (s) is used, and its name."""
 
 
 def duration(seconds: float) -> str:

@@ -59,7 +59,6 @@ class EmulatedLinks:
                 end, slow = math.inf if node.to_s is None else node.to_s, math.inf if node.pause else node.slow_s
                 self._intervals.setdefault(node.name, []).append(_Interval(node.from_s, end, slow))
         self._pauses = tuple(at for at in self._intervals.get(name, ()) if math.isinf(at.slow))
-        """When the receiver itself is paused."""
 
     def offer(self, message: State | Measurement, payload: bytes, at: float) -> bool:
         """Take a message off the wire and return True; return False if no fault ever acts on its link."""

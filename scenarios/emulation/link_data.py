@@ -46,7 +46,6 @@ class EmulationConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
 class LinkReportData(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     traces: tuple[LinkTrace, ...] = ()
     counts: dict[Name, LinkCounts] = {}
-    """Counts of the messages of each sender so far."""
     sha256: str = ""
     """Hash (hex) of all verdicts so far."""
     failures: tuple[Text, ...] = ()

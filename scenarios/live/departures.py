@@ -59,7 +59,6 @@ class Departures:
 
     @property
     def note(self) -> str:
-        """A sentence on the disturbed windows; "" if there are none."""
         if not self.disturbed:
             return ""
         lines = self.lines(self.disturbed[-1].end) or ["rows that are missing"]

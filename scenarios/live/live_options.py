@@ -34,7 +34,6 @@ from gridpeers.wire.trust.credentials import Credentials
 from gridpeers.wire.wording import suggestion
 
 LOOKING = 1.5
-"""Time (s) to find a plant that is there: a link, and a token on it, take some 50 ms."""
 
 
 def endpoint_for_run(listen: str, credentials: Credentials | None = None, access: Access | None = None) -> str:

@@ -71,7 +71,6 @@ class ProcessOutcome:
     interrupted: str = ""
     """Name of the signal that ended it: SIGINT, as Ctrl-C gives, or SIGTERM."""
     recorded: Recorded | None = None
-    """The record, if it is whole."""
     pacing: Pacing | None = None
     failed_laws: tuple[PlantEvent, ...] = ()
 
@@ -300,7 +299,6 @@ def agent_here(
 
 
 def _followed(recorder: LiveRecorder, run: Callable[[], str], requests: StopSignal) -> ProcessOutcome:
-    """Run something with its recorder until it returns why it broke, or a signal ends it."""
     broke = interrupted = ""
     try:
         with recorder:

@@ -34,8 +34,6 @@ class UsageError(ValueError):
 
 @dataclass(frozen=True)
 class Access:
-    """The options `--keys`, `--as` and `--insecure` of a command."""
-
     keys: Path | None = None
     name: str = ""
     """Name of the member; the first that fits if empty."""
@@ -72,7 +70,6 @@ class RunAddress:
 
 
 def address_of(run: str, connect: list[str] | None) -> RunAddress:
-    """Return the address that the options `--run` and `--connect` give; UsageError if one of them cannot be used."""
     return RunAddress(
         run=check_name("--run", run), connect=tuple(check_endpoint("--connect", text) for text in connect or [ENDPOINT])
     )
@@ -118,13 +115,11 @@ def check_inverters(names: Sequence[str]) -> None:
 
 
 def check_wait(wait: float) -> None:
-    """Raise UsageError if a longest wait (s) cannot be one; infinity waits for ever."""
     if not wait >= 0.0:
         raise UsageError(f"--wait: must be a time of at least 0 s, got {wait:g} s")
 
 
 def check_duration(seconds: float | None) -> None:
-    """Raise UsageError if a duration (s) cannot be one; None has no end."""
     if seconds is not None and not 0.0 < seconds <= LONGEST_TIME:
         raise UsageError(f"--for: must be a time of more than 0 s and at most {LONGEST_TIME:g} s, got {seconds:g} s")
 
@@ -179,5 +174,4 @@ def return_path(connect: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def loopback_of(listen: str) -> str:
-    """Return where a process of this host connects to one that listens there."""
     return listen.replace("/0.0.0.0:", "/127.0.0.1:").replace("/[::]:", "/[::1]:")

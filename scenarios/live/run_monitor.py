@@ -142,7 +142,6 @@ class Snapshot:
     impaired: tuple[str, ...] = ()
     inverters: tuple[InverterStatus, ...] = ()
     events: tuple[str, ...] = ()
-    """A line for each event, the latest last."""
 
 
 def line_of(event: PlantEvent) -> str:
@@ -154,7 +153,6 @@ class RunMonitor:
         self._run = run
         self._configs: dict[str, AgentConfig] = {}
         self._telemetry: Telemetry | None = None
-        """The plant's latest."""
         self._heard_at = 0.0
         self._row: tuple[float, ...] = ()
         self._t: float | None = None
@@ -260,7 +258,6 @@ class RunMonitor:
         return text + (f", fell behind by {pacing.slipped:.1f} s" if pacing.slipped > 0.0 else "")
 
     def _note(self, name: str, present: bool, status: AgentStatus | None, age: float) -> str:
-        """Return what a person should know of an agent, whose last status is `age` (s) old."""
         if not present:
             return "not heard here; the plant hears it" if name in self.members else "no agent"
         if status is None:

@@ -147,7 +147,6 @@ def has_left(client: RunClient, name: str) -> bool:
 
 
 def has_ended(client: RunClient) -> bool:
-    """Wait until a run that was asked to end has ended; its plant leaves last. Return False if it goes on."""
     return client.until(lambda: not client.plant, LEAVING)
 
 
@@ -194,7 +193,6 @@ def configurations(client: RunClient, name: str = "", wait: float = ANSWER) -> d
 
 
 def read_config(payload: bytes) -> AgentConfig | None:
-    """Return a plausible configuration of an agent; None if the bytes are something else."""
     if not payload.startswith(b"{"):
         return None
     try:

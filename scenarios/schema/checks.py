@@ -178,7 +178,6 @@ def check_moves(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> 
 
 
 def check_limits(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
-    """Note limits of available power that are not of a GFL, or beyond its rating."""
     rows, plant = {row.name: row for row in inverters_of(scenario, feeder)}, scenario.plant
     limits = [(f"event[{i}].P_max_kW", event.P_max_kW) for i, event in enumerate(scenario.events)]
     for case, rule in scenario.cases.items():
@@ -333,7 +332,6 @@ def check_step(scenario: ScenarioModel, feeder: Feeder | None, problems: Problem
 
 
 def _time_constants(table: str, parameters: InverterParameters) -> dict[tuple[str, str], float]:
-    """Return the time constants (s) that an inverter's step must resolve, by table and name."""
     if isinstance(parameters, GfmParameters):
         names: tuple[str, ...] = ("T_p", "T_q", "T_v")
     else:

@@ -170,7 +170,6 @@ def changes_of(scenario: ScenarioModel) -> FeederChanges:
 
 
 def as_in(scenario: ScenarioModel, feeder: Feeder) -> Feeder:
-    """Return a scenario's feeder, given the feeder as its tables have it."""
     return changed(feeder, changes_of(scenario))
 
 

@@ -31,7 +31,6 @@ def catalogue() -> tuple[str, ...]:
 
 
 def find_scenario(name: str) -> Path:
-    """Return the path of a scenario named as in the catalogue or given as a path; ScenarioError if there is neither."""
     return find_file(name, CATALOGUE, "scenario")
 
 
@@ -67,7 +66,6 @@ def load_scenario(name: str | Path) -> tuple[ScenarioModel, Feeder]:
 
 
 def read_toml(path: Path) -> tuple[str, dict[str, Any]]:
-    """Return text and tables of a file; ScenarioError if it cannot be read or is no TOML."""
     try:
         text = text_of(path.read_bytes())
     except TextFileError as error:

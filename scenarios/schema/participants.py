@@ -23,7 +23,6 @@ from gridpeers.wire.wording import suggestion
 
 
 def inverters_of(scenario: ScenarioModel, feeder: Feeder) -> tuple[InverterRow, ...]:
-    """Return the feeder's inverters, and those of its spare ones that join."""
     joining = {name for event in scenario.events for name in event.join}
     return (*feeder.inverters, *(row for row in feeder.spares if row.name in joining))
 

@@ -87,7 +87,6 @@ class Problems:
             raise ScenarioError(text for _, text in sorted(self._found, key=lambda item: item[0]))
 
     def _line_of(self, path: str) -> int:
-        """Line of a key, or of the nearest table around it; 0 when neither is written in the file."""
         while path:
             if path in self._lines:
                 return self._lines[path]

@@ -80,7 +80,6 @@ class SupplyState(NamedTuple):
     """Those of them that were fed until then."""
     islands: tuple[frozenset[Node], ...]
     inverters: frozenset[str]
-    """Inverters that are on the network."""
 
 
 def check_supply(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
