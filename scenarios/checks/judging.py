@@ -1,13 +1,10 @@
-"""Judge a recorded case by checks: each may fail without harm to the others, and one that takes long is named."""
+"""Judge a recorded case by checks: each may fail without harm to the others."""
 
 from __future__ import annotations
 
 import math
-import sys
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Mapping
 from itertools import islice
-from threading import Timer
 from typing import Any
 
 import numpy as np
@@ -26,10 +23,6 @@ from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.wire.plugins.plugin import Plugin, made
 from gridpeers.wire.plugins.registry import ANYTHING, PluginError, named
 from gridpeers.wire.wording import printable
-
-PATIENCE = 10.0
-"""Time (s) after which a check that still judges is named: those of an hour of nine agents in wall-clock time take
-minutes together, all others seconds, and one of a user's may never return."""
 
 
 class JudgingStop:
@@ -75,39 +68,17 @@ def judge_by(
     return tuple(found)
 
 
-@contextmanager
-def _named_if_slow(name: str, plugin: Plugin, case: CheckedCase) -> Iterator[None]:
-    """Say once which check judges, if it takes long: it may never return, and nothing else moves meanwhile."""
-    module = plugin.use.partition(":")[0]
-    of = f" of {module}" if module != plugin.use else ""
-    timer = Timer(PATIENCE, tell, (f"check {name}{of} has been judging case {case.case} for {PATIENCE:g} s",))
-    timer.daemon = True
-    timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()
-        timer.join(1.0)  # the figures' processes are forked next, and a fork wants no other thread
-
-
-def tell(text: str) -> None:
-    """Say on standard error what judging waits for."""
-    with suppress(OSError, ValueError):  # nobody reads it any more
-        print(f"{printable(text, 300)}; Ctrl-C ends the run, and keeps what is recorded", file=sys.stderr, flush=True)
-
-
 def _verdict(name: str, plugin: Plugin, case: CheckedCase) -> CheckVerdict:
     violations: list[Violation] = []
     count, raised = 0, ""
     try:
-        with _named_if_slow(name, plugin, case):
-            found = made(CHECKS, plugin)(case)
-            if not isinstance(found, Iterable) or isinstance(found, str | Mapping):
-                raise TypeError(f"returned {printable(repr(found), 60)}; return violations, none for a run that passes")
-            for number, violation in enumerate(islice(found, MOST_VIOLATIONS), 1):
-                checked, count = _checked(violation), number
-                if count <= SHOWN_VIOLATIONS:
-                    violations.append(checked)
+        found = made(CHECKS, plugin)(case)
+        if not isinstance(found, Iterable) or isinstance(found, str | Mapping):
+            raise TypeError(f"returned {printable(repr(found), 60)}; return violations, none for a run that passes")
+        for number, violation in enumerate(islice(found, MOST_VIOLATIONS), 1):
+            checked, count = _checked(violation), number
+            if count <= SHOWN_VIOLATIONS:
+                violations.append(checked)
     except NotJudgedError as error:
         raised = printable(str(error), 300) or "no reason given"
         if not violations:

@@ -100,30 +100,6 @@ def test_a_check_that_yields_without_end_is_asked_for_no_more(monkeypatch: pytes
     assert next(numbers) == 1000
 
 
-def test_a_check_that_judges_for_long_is_named_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """While it judges, or yields: this one goes on only when it has been named."""
-    ran()  # its own checks have other patience
-    told: list[str] = []
-    named = Event()
-
-    def tell(text: str) -> None:
-        told.append(text)
-        named.set()
-
-    monkeypatch.setattr(judging, "tell", tell)
-    monkeypatch.setattr(judging, "PATIENCE", 0.0)
-
-    def waits(case: CheckedCase) -> Iterator[Violation]:
-        assert named.wait(60.0)
-        yield Violation(text="late")
-
-    assert judged(waits, monkeypatch).count == 1
-    assert told == ["check mine has been judging case IV for 0 s"]
-    monkeypatch.setattr(judging, "PATIENCE", 1e6)
-    assert judged(lambda case: (), monkeypatch).status == "passed"
-    assert len(told) == 1
-
-
 def interrupted(case: CheckedCase) -> tuple[()]:
     """A check that a person ends by Ctrl-C."""
     raise KeyboardInterrupt
