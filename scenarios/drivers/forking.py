@@ -137,7 +137,7 @@ _OF_PLANTS = (
 )
 """Agents have another server, because they do not load numpy."""
 
-_OF_FIGURES = ("gridpeers.scenarios.results.plots.drawing_process",)
+_OF_FIGURES = ("gridpeers.scenarios.results.plots.run_figures", "gridpeers.scenarios.results.figure_processes")
 
 _SET_BY_US = {"ZENOH_RUNTIME", "KMP_DUPLICATE_LIB_OK"}
 """Variables that loading Zenoh, and threadpoolctl, sets here as it does there."""

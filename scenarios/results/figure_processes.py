@@ -1,6 +1,7 @@
 """Draw the figures of a run on all cores, by processes that have imported matplotlib while the run went on.
 
-Matplotlib takes 0.25 s to import and 1 s to draw the figures of a case, longer than the case takes.
+Matplotlib takes 0.25 s to import and 1 s to draw the figures of a case, longer than the case takes. Such a process runs
+this module.
 """
 
 from __future__ import annotations
@@ -8,6 +9,8 @@ from __future__ import annotations
 import os
 import pickle
 import signal
+import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -19,7 +22,7 @@ from gridpeers.wire.driver.machine import usable_cores
 if TYPE_CHECKING:
     from gridpeers.scenarios.results.plots.drawing import Drawing
 
-MODULE = "gridpeers.scenarios.results.plots.drawing_process"
+MODULE = "gridpeers.scenarios.results.figure_processes"
 
 MOST = 4  # Processes, as far as there are cores: a run has eight figures or a few more
 
@@ -73,3 +76,22 @@ def _start(started: list[ForkedProcess], drawing: Drawing, folder: Path, number:
 
 def _cores() -> int:
     return min(usable_cores(), MOST)
+
+
+def _draw_share() -> None:
+    """Draw the share that comes, pickled, on standard input: drawing, folder, number of the share, number of shares."""
+    from gridpeers.scenarios.results.plots.run_figures import draw_all
+
+    share = pickle.load(sys.stdin.buffer)
+    threading.Thread(target=_end_with_the_command, daemon=True).start()
+    draw_all(*share)
+
+
+def _end_with_the_command() -> None:
+    """End when the pipe does: a killed command's folder may be another run's by now."""
+    os.read(sys.stdin.fileno(), 1)  # not through the buffer, whose lock Python wants at its own end
+    os._exit(1)
+
+
+if __name__ == "__main__":
+    _draw_share()
