@@ -12,6 +12,7 @@ import threading
 import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
+from multiprocessing import resource_tracker
 from typing import Any, TypeVar
 
 T = TypeVar("T")
@@ -106,9 +107,10 @@ def _without_interrupts() -> Iterator[None]:
 
     The tracker of the workers' semaphores, started here too, else warns of those of workers that were ended.
     """
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     inherited = os.environ.get(_WARNINGS)
     os.environ[_WARNINGS] = ",".join(filter(None, [inherited, "ignore:resource_tracker:UserWarning"]))
+    resource_tracker.ensure_running()  # Python lets SIGINT through when it has started it: workers come after
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:

@@ -63,10 +63,23 @@ def many(sweep_file: Write) -> Path:
     return path
 
 
+SWEEP = "from gridpeers.cli.app import main; main()"
+
+SLEEPERS = """
+from time import sleep
+from gridpeers.scenarios.sweep.workers import on_workers
+try:
+    for _ in on_workers([(0.0,), *[(60.0,)] * 3], 2, sleep):
+        print("3 left")
+except KeyboardInterrupt:
+    print("interrupted")
+"""
+
+
 @contextmanager
-def command(*words: str, cwd: Path) -> Iterator[subprocess.Popen[str]]:
-    """The command in a session of its own, as in a terminal of its own; nothing of it outlives the test."""
-    line = [sys.executable, "-u", "-c", "from gridpeers.cli.app import main; main()", "sweep", *words]
+def python(code: str, *words: str, cwd: Path) -> Iterator[subprocess.Popen[str]]:
+    """A program in a session of its own, as in a terminal of its own; nothing of it outlives the test."""
+    line = [sys.executable, "-u", "-c", code, *words]
     with subprocess.Popen(
         line, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as running:
@@ -84,12 +97,12 @@ def reached_a_tenth(running: subprocess.Popen[str]) -> bool:
 
 
 def test_a_killed_sweep_goes_on_and_gives_the_table_of_an_undisturbed_one(many: Path, tmp_path: Path) -> None:
-    """Kill -9 in the middle: what was done stays, nothing is done twice, the table is equal."""
+    """Kill -9 in the middle: workers end, what was done stays, nothing is done twice, the table is equal."""
     journal = tmp_path / "killed" / "runs.jsonl"
-    with command("mine.toml", "--out", "killed", "--jobs", "1", cwd=tmp_path) as running:
+    with python(SWEEP, "sweep", "mine.toml", "--out", "killed", "--jobs", "2", cwd=tmp_path) as running:
         assert reached_a_tenth(running)
-        os.killpg(running.pid, signal.SIGKILL)
-        running.communicate(timeout=60)  # ends when nobody holds the pipes any more
+        running.kill()
+        running.communicate(timeout=60)  # workers hold the pipe: it ends with the last of them
     kept = journal.read_bytes()
     count = kept.count(b"\n")
     journal.write_bytes(kept + b'{"number":9,"status":"r')  # as if cut off in the middle of a line
@@ -105,12 +118,20 @@ def test_a_killed_sweep_goes_on_and_gives_the_table_of_an_undisturbed_one(many: 
     assert (tmp_path / "killed" / "status.txt").read_text() == "complete\n"
 
 
-def test_ctrl_c_keeps_what_is_done_says_how_to_go_on_and_leaves_no_worker(many: Path, tmp_path: Path) -> None:
-    """Exit code 130 and one line, whoever of the group got the signal."""
-    with command("mine.toml", "--out", "here", "--jobs", "2", cwd=tmp_path) as running:
+def test_ctrl_c_ends_workers_without_a_word_of_theirs(tmp_path: Path) -> None:
+    """Though the signal goes to all of the group; the next command finds none of them."""
+    with python(SLEEPERS, cwd=tmp_path) as running:
         assert reached_a_tenth(running)
         os.killpg(running.pid, signal.SIGINT)
-        _, err = running.communicate(timeout=60)  # workers hold the pipe: it ends with the last of them
+        assert running.communicate(timeout=50) == ("interrupted\n", "")  # it ends with the last worker
+
+
+def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(many: Path, tmp_path: Path) -> None:
+    """Exit code 130 and one line."""
+    with python(SWEEP, "sweep", "mine.toml", "--out", "here", "--jobs", "1", cwd=tmp_path) as running:
+        assert reached_a_tenth(running)
+        os.killpg(running.pid, signal.SIGINT)
+        _, err = running.communicate(timeout=60)
         assert running.returncode == 130, err
     kept = (tmp_path / "here" / "runs.jsonl").read_text().count("\n")
 
