@@ -24,6 +24,7 @@ from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.checks.judging import judge_case
 from gridpeers.scenarios.results.island_membership import closed_switches
 from gridpeers.scenarios.results.recorded_events import tripped_by, tripped_inverters
+from gridpeers.scenarios.results.run_files import JournalRow
 from gridpeers.scenarios.run import run_case
 from gridpeers.scenarios.run_request import BrokenRunError, Driver, LawStopError, Request
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
@@ -46,11 +47,10 @@ taken at the end of the first period. What an agent decides on it acts during th
 of the change from another, or has measured what a decision did."""
 
 
-class ChaosRow(msgspec.Struct, frozen=True, kw_only=True):
-    number: int
+class ChaosRow(JournalRow, frozen=True, kw_only=True):
     schedule: Schedule
     passed: tuple[str, ...] = ()
-    violated: dict[str, str] = {}
+    violated: dict[str, str] = msgspec.field(default_factory=dict)
     collapse: str = ""
     """Why violations of some inverters do not count: a change made them trip before any control could prevent it."""
     unsettled: str = ""

@@ -13,7 +13,7 @@ from datetime import datetime
 from io import StringIO
 from itertools import count
 from pathlib import Path
-from typing import BinaryIO, Protocol, TypeVar
+from typing import BinaryIO, TypeVar
 
 import msgspec
 
@@ -24,13 +24,7 @@ RUNS = Path("runs")  # Parent of the run folders that the user does not name, se
 STATUS = "status.txt"  # File that says how far a folder's run is
 
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)  # The system takes no more bytes
-_GONE = (
-    errno.ENOENT,
-    errno.ENOTDIR,
-    errno.ESTALE,
-    errno.EACCES,
-    errno.EPERM,
-)  # The folder was removed, or closed to us
+_GONE = (errno.ENOENT, errno.ENOTDIR, errno.ESTALE, errno.EACCES, errno.EPERM)  # It was removed, or closed to us
 
 _NOT_EMPTY = "the folder is not empty; give a new or an empty one"
 
@@ -213,11 +207,11 @@ def broken_if_ended(folder: Path) -> Iterator[None]:
 JOURNAL = "runs.jsonl"
 
 
-class JournalRow(Protocol):
-    """The result of a run of a study, as a struct of msgspec: a line of the journal, from which the study goes on."""
+class JournalRow(msgspec.Struct, frozen=True, kw_only=True):
+    """The result of a run of a study: a line of the journal, from which the study goes on."""
 
-    @property
-    def number(self) -> int: ...
+    number: int
+    """Its place in the study, from 0."""
 
 
 Row = TypeVar("Row", bound=JournalRow)

@@ -23,6 +23,7 @@ from gridpeers.scenarios.results.history import History
 from gridpeers.scenarios.results.metrics import SHARING, SHARING_OF_ISLANDS
 from gridpeers.scenarios.results.record import Recorder
 from gridpeers.scenarios.results.recorded_events import ended_by_a_law, first_of, law_failures
+from gridpeers.scenarios.results.run_files import JournalRow
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.scenarios.schema.configs import as_in, configs
 from gridpeers.scenarios.schema.plugin_keys import judges_laws
@@ -36,9 +37,7 @@ _kept = threading.local()
 _feeder = lru_cache(maxsize=8)(read_feeder)
 
 
-class SweepRow(msgspec.Struct, frozen=True, kw_only=True):
-    number: int
-    """Its place in the plan, from 0."""
+class SweepRow(JournalRow, frozen=True, kw_only=True):
     status: Literal["ran", "broke", "law failed"]
     """Where a law failed there are no measures, which would be droop's, unless the scenario has switched the check
     "law_failed" off: then the status is "ran"."""
@@ -53,7 +52,7 @@ class SweepRow(msgspec.Struct, frozen=True, kw_only=True):
     """The scenario's own metrics without a value, and why; "" when all have one."""
     link_warnings: str = ""
     """Accounts of emulated links that do not close, and plugged-in faults that failed; "" if there are none."""
-    measures: dict[str, float | None] = {}
+    measures: dict[str, float | None] = msgspec.field(default_factory=dict)
     """Every index of every event's window, e.g. "event1.MPSI", None where it never came to be; "event1.steady", 1 where
     all of them are steady values, else 0; and messages over all emulated links, e.g. "links_dropped"."""
 
@@ -92,7 +91,7 @@ def _run(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, His
     measured = CheckedCase.of(scenario, feeder, case, recorded)
     with np.errstate(all="ignore"):  # a value that is no number is None
         found = find({case: measured})
-    measures: dict[str, float | None] = {}
+    measures: dict[str, float | None] = msgspec.field(default_factory=dict)
     own = found.own.get(case, {})
     for label in found.results[case]:
         measures |= flat(label, _indexes(found, case, label))
