@@ -15,20 +15,13 @@ import msgspec
 
 from gridpeers.agents import graphs
 from gridpeers.agents.carriers.law_registry import LAWS
-from gridpeers.agents.graphs import GRAPHS
 from gridpeers.netem.models import own_fault
-from gridpeers.netem.models.own_fault import FAULTS
 from gridpeers.plant.tables.feeder_columns import TABLES, LoadColumns, Manifest
 from gridpeers.scenarios.checks import check_registry
-from gridpeers.scenarios.checks.check_registry import CHECKS
 from gridpeers.scenarios.results import claims, metric
-from gridpeers.scenarios.results.claims import CLAIMS
-from gridpeers.scenarios.results.metric import METRICS
 from gridpeers.scenarios.schema.scenario_model import Case, ScenarioModel
 from gridpeers.wire import keys, messages
-from gridpeers.wire import messages as bounds
 from gridpeers.wire.codec import KINDS
-from gridpeers.wire.messages import LONGEST_MESSAGE
 from gridpeers.wire.plugins.registry import PluginError, Registry
 from gridpeers.wire.schema.table_reading import in_words, kinds_of, shown
 from gridpeers.wire.schema.table_schema import INLINE, NO_KEY, Field, NamedTables, OtherKeys, fields_of
@@ -119,15 +112,19 @@ _LAW = """A class derived from gridpeers.Law; `docs/laws.md` has the contract.
 
 _REGISTRIES: dict[str, tuple[Registry[Any], str, str]] = {
     "laws": (LAWS, _LAW, 'law = "mine:Mine", or law = { use = "mine:Mine", gain = 2.0 }, for all cases or in one'),
-    "metrics": (METRICS, metric.__doc__ or "", 'metrics = ["mine:nadir_Hz", { use = "mine:Within", band_Hz = 0.05 }]'),
-    "claims": (CLAIMS, claims.__doc__ or "", 'claims = ["mine:restored"]'),
+    "metrics": (
+        metric.METRICS,
+        metric.__doc__ or "",
+        'metrics = ["mine:nadir_Hz", { use = "mine:Within", band_Hz = 0.05 }]',
+    ),
+    "claims": (claims.CLAIMS, claims.__doc__ or "", 'claims = ["mine:restored"]'),
     "checks": (
-        CHECKS,
+        check_registry.CHECKS,
         check_registry.__doc__ or "",
         'checks = ["mine:Calm", { use = "frequency", within_s = 1.0 }, { use = "rating", off = true }]',
     ),
-    "faults": (FAULTS, own_fault.__doc__ or "", '"mine:Jammer" = { share = 0.2 } in an entry [[link]]'),
-    "graphs": (GRAPHS, graphs.__doc__ or "", 'graph = "mine:star", or graph = { use = "mine:Nearest", k = 3 }'),
+    "faults": (own_fault.FAULTS, own_fault.__doc__ or "", '"mine:Jammer" = { share = 0.2 } in an entry [[link]]'),
+    "graphs": (graphs.GRAPHS, graphs.__doc__ or "", 'graph = "mine:star", or graph = { use = "mine:Nearest", k = 3 }'),
 }
 """By topic: the registry, how an entry is written, and how a scenario names one."""
 
@@ -152,7 +149,7 @@ def _messages() -> Iterator[str]:
         "# Messages",
         "",
         "msgpack maps with a field `type` that names the message, and their CRC-32; SI units; "
-        f"at most {LONGEST_MESSAGE} bytes.",
+        f"at most {messages.LONGEST_MESSAGE} bytes.",
         "Another CRC-32, unknown fields, missing fields, wrong types and values out of bounds are refused:",
         "counted by kind, logged once and dropped.",
     )
@@ -166,7 +163,7 @@ def _messages() -> Iterator[str]:
             leave_out=common if kind != messages.PlantEvent else set(),
         )
     yield from ("", "## Types, and their bounds", "")
-    yield from markdown_table(("type", "meaning"), ((f"`{name}`", text) for name, text in alias_docs(bounds)))
+    yield from markdown_table(("type", "meaning"), ((f"`{name}`", text) for name, text in alias_docs(messages)))
     yield from ("", "## Kinds of refused messages", "")
     yield from markdown_table(("kind", "meaning"), KINDS.items())
 

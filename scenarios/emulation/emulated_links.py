@@ -18,13 +18,7 @@ from gridpeers.netem.models.lie import lie_in_words
 from gridpeers.netem.receiver import Receiver
 from gridpeers.netem.schema.netem import NodeFault
 from gridpeers.netem.schema.pattern import links_among, parse
-from gridpeers.scenarios.emulation.link_data import (
-    EmulationConfig,
-    LinkCommand,
-    LinkStatus,
-    report_data,
-    words,
-)
+from gridpeers.scenarios.emulation.link_data import EmulationConfig, LinkCommand, LinkStatus, report_data, words
 from gridpeers.wire.links import Arrival, CommandEffect
 from gridpeers.wire.messages import PLANT, Measurement, State
 
