@@ -32,13 +32,8 @@ from gridpeers.wire.messages import PlantEvent
 from gridpeers.wire.schema.table_schema import Plausible, Unit
 
 MOST_NODES = 1500  # Nodes above which a feeder takes seconds
-
-NEAR, MOST_CORRECTIONS = 1e-6, 20
-"""Difference (pu) of a terminal voltage from that of the row at which to end, and most corrections until then."""
-
-FIRST = 0.1
-"""Part of the difference by which the internal voltage is corrected at first; then the secant says how far."""
-
+NEAR, MOST_CORRECTIONS = 1e-6, 20  # Difference (pu) from the row's terminal voltage at which to end
+FIRST = 0.1  # Part of the difference by which the internal voltage is corrected at first; then the secant says how far
 KEPT = 32  # Number of factored networks to keep: loads of a long run may change hundreds of times
 
 

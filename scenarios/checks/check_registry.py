@@ -26,9 +26,7 @@ from gridpeers.wire.plugins.plugin import KEYS, Plugin, callable_objection, plug
 from gridpeers.wire.plugins.registry import Registry
 
 RETURNS = "returns"  # Judges a run whose scenario asks for it: many end before an inverter that trips may return
-
-LAW_FAILED = "law_failed"
-"""Fails a run also without `--require-checks`: the numbers are not those of the law that the scenario names."""
+LAW_FAILED = "law_failed"  # Fails a run also without `--require-checks`: its numbers are not those of its law
 
 ALWAYS = (
     "frequency", "voltage", "power_sharing", "var_sharing", "rating", "oscillation", "steady", "power_balance",

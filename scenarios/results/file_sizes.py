@@ -19,10 +19,7 @@ from gridpeers.scenarios.schema.participants import inverters_of, netem_of, setu
 from gridpeers.wire.messages import PLANT
 
 NUMBER = 18  # Bytes of a number in history.csv with its comma: 17.5 measured over 600 s of islanding
-
-VERDICT, VERDICT_UNDER_WAY = 36, 26
-"""Bytes of a message's row in links.csv, and in the file that keeps it while the case runs."""
-
+VERDICT, VERDICT_UNDER_WAY = 36, 26  # Bytes of a message's row in links.csv, and in its file while the case runs
 RECORDED_NUMBER = 6  # Bytes of a number of telemetry in run.mcap, compressed: 5.2 to 7.5 measured
 
 RECORDED_DECISION = {"simulated": 75, "wall": 150}
@@ -34,7 +31,6 @@ RECORDED_ARRIVAL, RECORDED_VERDICT = 9, 8
 
 LONG = 20_000_000  # Bytes from which on a run says its size before it starts
 HOUR = 3600.0  # Run time (s) for which a live run without an end says its size
-
 MB = 1e6
 
 

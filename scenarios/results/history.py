@@ -175,7 +175,7 @@ class Window:
 
 
 def windows(events: Sequence[tuple[str, float]], end: float) -> tuple[Window, ...]:
-    """Return the windows of events given as (label, time in s)."""
+    """Return the windows of events, each its label and time (s)."""
     ends = [*(t for _, t in events), end][1:]
     return tuple(Window(label=label, start=t, end=stop) for (label, t), stop in zip(events, ends, strict=True))
 

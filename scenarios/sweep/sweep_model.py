@@ -8,8 +8,7 @@ import msgspec
 
 from gridpeers.wire.schema.table_schema import Example, Problem, Range
 
-MOST_POINTS = 1_000_000
-"""Most values of one range: more are a slip, and would fill the memory before any message."""
+MOST_POINTS = 1_000_000  # Most values of one range: more are a slip, and would fill the memory before any message
 
 
 class ValueRange(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

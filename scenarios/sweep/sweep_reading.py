@@ -54,8 +54,7 @@ class Plan:
         return tuple(self.runs[0].shown)
 
 
-MOST_LISTED = 20
-"""Most problems of samples in a message: the rest is more of the same."""
+MOST_LISTED = 20  # Most problems of samples in a message: the rest is more of the same
 
 
 class BaseScenario(NamedTuple):
@@ -119,8 +118,7 @@ def _in_samples(numbers: Sequence[int], settings: Sequence[Setting]) -> str:
     return f" (sample {numbers[0]}: {listed}{more})"
 
 
-SECONDS_PER_SECOND = 0.05
-"""Rough cost of a second of the nine-inverter feeder (s on one core, bench/peers), for messages alone."""
+SECONDS_PER_SECOND = 0.05  # Rough cost of a second of the nine-inverter feeder (s on one core, bench/peers)
 
 
 def sweeps() -> tuple[str, ...]:

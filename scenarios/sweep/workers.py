@@ -23,9 +23,7 @@ Calls = Iterable[tuple[Any, ...]]
 """Arguments of the task for each run, such as its number, its scenario and its case; taken as workers become free."""
 
 _WARNINGS = "PYTHONWARNINGS"
-
-DASK_PATIENCE = 10.0
-"""Longest wait for a scheduler, and for its first worker (s)."""
+DASK_PATIENCE = 10.0  # Longest wait for a scheduler, and for its first worker (s)
 
 
 class WorkersError(RuntimeError):

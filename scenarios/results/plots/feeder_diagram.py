@@ -22,9 +22,7 @@ from gridpeers.wire.wording import counted
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Of the microgrids, in the order of the inverters, then of other zones (Okabe and Ito's palette)."""
 
-BESIDE = "#8a8a8a"
-"""Colour of the zone of the substation, and of buses of no zone."""
-
+BESIDE = "#8a8a8a"  # Colour of the zone of the substation, and of buses of no zone
 WIDTH = {1: 0.7, 2: 1.1, 3: 2.0}  # Width of a branch (pt) by its number of phases
 HALO: Any = [withStroke(linewidth=2.0, foreground="white")]  # Around labels, so that they can be read on branches
 MANY = 400  # Buses beyond which loads are not marked and branches are half as wide

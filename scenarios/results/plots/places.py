@@ -82,9 +82,7 @@ SIDES = ((1, 1), (1, -1), (-1, 1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1, 0))
 """Sides of a mark on which its label can stand, to the right and upwards, the preferred one first."""
 
 PREFERENCE = 0.05  # Length of covered line (pt) that is as bad as the next side
-
-WORD, MARK = 20.0, 6.0
-"""Length of covered line (pt) that is as bad as a covered square point of another label, or of a mark."""
+WORD, MARK = 20.0, 6.0  # Lengths (pt) as bad as a covered square point of another label, or of a mark
 
 
 class Label(NamedTuple):

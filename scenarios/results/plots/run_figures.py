@@ -43,10 +43,8 @@ LOST = 0.3  # Distance from nominal (Hz) at which a frequency that does not come
 ROUNDS = ("-", "--", ":", "-.")  # Lines of the first inverters, of those that have their colours again, and so on
 
 MOVER: Style = ("#d55e00", "-", 2.2)
-"""Style of an inverter that leaves or joins, among all others."""
-
 STAYERS: dict[bool, Style] = {True: ("#0072b2", "-", 1.6), False: ("#56b4e9", "--", 1.2)}
-"""Styles of the others: grid-forming, or not."""
+"""Styles of inverters that leave or join, and of the others: grid-forming, or not."""
 
 PAIR: tuple[Style, Style] = (("#0072b2", "-", 2.2), ("#d55e00", (0, (4, 2)), 1.6))
 """Styles of two runs: the second lies on top, dashed and thinner, so that equal ones are both seen."""
