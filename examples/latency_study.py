@@ -7,7 +7,7 @@ import numpy as np
 
 import gridpeers as gp
 
-DELAYS = [0.0, 0.02, 0.05, 0.1, 0.2]  # s
+DELAYS = [0.0, 0.05, 0.2]  # s
 
 
 @gp.metric("swing_pu")
