@@ -34,8 +34,16 @@ class Timed(NamedTuple):
 class SoakRun(WatchedRun):
     """A live run that is disturbed; its parameters are those of `WatchedRun`."""
 
-    def __init__(self, folder: Path, microgrids: Mapping[str, str], spare: str, *, recorded: bool = True) -> None:
-        super().__init__(folder, microgrids, spare, recorded=recorded)
+    def __init__(
+        self,
+        folder: Path,
+        microgrids: Mapping[str, str],
+        spare: str,
+        *,
+        scenario: str = "islanding",
+        recorded: bool = True,
+    ) -> None:
+        super().__init__(folder, microgrids, spare, scenario=scenario, recorded=recorded)
         self.times: list[Timed] = []
         self.kills: list[tuple[str, float]] = []
         """Agents that were killed, and when (s of run time)."""

@@ -151,7 +151,16 @@ class WatchedRun:
     there is no report and no verdict.
     """
 
-    def __init__(self, folder: Path, microgrids: Mapping[str, str], spare: str, *, recorded: bool = True) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        microgrids: Mapping[str, str],
+        spare: str,
+        *,
+        scenario: str = "islanding",
+        recorded: bool = True,
+    ) -> None:
+        self.scenario = scenario
         self.microgrids, self.agents = microgrids, tuple(microgrids)
         self.monitor = SoakMonitor()
         self.monitor.off.add(spare)
@@ -189,7 +198,7 @@ class WatchedRun:
             self._stack.enter_context(self._processes)
             out = ["--out", str(self.here)] if self._recorded else []
             born = monotonic()
-            self._up = self._processes.start("up", "up", "islanding", *self._processes.listen, *out)
+            self._up = self._processes.start("up", "up", self.scenario, *self._processes.listen, *out)
             self._client = CountingClient(self._processes.address, meet_agents=True)
             self._stack.callback(self._client.close)
             self._client.find_plant(BUILD)

@@ -10,13 +10,13 @@ from typing import Literal
 
 import pytest
 
+import gridpeers as gp
 from bench.soak.judging import ProcessSize, growths, judge_checks, judge_growth, judge_late, judge_times
 from bench.soak.soak_actions import DECK, SoakAction, soak_actions
 from bench.soak.soak_monitor import SoakMonitor
 from bench.soak.soak_run import SoakRun
 from gridpeers.agents.agent_config import AgentConfig, Control
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict, Violation
-from gridpeers.scenarios.schema import load_scenario
 from gridpeers.wire.messages import AgentStatus, Telemetry
 
 AGENTS = tuple(f"inv{i}" for i in range(1, 10))
@@ -173,9 +173,10 @@ def test_a_frequency_is_restored_once_it_holds() -> None:
 @pytest.mark.skipif(sys.platform != "linux", reason="sizes of processes are from /proc")
 def test_a_killed_agent_is_told_and_comes_back_and_a_cut_heals(tmp_path: Path) -> None:
     """Each time is measured, the sizes of plant, command and agents are there, no command fails, and the run ends."""
-    feeder = load_scenario("islanding")[1]
-    microgrids = {row.name: row.microgrid for row in feeder.inverters}
-    with SoakRun(tmp_path, microgrids, "inv10", recorded=False) as run:
+    few = gp.load("islanding").replace({"without_agent": ["inv2", "inv5", "inv6", "inv8", "inv9"]})
+    (tmp_path / "few.toml").write_text(few.to_toml())
+    microgrids = {"inv1": "MG1", "inv3": "MG1", "inv4": "MG2", "inv7": "MG3"}
+    with SoakRun(tmp_path, microgrids, "inv10", scenario="few.toml", recorded=False) as run:
         run.disturb(SoakAction("kill", ("inv3",), 0.3))
         run.disturb(SoakAction("cut", ("inv4", "inv7"), 0.5))
         end = run.finish()
