@@ -19,6 +19,7 @@ from gridpeers.lab.replay.recorded_process import ReplayError
 from gridpeers.lab.replay.replay import replay
 from gridpeers.runs.result import Result
 from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
+from gridpeers.scenarios.results.plots import run_figures
 from gridpeers.scenarios.results.record import QUANTITIES
 from gridpeers.wire.journal import RecordLevel
 from gridpeers.wire.messages import Telemetry
@@ -52,6 +53,13 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Result:
     folder = tmp_path_factory.mktemp("short")
     (folder / "short.toml").write_text(SHORT, encoding="utf-8")
     return gp.load(folder / "short.toml").run("IV", folder=folder / "out")
+
+
+@pytest.fixture(autouse=True)
+def _few_figures(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The figures of a run in a folder are drawn by one test, as all of them take 2 s."""
+    if "figure" not in request.node.name:
+        monkeypatch.setattr(run_figures, "draw_all", lambda *_: ())
 
 
 def test_a_replay_gives_the_run(run: Result) -> None:
@@ -274,11 +282,10 @@ def test_a_replay_ends_at_the_hole_and_says_so(damaged: tuple[RunRecord, RunReco
     """No difference is claimed of what is not known; the note says that not all was compared."""
     whole, flipped = damaged
 
-    found = replay(flipped)
+    found, complete = replay(flipped), replay(whole)
 
     assert found.difference is None
     assert any("lacks later decisions" in note for note in found.notes)
-    assert replay(whole).notes == ()
-    counts = {part.name: part.count for part in found.parts}
-    all_ = {part.name: part.count for part in replay(whole).parts}
+    assert complete.notes == ()
+    counts, all_ = ({part.name: part.count for part in done.parts} for done in (found, complete))
     assert 0 < counts["inv4"] < all_["inv4"]
