@@ -43,6 +43,7 @@ open = ["13-152"]
 [case.calm]
 secondary = "all"
 graph = "full"
+without_agent = ["inv3", "inv5", "inv6", "inv8", "inv9"]
 """
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import runpy
 import select
 import signal
 import subprocess
@@ -235,22 +236,25 @@ def test_laws_that_fail_in_a_live_run_are_exit_code_1_and_named(desk: Desk) -> N
 SCRIPT = Path(__file__).parents[3] / "examples" / "live_run.py"
 
 
-def test_a_live_run_is_changed_by_commands_and_read_at_its_end(tmp_path: Path) -> None:
-    """A link is made late, an agent leaves, and the record has both."""
-    done = subprocess.run(
-        [sys.executable, str(SCRIPT), free_endpoint()],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        timeout=100,
-        check=False,
-    )
+def test_a_live_run_is_changed_by_commands_and_read_at_its_end(
+    elsewhere: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A link is made late, an agent leaves, and the record has both. Its commands beside `up` run in this process."""
 
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "inv2 left; its inverter is off the network" in done.stdout
-    assert "link command 1: inv1 <-> inv4: delay 0.1 s" in done.stdout
-    assert "P of inv2 at the end: 0 W" in done.stdout
-    assert [path.name for path in tmp_path.iterdir()] == ["live_run.png"]
+    def run(words: list[str], *, check: bool) -> None:
+        assert words[:3] == [sys.executable, "-m", "gridpeers"]
+        code, text = invoke(*words[3:])
+        assert (code, check) == (0, True), text
+
+    monkeypatch.setattr(sys, "argv", [str(SCRIPT), free_endpoint()])
+    monkeypatch.setattr(subprocess, "run", run)
+    runpy.run_path(str(SCRIPT), run_name="__main__")
+
+    printed = capsys.readouterr().out
+    assert "inv2 left; its inverter is off the network" in printed
+    assert "link command 1: inv1 <-> inv4: delay 0.1 s" in printed
+    assert "P of inv2 at the end: 0 W" in printed
+    assert [path.name for path in elsewhere.iterdir()] == ["live_run.png"]
 
 
 pty = pytest.importorskip("pty")
