@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -18,46 +17,26 @@ SPELL = 1.0  # time (s) without a limited set-point after which a spell is over
 _UNIT = {"P_set": "kW", "V_set": "V"}
 
 
-@dataclass
-class _Spell:
-    count: int
-    last: float  # time of the last one (s)
-    farthest: float  # the one farthest from the held value (kW or V)
-    distance: float  # distance of that one (kW or V)
-
-
 class SetPointLimits:
-    """Report set-points beyond an inverter's bounds: one event when a spell begins, and one when it ends."""
+    """Report set-points beyond an inverter's bounds: one event a spell."""
 
     def __init__(self) -> None:
-        self._spells: dict[tuple[str, str], _Spell] = {}
+        self._last: dict[tuple[str, str], float] = {}  # time (s) of the last limited one of each present spell
         self._refused: set[str] = set()
 
     def held(self, name: str, t: float, quantity: str, set_point: float, held: float) -> list[PlantEvent]:
         """Compare an inverter's set-point at t (s) with the held one (kW or V), apart from rounding."""
-        distance = abs(set_point - held)
-        limited = distance > 1e-9 * abs(set_point)
-        if not (limited or self._spells):
-            return []
         key, unit = (name, quantity), _UNIT[quantity]
-        spell = self._spells.get(key)
-        if limited:
-            if spell is None:
-                self._spells[key] = _Spell(1, t, set_point, distance)
-                beyond = f"{name} gets {quantity} {set_point:g} {unit}, which is beyond its bound"
-                text = f"{beyond}; it holds {held:g} {unit}"
-                return [PlantEvent(t=t, kind="limit", subject=name, text=text)]
-            spell.count, spell.last = spell.count + 1, t
-            if distance > spell.distance:
-                spell.farthest, spell.distance = set_point, distance
-        elif spell is not None and t - spell.last >= SPELL:
-            del self._spells[key]
-            text = (
-                f"{name} gets {quantity} within its bound again; {spell.count} set-points were limited, "
-                f"the farthest {spell.farthest:g} {unit}"
-            )
-            return [PlantEvent(t=t, kind="limit", subject=name, text=text)]
-        return []
+        begun = key in self._last
+        if abs(set_point - held) <= 1e-9 * abs(set_point):
+            if begun and t - self._last[key] >= SPELL:
+                del self._last[key]
+            return []
+        self._last[key] = t
+        if begun:
+            return []
+        text = f"{name} gets {quantity} {set_point:g} {unit}, which is beyond its bound; it holds {held:g} {unit}"
+        return [PlantEvent(t=t, kind="limit", subject=name, text=text)]
 
     def refused(self, name: str, t: float) -> list[PlantEvent]:
         if name in self._refused:
