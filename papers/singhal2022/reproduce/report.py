@@ -5,10 +5,9 @@ from __future__ import annotations
 import base64
 import os
 import platform
-import shutil
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,7 +19,7 @@ from gridpeers.measures import HEADINGS
 from gridpeers.output_folders import set_status, versions, write_whole
 from gridpeers.papers.singhal2022.communication_claims import graph_runs
 from gridpeers.papers.singhal2022.paper_benchmarks import ComparedNumber, headline, numbers
-from gridpeers.papers.singhal2022.reproduce.work import FORMATS, SETTINGS, PartResult, Work
+from gridpeers.papers.singhal2022.reproduce.work import SETTINGS, PartResult, Work
 from gridpeers.papers.singhal2022.tables import MQSI_FACTOR, V_RELATIVE, Cell, PaperTable
 from gridpeers.theory import ScenarioModel
 
@@ -169,18 +168,8 @@ def render(template: str, whole: Reproduction, settings: Sequence[tuple[str, str
 
 
 def write(whole: Reproduction, work: Work, folder: Path) -> None:
-    """Write all files of a reproduction into the report's folder."""
-    (folder / "figures").mkdir()
-    results = []
-    for result in whole.results:
-        figures = {}
-        for picture, path in result.figures.items():
-            for kind in FORMATS:
-                shutil.copyfile(path.with_suffix(f".{kind}"), folder / "figures" / f"{picture.key}.{kind}")
-            figures[picture] = folder / "figures" / f"{picture.key}.png"
-        results.append(replace(result, figures=figures))
-    whole = replace(whole, results=tuple(results))
-    ours = settings({part.name: work.spec(part.name) for part in work.parts})
+    """Write the texts of a reproduction into the report's folder, which has the figures."""
+    ours = settings(work.specs())
     for name in ("report.html", "report.md"):
         write_whole(folder / name, render(f"{name}.jinja", whole, ours))
     write_whole(folder / "metrics.json", metrics_json(whole))

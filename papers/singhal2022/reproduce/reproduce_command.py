@@ -72,7 +72,7 @@ def reproduce(
         folder = new_folder(out, "reproduce", now)
     except FolderError as error:
         fail([str(error)], BAD_INPUT)
-    work = Work(chosen(only), driver, folder / "runs", seed, jobs, dask)
+    work = Work(chosen(only), driver, folder, seed, jobs, dask)
     left = f"what came until then is in {shown(folder)}/"
     try:
         with interruptible():

@@ -39,8 +39,8 @@ NOT_CONNECTED = 1e-9
 END_S = 6.0
 """End of the runs (s): after the event at 1 s a path of nine inverters shares within 2 s, the slowest tree in 3 s."""
 
-Tell = Callable[[int, int], None]
-"""Is called with the number of runs that are done, and of all runs."""
+Tell = Callable[[str, float], None]
+"""Takes the present run in words, and the share of all runs that is done."""
 
 EventValues = Mapping[tuple[str, str], float]
 """MQSI by case and event."""
@@ -67,13 +67,18 @@ def topology_study(seed: int, tell: Tell, *, jobs: int | None, dask: str = "") -
     links = [[[names[i], names[j]] for i, j in edges] for edges in drawn]
     first = {"case.IV.graph": "links", "case.IV.links": links[0], "time.end_s": END_S, "paper": None}
     base = scenario.replace({**first, "event": scenario.tables["event"][:1]})
-    tell(0, len(drawn))
-    rows = gp.sweep(base, {"case.IV.links": links}, cases=["IV"], jobs=jobs, dask=dask, progress=tell)
+    progress = _counted(tell, "graphs")
+    progress(0, len(drawn))
+    rows = gp.sweep(base, {"case.IV.links": links}, cases=["IV"], jobs=jobs, dask=dask, progress=progress)
     for edges, (_, row) in zip(drawn, rows.iterrows(), strict=True):
         if row["status"] != "ran":
             raise RuntimeError(f"topology, a graph with {len(edges)} links: {row['why']}")
     runs = zip(drawn, rows.to_dict("records"), strict=True)
     return GraphFindings(results={}, graphs=tuple(_graph_run(len(names), edges, row) for edges, row in runs))
+
+
+def _counted(tell: Tell, what: str) -> Callable[[int, int], None]:
+    return lambda done, of: tell(f"{done} of {of} {what}", done / of)
 
 
 def _graph_run(inverters: int, edges: gp.random_graphs.Edges, row: Mapping[str, Any]) -> GraphRun:
@@ -99,7 +104,9 @@ BANKS: dict[str, dict[str, int]] = {
 """Variants: kvar a phase, by bus."""
 
 
-def bank_study(base: gp.Scenario, folder: Path, tell: Tell, jobs: int | None, dask: str = "") -> dict[str, EventValues]:
+def bank_study(
+    base: gp.Scenario, folder: Path, tell: Tell, *, jobs: int | None, dask: str = ""
+) -> dict[str, EventValues]:
     """Run all cases of the islanding over all variants, and return their MQSI by variant, case and event.
 
     The folder takes the variants' feeders; `jobs` and `dask` as of `gridpeers.sweep`.
@@ -109,9 +116,10 @@ def bank_study(base: gp.Scenario, folder: Path, tell: Tell, jobs: int | None, da
         str(_feeder(standard, folder.absolute() / f"feeder{number}", banks)): variant
         for number, (variant, banks) in enumerate(BANKS.items())
     }
-    tell(0, len(BANKS) * len(CASES))
+    progress = _counted(tell, "runs")
+    progress(0, len(BANKS) * len(CASES))
     varied = {"plant.feeder": list(feeders)}
-    rows = gp.sweep(base.replace({"paper": None}), varied, cases=CASES, jobs=jobs, dask=dask, progress=tell)
+    rows = gp.sweep(base.replace({"paper": None}), varied, cases=CASES, jobs=jobs, dask=dask, progress=progress)
     found: dict[str, dict[tuple[str, str], float]] = {variant: {} for variant in BANKS}
     for row in rows.fillna(dict.fromkeys((f"{event}.MQSI" for event in EVENTS), 0.0)).to_dict("records"):
         variant = feeders[row["plant.feeder"]]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -25,16 +25,12 @@ from gridpeers.theory import ScenarioModel
 class Picture(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     key: str
     """Its name in claims, and its file's name."""
-    file: str
-    """File in the run's folder of plots."""
     title: str
     """Its contents, and the figure of the paper that it stands for."""
     note: str = ""
     """A hint for the reader, besides the claims."""
-
-    @property
-    def stem(self) -> str:
-        return self.file.partition(".")[0]
+    plot: str = ""
+    """Name of the figure of the run (`gridpeers.Results.plot`); a study has the one figure."""
 
 
 class Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -82,9 +78,6 @@ def chosen(only: str | None) -> tuple[Part, ...]:
     return tuple(part for part in PARTS if (part.tables if only == "tables" else part.name == only))
 
 
-FORMATS: tuple[gp.figures.Format, ...] = ("png", "pdf", "svg")
-"""Files of each figure."""
-
 _STUDIES = ("topology", "var-sharing")
 """Parts that are many short runs of the islanding, without a folder for each."""
 
@@ -115,7 +108,7 @@ class PartResult:
 
 
 class Work:
-    """The runs of some parts, each in a folder of its own; the topologies are always run without processes.
+    """The runs of some parts, each in `runs/PART` of a folder; the topologies are always run without processes.
 
     `seed` is in place of the scenarios' own; `jobs` and `dask` are for the studies of many runs, as of
     `gridpeers.sweep`.
@@ -135,16 +128,15 @@ class Work:
         self._loaded = {
             part.name: gp.load("islanding" if part.name in _STUDIES else part.name).replace(changes) for part in parts
         }
-        self._before = 0.0
 
     @property
     def seed(self) -> int:
         """Seed of the first part; all scenarios of the catalogue have the same."""
         return next(iter(self._loaded.values())).spec.seed
 
-    def spec(self, part: str) -> ScenarioModel:
-        """Return the keys of the scenario of a part."""
-        return self._loaded[part].spec
+    def specs(self) -> dict[str, ScenarioModel]:
+        """Return the keys of the scenario of each part."""
+        return {part: scenario.spec for part, scenario in self._loaded.items()}
 
     @property
     def total_s(self) -> float:
@@ -152,74 +144,72 @@ class Work:
         return sum(self._length(part) for part in self.parts)
 
     def do(self, tell: TellPart, *, figures: bool) -> Iterator[PartResult]:
-        """Run part after part, telling how many seconds of all runs have been simulated.
+        """Run part after part, telling how many seconds of all runs have been simulated, and draw into `figures/`.
 
         BrokenRunError if a run broke; those before are done, and their folders stay.
         """
+        before = 0.0
         for part in self.parts:
-            wall, cpu = perf_counter(), sum(os.times()[:4])
-            folder = self.folder / part.name
-            if part.name in _STUDIES:
-                folder.mkdir(parents=True)
-            do = {"topology": self._topology, "var-sharing": self._banks}.get(part.name, self._scenario)
-            found, sha256, metrics, plots = do(part, folder, tell, figures)
-            self._before += self._length(part)
-            yield PartResult(
-                part=part,
-                found=found,
-                verdicts=judge(found, CLAIMS[part.experiment]) if part.experiment else (),
-                tables=tables_of(part.experiment),
-                figures={picture: plots / picture.file for picture in part.picture} if figures else {},
-                sha256=sha256,
-                metrics=metrics,
-                wall_s=perf_counter() - wall,
-                cpu_s=sum(os.times()[:4]) - cpu,
-            )
+            yield self._part(part, before, tell, figures)
+            before += self._length(part)
+
+    def _part(self, part: Part, before: float, tell: TellPart, figures: bool) -> PartResult:
+        wall, cpu = perf_counter(), sum(os.times()[:4])
+        length = self._length(part)
+        do = {"topology": self._topology, "var-sharing": self._banks}.get(part.name, self._scenario)
+        found, sha256, metrics, plot = do(
+            part,
+            self.folder / "runs" / part.name,
+            lambda run, share: tell(f"{part.name}, {run}", before + share * length),
+        )
+        pictures = part.picture if figures else ()
+        files = [
+            gp.figures.save(plot(picture.plot), self.folder / "figures", picture.key, ("png", "pdf", "svg"))
+            for picture in pictures
+        ]
+        return PartResult(
+            part=part,
+            found=found,
+            verdicts=judge(found, CLAIMS[part.experiment]) if part.experiment else (),
+            tables=tables_of(part.experiment),
+            figures={picture: png for picture, (png, *_) in zip(pictures, files, strict=True)},
+            sha256=sha256,
+            metrics=metrics,
+            wall_s=perf_counter() - wall,
+            cpu_s=sum(os.times()[:4]) - cpu,
+        )
 
     def _length(self, part: Part) -> float:
         """Return the seconds that are simulated in all runs of a part."""
         if part.name == "topology":
             return END_S * sum(1 for _ in graphs(9, self.seed))
-        scenario = self.spec(part.name)
+        scenario = self._loaded[part.name].spec
         runs = len(BANKS) * len(CASES) if part.name == "var-sharing" else len(scenario.cases)
         return scenario.time.end_s * runs
 
-    def _counted(self, part: Part, tell: TellPart, of_what: str) -> Tell:
-        """Return the function that takes the number of runs of a study that are done, and of all its runs."""
-        return lambda done, of: tell(
-            f"{part.name}, {done} of {of} {of_what}", self._before + done / of * self._length(part)
-        )
-
-    def _scenario(self, part: Part, folder: Path, tell: TellPart, figures: bool) -> _PartOutput:
+    def _scenario(self, part: Part, folder: Path, tell: Tell) -> _PartOutput:
         scenario = self._loaded[part.name]
         order = list(scenario.cases)
 
         def note(case: str, t: float, end: float) -> None:
-            tell(f"{part.name}, case {case}", self._before + order.index(case) * end + t)
+            tell(f"case {case}", (order.index(case) + t / end) / len(order))
 
         run = scenario.run(driver=self.driver, progress=note, folder=folder)
-        if figures:
-            for picture in part.picture:
-                gp.figures.save(run.plot(picture.stem), folder / "plots", picture.stem, FORMATS[1:])
-        return run.findings, run.sha256, run.numbers, folder / "plots"
+        return run.findings, run.sha256, run.numbers, run.plot
 
-    def _topology(self, part: Part, folder: Path, tell: TellPart, figures: bool) -> _PartOutput:
-        found = topology_study(self.seed, self._counted(part, tell, "graphs"), jobs=self.jobs, dask=self.dask)
-        if figures:
-            gp.figures.save(topologies(found.graphs), folder, part.picture[0].stem, FORMATS)
-        return found, {}, None, folder
+    def _topology(self, part: Part, folder: Path, tell: Tell) -> _PartOutput:
+        found = topology_study(self.seed, tell, jobs=self.jobs, dask=self.dask)
+        return found, {}, None, lambda _: topologies(found.graphs)
 
-    def _banks(self, part: Part, folder: Path, tell: TellPart, figures: bool) -> _PartOutput:
-        ours = bank_study(self._loaded[part.name], folder, self._counted(part, tell, "runs"), self.jobs, self.dask)
-        if figures:
-            gp.figures.save(var_sharing(ours), folder, part.picture[0].stem, FORMATS)
+    def _banks(self, part: Part, folder: Path, tell: Tell) -> _PartOutput:
+        ours = bank_study(self._loaded[part.name], folder, tell, jobs=self.jobs, dask=self.dask)
         metrics = [
             {"variant": variant, "case": case, "MQSI": {event: values[case, event] for event in EVENTS}}
             for variant, values in ours.items()
             for case in CASES
         ]
-        return Findings(results={}), {}, metrics, folder
+        return Findings(results={}), {}, metrics, lambda _: var_sharing(ours)
 
 
-_PartOutput = tuple[Findings, dict[str, str], Any, Path]
-"""Findings, hashes by case, metrics, and the folder of the figures."""
+_PartOutput = tuple[Findings, dict[str, str], Any, Callable[[str], Any]]
+"""Findings, hashes by case, metrics, and the function that returns a figure by its name."""
