@@ -125,19 +125,16 @@ def show(live: LiveRun) -> None:
 
 
 def _delay(delay: float | None, jitter: float | None) -> dict[str, Any]:
-    from gridpeers.netem.models.delay import DELAY, LONGEST_DELAY, Uniform
-    from gridpeers.wire.schema.table_schema import Plausible
+    from gridpeers.netem.models.delay import DELAY, Uniform
 
     if jitter is None:
         return {} if delay is None else {"delay": delay}
     if delay is None:
         raise UsageError("--jitter: is around a delay; give --delay too")
-    around = Plausible("a jitter", 0.0, LONGEST_DELAY, above_zero=True)
-    wrong = {"--delay": DELAY.objection(delay, "s"), "--jitter": around.objection(jitter, "s")}
-    if any(wrong.values()):
-        raise UsageError("; ".join(f"{option}: {text}" for option, text in wrong.items() if text))
-    if jitter > delay:
-        raise UsageError(f"--jitter: {jitter:g} s is more than the delay of {delay:g} s: some would be negative")
+    if wrong := DELAY.objection(delay, "s"):
+        raise UsageError(f"--delay: {wrong}")
+    if not 0.0 < jitter <= delay:
+        raise UsageError(f"--jitter: must be above 0 s, and at most the delay of {delay:g} s, got {jitter:g} s")
     return {"delay": Uniform(low_s=round(delay - jitter, 9), high_s=round(delay + jitter, 9))}
 
 

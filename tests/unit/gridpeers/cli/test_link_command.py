@@ -13,7 +13,7 @@ from tests.command_line import invoke
         (["set", "inv1", "inv4"], "nothing is to be set; give one of --delay, --jitter (with --delay), --loss,"),
         (["set", "inv1 -> inv4", "--loss", "20"], "--loss: a loss is a probability from 0 to 1, got 20; did you"),
         (["set", "inv1", "inv4", "--delay", "100"], "--delay: 100 s is not plausible for a delay (0 to 10 s); did"),
-        (["set", "inv1", "inv4", "--delay", "0.1", "--jitter", "0.2"], "--jitter: 0.2 s is more than the delay"),
+        (["set", "inv1", "inv4", "--delay", "0.1", "--jitter", "0.2"], "--jitter: must be above 0 s, and at most"),
         (["set", "inv1", "inv4", "--jitter", "0.2"], "--jitter: is around a delay; give --delay too"),
         (["set", "inv1", "inv4", "--profile", "lt"], '--profile: there is no profile "lt"; did you mean "lte"?'),
         (["set", "inv1", "inv4", "--loss", "0.1", "--for", "-1"], "--for: a time of the run must be above 0, got -1 s"),
