@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+import re
+import shutil
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -17,7 +19,7 @@ import pandas as pd
 from gridpeers.plant.equipment import Feeder
 from gridpeers.rooms import ROOMS
 from gridpeers.runs import frames
-from gridpeers.runs.run_folder import RunFolder
+from gridpeers.runs.run_folder import RunFolder, new_home
 from gridpeers.scenarios.checks import check_verdict
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict
 from gridpeers.scenarios.checks.checked_case import CheckedCase
@@ -30,6 +32,7 @@ from gridpeers.scenarios.results.findings import Findings, find
 from gridpeers.scenarios.results.history import History, as_they_came, read_history, windows
 from gridpeers.scenarios.results.plots.drawing import Drawing, drawing_of
 from gridpeers.scenarios.results.recorded_events import law_failures
+from gridpeers.scenarios.results.run_files import FolderError, refusal, shown, write_whole
 from gridpeers.scenarios.schema import scenario_model as model
 from gridpeers.scenarios.schema.plugin_keys import claims_of
 from gridpeers.wire.messages import PlantEvent
@@ -66,7 +69,7 @@ class _FromFolder:
     @property
     def report(self) -> str:
         """Text that `gridpeers run` prints at the end, of all cases; it names the folder if that stays."""
-        return self._folder.report
+        return self._folder.read("report.txt", lambda file: file.read_text(encoding="utf-8"))
 
 
 class Results(_FromFolder, Mapping[str, "Result"]):
@@ -127,7 +130,16 @@ class Results(_FromFolder, Mapping[str, "Result"]):
         """Write the run folder as the command does, figures included, into a new or empty folder; return its path."""
         from gridpeers.scenarios.results.plots.run_figures import draw_all
 
-        return self._folder.save(folder, lambda plots: draw_all(self.drawing(self._results), plots))
+        new = new_home(folder)
+        try:
+            shutil.copytree(self.folder, new, dirs_exist_ok=True)
+            text = re.sub(r"\nResults: [^\n]*/\n\Z", "", self.report)
+            write_whole(new / "report.txt", f"{text}\nResults: {shown(new)}/\n")
+            if not (new / "plots").exists():
+                draw_all(self.drawing(self._results), new / "plots")
+        except OSError as error:
+            raise FolderError(refusal(new, error)) from error
+        return new
 
     @cached_property
     def findings(self) -> Findings:

@@ -12,7 +12,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, TypeVar
 
-from gridpeers.scenarios.results.run_files import FolderError, empty_folder, refusal, shown, write_whole
+from gridpeers.scenarios.results.run_files import FolderError, empty_folder
 from gridpeers.wire.wording import is_no_path, printable
 
 T = TypeVar("T")
@@ -44,24 +44,6 @@ class RunFolder:
         """The content of metrics.json."""
         numbers: dict[str, Any] = json.loads((self.path / "metrics.json").read_text(encoding="utf-8"))
         return numbers
-
-    @property
-    def report(self) -> str:
-        """The content of report.txt."""
-        return self.read("report.txt", lambda file: file.read_text(encoding="utf-8"))
-
-    def save(self, folder: str | Path, draw: Callable[[Path], object]) -> Path:
-        """Copy it into a new or empty folder, and draw the figures there if it has none; return that folder."""
-        new = new_home(folder)
-        try:
-            shutil.copytree(self.path, new, dirs_exist_ok=True)
-            text = re.sub(r"\nResults: [^\n]*/\n\Z", "", self.report)
-            write_whole(new / "report.txt", f"{text}\nResults: {shown(new)}/\n")
-            if not (new / "plots").exists():
-                draw(new / "plots")
-        except OSError as error:
-            raise FolderError(refusal(new, error)) from error
-        return new
 
 
 def as_folder(it: Any) -> Path:
