@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from math import inf
 from pathlib import Path
 
@@ -172,36 +172,40 @@ def check_netem(scenario: ScenarioModel, feeder: Feeder | None, problems: Proble
     rows = inverters_of(scenario, feeder) if feeder else ()
     names = tuple(row.name for row in rows) if feeder else None
     microgrids = {row.name: row.microgrid for row in rows}
-    end_s = inf if problems.touch("time.end_s", "time") else scenario.time.end_s
-    for case in scenario.cases:
-        netem = netem_of(scenario, case)
-        places = {}  # where the file has each entry
-        for list_ in LISTS:
-            common = len(getattr(scenario.netem, list_.name))
-            for i in range(len(getattr(netem, list_.name))):
-                where = f"{list_.key}[{i}]" if i < common else f"case.{case}.{list_.key}[{i - common}]"
-                places[f"{list_.key}[{i}]"] = where
-        noted = {
-            path.replace(where, entry, 1)
-            for entry, where in places.items()
-            for path in problems.paths
-            if path.startswith(where)
-        }
-        found = netem.problems(names, microgrids, end_s, noted)
-        found += [it for it in _wrong_nodes(scenario, netem) if it.path not in noted]
-        for path, text in found:
-            entry, end, key = path.partition("]")
-            problems.add(places[entry + end] + key, text)
-
-
-def _wrong_nodes(scenario: ScenarioModel, netem: Netem) -> Iterator[Problem]:
     T_c = scenario.time.T_c_s
-    for i, node in enumerate(netem.nodes):
-        ticks = node.from_s / T_c
-        if node.kill and (ticks < 0.5 or abs(ticks - round(ticks)) > 1e-6):
-            text = f"{node.from_s:g} s is no multiple of T_c_s = {T_c:g} s after 0: agents die at ticks; "
-            yield Problem(f"node[{i}].from_s", f"{text}write {max(1, round(ticks)) * T_c:g}")
-        if node.skew is not None and (node.from_s or node.to_s is not None):
-            yield Problem(f"node[{i}].skew", "a clock is skewed for the whole run; leave out from_s and to_s")
-        if scenario.security == "mtls" and node.lies is not None and node.lies.in_name_of:
-            yield Problem(f"node[{i}].lies.in_name_of", _KEPT_OUT)
+    end_s = inf if problems.touch("time.end_s", "time") else scenario.time.end_s
+
+    def wrong_in(netem: Netem, noted: set[str]) -> list[Problem]:
+        nodes = []
+        for i, node in enumerate(netem.nodes):
+            ticks = node.from_s / T_c
+            if node.kill and (ticks < 0.5 or abs(ticks - round(ticks)) > 1e-6):
+                text = f"{node.from_s:g} s is no multiple of T_c_s = {T_c:g} s after 0: agents die at ticks; "
+                nodes.append(Problem(f"node[{i}].from_s", f"{text}write {max(1, round(ticks)) * T_c:g}"))
+            if node.skew is not None and (node.from_s or node.to_s is not None):
+                text = "a clock is skewed for the whole run; leave out from_s and to_s"
+                nodes.append(Problem(f"node[{i}].skew", text))
+            if scenario.security == "mtls" and node.lies is not None and node.lies.in_name_of:
+                nodes.append(Problem(f"node[{i}].lies.in_name_of", _KEPT_OUT))
+        return netem.problems(names, microgrids, end_s, noted) + [it for it in nodes if it.path not in noted]
+
+    problems.extend(wrong_in(scenario.netem, _noted("", problems)))
+    for name, case in scenario.cases.items():
+        path = f"case.{name}."
+        problems.extend(wrong_in(case.netem, _noted(path, problems)), path)
+        if not (_noted("", problems) or _noted(path, problems) or is_calm(case.netem)):
+            for problem in wrong_in(netem_of(scenario, name), set()):
+                problems.add(_place(problem.path, scenario.netem, path), problem.text)
+
+
+def _noted(prefix: str, problems: Problems) -> set[str]:
+    entries = tuple(f"{prefix}{list_.key}[" for list_ in LISTS)
+    return {path.removeprefix(prefix) for path in problems.paths if path.startswith(entries)}
+
+
+def _place(path: str, common: Netem, case: str) -> str:
+    """Return the path of an entry in the file, given its path among all entries of a case."""
+    kind, _, rest = path.partition("[")
+    index, _, rest = rest.partition("]")
+    before = next(len(getattr(common, list_.name)) for list_ in LISTS if list_.key == kind)
+    return f"{case}{kind}[{int(index) - before}]{rest}" if int(index) >= before else path
