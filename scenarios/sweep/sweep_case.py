@@ -91,7 +91,7 @@ def _run(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, His
     measured = CheckedCase.of(scenario, feeder, case, recorded)
     with np.errstate(all="ignore"):  # a value that is no number is None
         found = find({case: measured})
-    measures: dict[str, float | None] = msgspec.field(default_factory=dict)
+    measures: dict[str, float | None] = {}
     own = found.own.get(case, {})
     for label in found.results[case]:
         measures |= flat(label, _indexes(found, case, label))
