@@ -23,12 +23,11 @@ from gridpeers.scenarios.emulation.link_data import (
     data_of,
     words,
 )
-from gridpeers.scenarios.record.decision_entries import inside
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.viewer.run_view import FROZEN
 from gridpeers.viewer.strips import LENGTH, Point, next_due, point_of
 from gridpeers.wire.journal import Decision
-from gridpeers.wire.messages import PLANT, LinkReport, LinkRequest, Measurement, State, Telemetry
+from gridpeers.wire.messages import LinkReport, LinkRequest, Measurement, State, Telemetry
 
 LENGTHS = (LENGTH / 4.0, LENGTH / 2.0, LENGTH)
 """Lengths of strips (s): a record that is shorter than the last has more points a second."""
@@ -108,9 +107,7 @@ class AgentMoment(NamedTuple):
     idle: bool
     """It was paused, it had no measurement, or its law had failed."""
     known: bool = True
-    """The record says how it decided; False where a part of its journal is missing."""
-    damaged: bool = False
-    """That part is lost because the file is damaged there."""
+    """The record says how it decided; False behind the end of its journal, of which a killed process lacks a part."""
 
 
 class AgentMoments:
@@ -123,7 +120,7 @@ class AgentMoments:
         if self._info.level == "physics":
             return {}
         found = (self._in_ticks if self._info.simulated else self._live)(t)
-        return self._perhaps_there(t) | {moment.name: moment for moment in found}
+        return {moment.name: moment for moment in found}
 
     def sent(self, since: float, until: float) -> Counter[str]:
         counts: Counter[str] = Counter()
@@ -132,17 +129,11 @@ class AgentMoments:
                 counts[name] += bisect_right(times, until + 1e-9) - bisect_right(times, since + 1e-9)
         return counts
 
-    def lost(self, since: float, until: float) -> float:
-        """Return how much of the time between two run times (s) is lost, as the file is damaged there."""
-        holes = self._entries.holes(PLANT)
-        return sum(max(0.0, min(until, end) - max(since, begin)) for begin, end in holes)
-
     def _in_ticks(self, t: float) -> list[AgentMoment]:
         T_c = self._info.T_c
         last, moments = int(t / T_c + 1e-6), []
         for config in self._info.agents:
-            lost = inside(self._entries.holes(config.name), last * T_c)
-            for tick in range(last, max(-1, last - (1 if lost else 2)), -1):
+            for tick in range(last, max(-1, last - 2), -1):
                 state = self._index.state(config.name, tick, tick * T_c)
                 if state is not None:
                     moments.append(self._at_tick(state, tick * T_c))
@@ -151,9 +142,9 @@ class AgentMoments:
 
     def _at_tick(self, state: State, t: float) -> AgentMoment:
         name, measured = state.sender, self._index.measurement(state.sender, state.seq, t)
-        if measured is None or not (state.idle or self._entries.knows(name, t)):
+        if measured is None or not (state.idle or self._entries.know(state, t)):
             island = state.island if measured is None else measured.island
-            return _unknown(name, t, island, damaged=inside(self._entries.holes(name), t))
+            return AgentMoment(name, t, island, (), (), (), idle=False, known=False)
         form, T_c = None if state.idle else self._entries.at(name, state.seq), self._info.T_c
         ages = () if form is None else tuple(-1.0 if lag is None else round(lag * T_c, 9) for lag in form.states)
         return _moment(name, t, measured.island, form, ages, idle=state.idle)
@@ -170,34 +161,15 @@ class AgentMoments:
                         continue
                     last[journal.sender] = own, entry
         return [
-            _unknown(name, own.t, own.island, damaged=True)
-            if self._entries.lost_at(name, t, own.t)
-            else _moment(name, own.t, own.island, entry, tuple(-1.0 if age is None else age for age in entry.ages))
+            _moment(name, own.t, own.island, entry, tuple(-1.0 if age is None else age for age in entry.ages))
             for name, (own, entry) in last.items()
         ]
-
-    def _perhaps_there(self, t: float) -> dict[str, AgentMoment]:
-        """Return the agents that may have been there, for all that a damaged file says."""
-        simulated = self._info.simulated  # the plant has all states
-        since = t - (self._info.T_c if simulated else self._gone)
-
-        def is_lost(node: str) -> bool:
-            return any(begin < t and end >= since for begin, end in self._entries.holes(node))
-
-        names = self._info.agent_names
-        if not (simulated and is_lost(PLANT)):
-            names = () if simulated else tuple(name for name in names if is_lost(name))
-        return {name: _unknown(name, t, "", damaged=True) for name in names}
 
     def _read_sent(self, part: int) -> dict[str, list[float]]:
         times: dict[str, list[float]] = defaultdict(list)
         for (name, _), states in self._index.part(part).states.items():
             times[name] += [state.t for state in states[:1] if not (state.quiet or state.idle)]
         return {name: sorted(each) for name, each in times.items()}
-
-
-def _unknown(name: str, t: float, island: str, *, damaged: bool) -> AgentMoment:
-    return AgentMoment(name, t, island, (), (), (), idle=False, known=False, damaged=damaged)
 
 
 def _moment(

@@ -180,8 +180,8 @@ class RecordView:
         """Feed what each agent says, what it sent in the second before, and the accounts of its links."""
         sent, faults = self._moments.sent(t - WINDOW, t), self._faults.into(t, WINDOW)
         T_c = self.record.info.T_c
-        span = min(WINDOW, T_c * (int(t / T_c + 1e-6) + 1))  # in the first second: the periods that have begun
-        span = max(T_c, span - self._moments.lost(t - span, t))
+        begun = T_c * (int(t / T_c + 1e-6) + 1)  # the periods of the first second
+        span = max(T_c, min(WINDOW, begun))
         statuses = [_status(agent, sent[name], tuple(faults.get(name, ()))) for name, agent in agents.items()]
         view.statuses(statuses, {name: sent[name] / span for name in agents}, t)
         for name in agents:
@@ -195,8 +195,6 @@ class RecordView:
         note = one.note
         if agent is not None and agent.idle:
             note = "idle: paused, without a measurement, or its law has failed"
-        elif agent is not None and agent.damaged:
-            note = "how it decided is not known: the record is damaged there"
         elif agent is None and note != "no agent":
             note = ""
         hears = one.hears if agent is None or agent.known else None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict, deque
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import takewhile
 from math import inf, nextafter
@@ -12,7 +12,6 @@ from gridpeers.lab.communication.sent_states import Link, SentState, SentStates,
 from gridpeers.netem.ledger import LinkTrace
 from gridpeers.netem.schema.fault import Span
 from gridpeers.netem.schema.pattern import Link as LinkEnds
-from gridpeers.scenarios.record.decision_entries import Hole, inside
 from gridpeers.scenarios.record.record_info import RecordInfo
 
 MOST_WAITING = 6000
@@ -39,8 +38,8 @@ class Missing:
 class TickAccounts:
     """Simulated time without emulated links: every decision has the neighbours' states of the tick before."""
 
-    def __init__(self, sent: Mapping[str, SentStates], T_c: float, lost: Sequence[Hole] = ()) -> None:
-        self._sent, self._T_c, self._lost = sent, T_c, lost
+    def __init__(self, sent: Mapping[str, SentStates]) -> None:
+        self._sent = sent
         self._spoken: dict[int, set[str]] = {}
         self.missing: dict[Link, Missing] = {}
 
@@ -68,7 +67,7 @@ class TickAccounts:
             newer = spoke and own and use.ticks != 1
             number = use.number_at(state.number)
             invented = number is not None and not use.unused and not (window.has(number) or window.is_past(number))
-            if newer or (invented and not inside(self._lost, (number or 0) * self._T_c)):
+            if newer or invented:
                 self.missing[use.link].add(state.t)
 
 

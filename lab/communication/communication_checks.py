@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
-from types import MappingProxyType
 from typing import Annotated, Self
 
 from gridpeers.agents.agent_config import MAX_AGE
@@ -33,10 +32,8 @@ from gridpeers.scenarios.checks.check_verdict import (
     require_time,
 )
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.record.decision_entries import Hole
 from gridpeers.scenarios.record.record_info import LIVE, RecordInfo
 from gridpeers.wire.journal import Decision
-from gridpeers.wire.messages import PLANT
 from gridpeers.wire.schema.table_schema import Plausible, Unit
 from gridpeers.wire.timing import PATIENCE
 
@@ -242,37 +239,31 @@ class OldUse:
 
 
 def summarise(path: Path) -> CommunicationSummary:
-    """Go through the file of a record once, twice if parts of it are lost; NotJudgedError if it has no decisions."""
+    """Go through the file of a record once, twice if it is damaged; NotJudgedError if it has no decisions."""
     file, t_end = opened(path)
     found = CommunicationSummary(file.info, t_end).read(file)
-    last = t_end - 2.0 * file.info.T_c
-    lost = {name: holes for name, each in found.holes.items() if (holes := [hole for hole in each if hole[0] < last])}
-    if lost:  # known only now, and left out the second time
-        file, _ = opened(path)
-        found = CommunicationSummary(file.info, t_end, lost).read(file)
+    if file.t_end < t_end:  # known only now
+        found = CommunicationSummary(file.info, file.t_end).read(file)
     return found.finish()
 
 
 class CommunicationSummary(RecordPass):
-    """What a pass over a record found; `lost` has the parts of journals that an earlier pass missed.
+    """What a pass over a record found.
 
     Its memory does not grow with the run: of each agent it keeps the last states and decisions, of each link counters,
     and the numbers of messages on their way. Journals of different nodes come into a record with a delay; so a decision
     is looked at a while after its run time, once all its inputs are there.
     """
 
-    def __init__(
-        self, info: RecordInfo, t_end: float, lost: Mapping[str, Sequence[Hole]] = MappingProxyType({})
-    ) -> None:
+    def __init__(self, info: RecordInfo, t_end: float) -> None:
         super().__init__(info, t_end)
-        self._lost = lost
         self._simulated = simulated = info.simulated
         speed = max(1.0, info.plant.speed)
         self._delay = DELAY_TICKS * info.T_c if simulated else DELAY * speed
         self._names = frozenset(info.agent_names)
         self.sent: defaultdict[str, SentStates] = defaultdict(lambda: SentStates(simulated=simulated))
         self._decided: dict[str, DecidedTicks | DecidedStates] = {}
-        self._ticks = TickAccounts(self.sent, info.T_c, lost.get(PLANT, ()))
+        self._ticks = TickAccounts(self.sent)
         self._arrivals = ArrivalAccounts(PAUSE * speed, LINKED_WITHIN * speed)
         self._heals = Heals(info, t_end, self.sent)
         self.unheard = self._ticks.missing
@@ -323,7 +314,7 @@ class CommunicationSummary(RecordPass):
         if agent not in self._decided:
             T_c = self.info.T_c
             self._decided[agent] = (
-                DecidedTicks(agent, T_c, self._lost.get(agent, ()))
+                DecidedTicks(agent, T_c, self.journal_ends)
                 if self._simulated
                 else DecidedStates(agent, T_c, self.sent[agent])
             )

@@ -7,8 +7,6 @@ sent, heard and used which number. So this reads the entries of the journals as 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
-from math import inf
 from pathlib import Path
 from typing import Any, Self
 
@@ -18,7 +16,7 @@ from gridpeers.lab.communication.sent_states import Link, SentState
 from gridpeers.netem.ledger import LinkCounts, LinkTrace
 from gridpeers.scenarios.checks.check_verdict import NotJudgedError
 from gridpeers.scenarios.emulation.link_data import data_of
-from gridpeers.scenarios.record.decision_entries import INSTANT, Hole, JournalCoverage, is_periodic
+from gridpeers.scenarios.record.decision_entries import JournalEnds
 from gridpeers.scenarios.record.journal_reader import entries_of, values_of
 from gridpeers.scenarios.record.record_file import RecordFile
 from gridpeers.scenarios.record.record_info import RecordInfo
@@ -63,13 +61,10 @@ class RecordPass:
         """Real time: how many states a receiver dropped unread."""
         self.unreadable = 0
         """Messages, entries, reports and parts of the file that could not be read, or cannot be true."""
-        self.holes: Mapping[str, Sequence[Hole]] = {}
-        """Simulated time: run times (s) between which it is not known how an agent decided, or what the plant heard:
-        the file is damaged there, or the rest of a journal is missing."""
+        self.journal_ends = JournalEnds(info)
         self._latest = t_end + AHEAD * max(1.0, info.plant.speed)
         self._most = int(self._latest / info.T_c) if info.simulated else MOST_COUNT
         """Largest number of a state: in simulated time that of its tick."""
-        self._coverage: dict[str, JournalCoverage] = {}
         self._spoke: dict[str, float] = {}
         """Real time: run time (s) of the last own state in each agent's journal."""
         fields = info.fields.get(State.__name__, ())
@@ -101,28 +96,20 @@ class RecordPass:
             else:
                 self.unreadable += 1
         self.unreadable += len(file.damage)
-        self.holes = {
-            name: [*each.holes(file.holes), (each.known_until + INSTANT, inf)] for name, each in self._coverage.items()
-        }
+        self.t_end = min(self.t_end, file.t_end)
         return self
 
     def _journal(self, journal: Journal) -> None:
-        """Take a part of a journal, as far as it can be read; in simulated time what is not whole is lost."""
-        before, ticks = self.unreadable, list[int]()
+        """Take a part of a journal, as far as it can be read."""
         simulated, T_c = self.info.simulated, self.info.T_c
+        self.journal_ends.take(journal)
         for entry in entries_of(journal.data, self._count_damage):
-            if isinstance(entry, Decision | Exchange):
-                if not 0 <= (time_of(entry.tick, T_c) if simulated else journal.t) <= self._latest:
-                    self.unreadable += 1
-                    continue
-                ticks.append(entry.tick)
-            self._take(journal, entry)
-        if simulated and self.unreadable == before:  # in real time each entry tells all by itself
-            name = journal.sender
-            if name not in self._coverage:
-                self._coverage[name] = JournalCoverage(periodic=is_periodic(self.info, name))
-            times = (time_of(ticks[0], T_c), time_of(ticks[-1], T_c) if name == PLANT else journal.t) if ticks else None
-            self._coverage[name].take(journal, lambda: times)
+            if isinstance(entry, Decision | Exchange) and not (
+                0 <= (time_of(entry.tick, T_c) if simulated else journal.t) <= self._latest
+            ):
+                self.unreadable += 1
+            else:
+                self._take(journal, entry)
 
     def _count_damage(self, error: ValueError) -> None:
         self.unreadable += 1

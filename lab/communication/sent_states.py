@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from array import array
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from math import inf
 from typing import NamedTuple
 
-from gridpeers.scenarios.record.decision_entries import Hole, inside
+from gridpeers.scenarios.record.decision_entries import JournalEnds
 from gridpeers.wire.journal import Decision
 
 Link = tuple[str, str]  # Sender and receiver
@@ -176,8 +176,8 @@ def uses_of(agent: str, decision: Decision, T_c: float, *, simulated: bool) -> U
 class DecidedTicks:
     """The states of one agent in simulated time, each with the decision in force."""
 
-    def __init__(self, agent: str, T_c: float, holes: Sequence[Hole]) -> None:
-        self._agent, self._T_c, self._holes = agent, T_c, holes
+    def __init__(self, agent: str, T_c: float, journal_ends: JournalEnds) -> None:
+        self._agent, self._T_c, self._ends = agent, T_c, journal_ends
         self._states: deque[SentState] = deque(maxlen=MOST)
         self._coming: deque[Decision] = deque()
         self._uses: Uses | None = None
@@ -195,7 +195,8 @@ class DecidedTicks:
             while self._coming and self._coming[0].tick <= state.number:
                 self._uses = uses_of(self._agent, self._coming.popleft(), self._T_c, simulated=True)
                 self._new = True
-            if self._uses is not None and not state.idle and not inside(self._holes, state.t):
+            known = self._ends.know(self._agent, state.epoch, state.t)
+            if self._uses is not None and not state.idle and known:
                 yield state, self._uses, self._new
                 self._new = False
 

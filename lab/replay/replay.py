@@ -323,11 +323,8 @@ def run_again(
 
 def _decisions(record: RunRecord, agent: str) -> ReplayedPart:
     part = ReplayedPart(agent)
-    hole = min((since for since, _ in record.holes(agent)), default=inf)
     with made_here(f"{agent}: its law cannot be made here"):
         for each in recomputed(record, agent):
-            if each.decision.t > hole:  # its law may have a memory, of which nothing is known behind a hole
-                break
             part.compare(each.decision.t, message_difference(each.decision.state, each.state))
             if part.difference is not None:
                 return part

@@ -50,7 +50,7 @@ class DecisionReader:
             own = [each for (sender, _), found in states if sender == name for each in found]
             for state in sorted(own, key=lambda each: each.seq):
                 t = time_of(state.seq, T_c)
-                if not since - 1e-9 <= t <= until + 1e-9 or not self.entries.knows(name, t):
+                if not since - 1e-9 <= t <= until + 1e-9 or not self.entries.know(state, t):
                     continue
                 if (decision := self._at_tick(config, state, t)) is not None:
                     yield decision

@@ -1,4 +1,4 @@
-"""Read the file of a record, whole or cut off, without trusting anything in it; and find it.
+"""Read the file of a record up to its end or its first damaged chunk, without trusting anything in it; and find it.
 
 The file is a sequence of MCAP records, each with its length before it. A process that is killed leaves the last one
 half written, and no index at the end. So the reader does not use the index: it goes from record to record up to the
@@ -52,8 +52,6 @@ class RecordMessage(NamedTuple):
 class _ChunkPlace(NamedTuple):
     offset: int
     length: int
-    since: float
-    until: float
 
 
 class RecordFile:
@@ -66,14 +64,12 @@ class RecordFile:
         self.path = path
         self.complete = False
         """True if the file was closed properly: everything that was recorded is in it."""
-        self._damage: list[str] = []
-        self.holes: list[tuple[float, float]] = []
-        """Run times (s) of the first and the last message of each chunk that turned out to be damaged."""
         self._end = ""
+        self._damaged = False
         self._offset = 0
         """Where the first record begins that could not be read yet."""
         self._topics: dict[int, Topic] = dict(enumerate(get_args(Topic), 1))
-        """Topic of each channel: those of our writer, as the first chunk, which names them, may be damaged."""
+        """Topic of each channel: those of our writer, as the first chunk, which names them, may not be read yet."""
         self._chunks: list[_ChunkPlace] = []
         self.ends: list[float] = []
         """Latest run time (s) up to the end of each part that can be read on its own, in the order of the file."""
@@ -87,8 +83,8 @@ class RecordFile:
 
     @property
     def damage(self) -> tuple[str, ...]:
-        """Sentences on parts of the file that could not be read, and on its end if it is cut off."""
-        return (*self._damage, *filter(None, [self._end]))
+        """A sentence on where it ends if it is cut off, or where a damaged chunk was met; nothing behind it is read."""
+        return (self._end,) if self._end else ()
 
     @property
     def t_end(self) -> float:
@@ -100,9 +96,11 @@ class RecordFile:
             yield from (message for message in self.part(index) if topics is None or message.topic in topics)
 
     def part(self, index: int) -> tuple[RecordMessage, ...]:
-        """Return the messages of a part; none if it is damaged: `damage` says so then."""
+        """Return the messages of a part; none if it is damaged, or behind a damaged one: the file ends there then."""
+        if index >= len(self.ends):
+            return ()
         # not an lru_cache of a method: in a cycle with its file it would stay in memory long after
-        messages = self._recent.pop(index) if index in self._recent else self._load_chunk(self._chunks[index])
+        messages = self._recent.pop(index) if index in self._recent else self._load_chunk(index)
         self._recent[index] = messages
         if len(self._recent) > RECENT:
             del self._recent[next(iter(self._recent))]
@@ -110,6 +108,8 @@ class RecordFile:
 
     def refresh(self) -> None:
         """Note what was written since, of a run that is still recorded."""
+        if self._damaged:
+            return
         try:
             with self.path.open("rb") as file:
                 self._size = file.seek(0, 2)
@@ -137,8 +137,8 @@ class RecordFile:
                 self.complete = True
                 return ""
             if opcode == Opcode.CHUNK and length > _TIMES.size:
-                since, until = _TIMES.unpack(file.read(_TIMES.size))
-                self._chunks.append(_ChunkPlace(start, length, since / 1e9, until / 1e9))
+                _, until = _TIMES.unpack(file.read(_TIMES.size))
+                self._chunks.append(_ChunkPlace(start, length))
                 self.ends.append(max(self.t_end, until / 1e9))  # a part may have late messages alone
             elif opcode == Opcode.HEADER:
                 self._check_header(file.read(length))
@@ -183,7 +183,8 @@ class RecordFile:
                 f"{self.path}: what it says about its run (written by gridpeers {by[:40]}) cannot be read: {error}"
             ) from None
 
-    def _load_chunk(self, place: _ChunkPlace) -> tuple[RecordMessage, ...]:
+    def _load_chunk(self, index: int) -> tuple[RecordMessage, ...]:
+        place = self._chunks[index]
         try:
             with self.path.open("rb") as file:
                 file.seek(place.offset)
@@ -192,11 +193,10 @@ class RecordFile:
         except OSError as error:
             raise RecordFileError(f"{self.path}: cannot be read: {error.strerror}") from None
         except _BROKEN as error:
-            since, until = hole = place.since, place.until
-            if hole not in self.holes:
-                self.holes.append(hole)
-                why = str(error)[:100] or type(error).__name__
-                self._damage.append(f"a chunk is damaged, from t = {since:.2f} s to {until:.2f} s: {why}")
+            del self.ends[index:], self._chunks[index:]
+            self._damaged, self.complete = True, False
+            why = str(error)[:100] or type(error).__name__
+            self._end = f"the file is damaged after t = {self.t_end:.2f} s, and read up to there: {why}"
             return ()
         messages = []
         for record in records:

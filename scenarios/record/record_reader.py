@@ -16,7 +16,6 @@ from typing import TypeVar, get_args
 
 from gridpeers.netem.ledger import LinkCounts, LinkTrace
 from gridpeers.scenarios.emulation.link_data import LinkReportData, data_of
-from gridpeers.scenarios.record.decision_entries import Hole
 from gridpeers.scenarios.record.decision_reader import DecisionReader
 from gridpeers.scenarios.record.message_index import MessageIndex, MessageOnWire
 from gridpeers.scenarios.record.record_file import RecordFile, RecordFileError, record_path
@@ -44,7 +43,7 @@ class RunRecord:
         """What is in each part of the file, for readers that go through it by parts."""
         self._decisions = DecisionReader(self.index)
         self.entries_of_decisions = self._decisions.entries
-        """How agents decided, and where the record lacks it, for readers that look at all agents."""
+        """How agents decided, and up to when the record has it, for readers that look at all agents."""
 
     @classmethod
     def open(cls, path: str | Path, case: str = "") -> RunRecord:
@@ -65,7 +64,7 @@ class RunRecord:
 
     @property
     def damage(self) -> tuple[str, ...]:
-        """Sentences on parts of the file that could not be read so far, and on its end if it is cut off."""
+        """Sentences on what could not be read so far, and on the end of the file if it is cut off or damaged."""
         return tuple(dict.fromkeys((*self._file.damage, *self.index.damage)))
 
     @property
@@ -161,33 +160,34 @@ class RunRecord:
             raise RecordFileError(f'{self.path}: it has no decisions: the run was recorded with record = "physics"')
         return self._decisions.decisions(agent, since, until)
 
-    def holes(self, agent: str) -> list[Hole]:
-        """Return the run times (s) between which it is not known how an agent decided: the file is damaged there."""
-        self._require(agent)
-        return list(self.entries_of_decisions.holes(agent))
-
     def decision(self, agent: str, t: float) -> RecordedDecision:
         """Return the decision of an agent that was in force at a run time (s): its last one up to then.
 
         Raise RecordFileError if there is none, or the record lacks it.
         """
         _check_times(t=t)
-        if not 0.0 <= t <= self.t_end + self.info.T_c:
-            raise RecordFileError(
-                f"{self.path}: t = {t:g} s is outside of the record, which has 0 to {self.t_end:.2f} s"
-            )
+        self._require_time(t)
         back, found = 1.0, None
         while found is None and back < 4.0 * (t + 1.0):
             found = _last(self.decisions(agent, since=max(0.0, t - back), until=t + 1e-9))
             back *= 4.0
-        if self.entries_of_decisions.lost_at(agent, t, None if found is None else found.t):
-            why = self.damage[0] if self.damage else "parts of journals never came into it"
-            raise RecordFileError(f"{self.path}: it lacks how {agent} decided at t = {t:g} s: {why}")
+        self._require_time(t)  # the file may have turned out to be damaged
+        tick = int(t / self.info.T_c + 1e-6)
+        state = self.index.state(agent, tick, t) if self.info.simulated else None
+        if state is not None and not (state.idle or self.entries_of_decisions.know(state, state.t)):
+            raise RecordFileError(f"{self.path}: it lacks how {agent} decided at t = {t:g} s: its journal ends before")
         if found is None:
             first = next(self.decisions(agent), None)
             more = ", nor later" if first is None else f"; its first decision is of t = {first.t:.2f} s"
             raise RecordFileError(f"{self.path}: {agent} had not decided anything by t = {t:g} s{more}")
         return found
+
+    def _require_time(self, t: float) -> None:
+        if not 0.0 <= t <= self.t_end + self.info.T_c:
+            raise RecordFileError(
+                f"{self.path}: t = {t:g} s is outside of the record, which has 0 to {self.t_end:.2f} s"
+                + "".join(f": {why}" for why in self._file.damage)
+            )
 
     def _require(self, agent: object) -> None:
         if agent != "plant" and agent not in self.agents:

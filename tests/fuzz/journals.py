@@ -37,7 +37,7 @@ class JournalFile:
 
     def __init__(self, parts: Iterable[tuple[str, bytes]], reports: Iterable[LinkReport], *, clock: str) -> None:
         self.info, self.t_end = info(clock=clock), T_END
-        self.damage, self.holes = (), list[tuple[float, float]]()
+        self.damage = ()
         self._parts, self._reports = parts, reports
 
     def messages(self, topics: object) -> Iterator[RecordMessage]:

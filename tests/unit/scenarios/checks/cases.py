@@ -49,7 +49,8 @@ def altered(content: RecordContent, **parts: Any) -> RecordContent:
 def with_content(case: CheckedCase, content: RecordContent, *, late: float = 0.0) -> CheckedCase:
     """A case whose record has something else in it, in the order of time; of agents' journals, some time (s) late."""
     other = replace(case)
-    sums = CommunicationSummary(content.info, content.t_end, content.holes)
+    sums = CommunicationSummary(content.info, content.t_end)
+    sums.journal_ends = content.journal_ends
     of: dict[tuple[str, int, int], float] = {}
     entries: list[tuple[float, int, Callable[[], None]]] = []
     for agent, states in content.states.items():

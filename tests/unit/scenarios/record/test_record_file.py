@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import random
+from itertools import islice
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
+from mcap.reader import make_reader
 from mcap.writer import Writer
 
 from gridpeers.scenarios.record.message_index import MessageIndex
@@ -68,8 +70,38 @@ def test_a_record_cut_off_anywhere_is_read_up_to_there(whole: Path, tmp_path: Pa
     assert counts[-1] > counts[len(counts) // 2] > 0
 
 
-def test_a_record_with_changed_bytes_is_read_around_them(whole: Path, tmp_path: Path) -> None:
-    """Whatever byte is wrong, what can be read is read, the rest is told, and nothing else is raised."""
+def test_a_record_is_read_up_to_its_first_damaged_chunk(whole: Path, tmp_path: Path) -> None:
+    """One bit of a chunk is flipped: what is before it is there as it was, the rest is not, and that is told once."""
+    with whole.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    middle = summary.chunk_indexes[len(summary.chunk_indexes) // 2]
+    data = bytearray(whole.read_bytes())
+    data[middle.chunk_start_offset + middle.chunk_length // 2] ^= 1
+    (tmp_path / FILE).write_bytes(data)
+    intact = RunRecord.open(whole)
+
+    record, count = read_all(tmp_path)
+    record.refresh()
+    end = record.t_end
+
+    assert count > 100
+    assert 0.0 < end < 1.0
+    (told,) = record.damage
+    assert f"the file is damaged after t = {end:.2f} s, and read up to there" in told
+    assert not record.complete
+    assert record.outcome is None
+    for agent in record.agents:
+        found = list(record.decisions(agent))
+        assert len(found) > 5
+        assert found == list(islice(intact.decisions(agent), len(found)))
+    assert record.decision("inv1", 0.2) == intact.decision("inv1", 0.2)
+    with pytest.raises(RecordFileError, match=r"t = 0\.9 s is outside of the record, .*: the file is damaged"):
+        RunRecord.open(tmp_path).decision("inv1", 0.9)
+
+
+def test_a_record_with_changed_bytes_is_read_up_to_them(whole: Path, tmp_path: Path) -> None:
+    """Whatever byte is wrong, what is before it is read, the rest is told once, and nothing else is raised."""
     data, draws, told = whole.read_bytes(), random.Random(7), 0
     for _ in range(40):
         changed = bytearray(data)
@@ -79,6 +111,7 @@ def test_a_record_with_changed_bytes_is_read_around_them(whole: Path, tmp_path: 
         try:
             record, _ = read_all(tmp_path)
             told += bool(record.damage)
+            assert len(record.damage) <= 1
         except RecordFileError:
             told += 1
 
