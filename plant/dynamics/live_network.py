@@ -9,6 +9,7 @@ import numpy as np
 
 from gridpeers.plant.dynamics.circuit import PHASES, Circuit, NoSolutionError
 from gridpeers.plant.dynamics.inverters import Inverters
+from gridpeers.plant.dynamics.island_parts import IslandParts, is_large
 from gridpeers.plant.dynamics.kernel.compiled import Complex, Real
 from gridpeers.plant.dynamics.kernel.controller_pass import Units
 from gridpeers.plant.dynamics.kernel.network_arrays import Reduced
@@ -55,6 +56,7 @@ class LiveNetwork:
         self._noted: Complex = circuit.V_branch.astype(complex)
         self._steps_since = False  # whether steps were taken since `V_branch` was written
         self._excess = 0
+        self._parts: IslandParts | None = None
 
     @property
     def source_voltage(self) -> Complex:
@@ -114,6 +116,17 @@ class LiveNetwork:
         if self._excess > WORTH:
             self._linearise(self._branch_voltages())
 
+    def parts(self, units: Units) -> IslandParts | None:
+        """Return the islands in parts; None where the network is too small, or all is one island."""
+        if self._parts is None and is_large(self.net):
+            self._parts = IslandParts(self.net, self.reduction.node_island, units)
+        return self._parts
+
+    def join_parts(self) -> None:
+        """Go on with all islands at once, because a part has failed."""
+        self._parts = None
+        self.net.sparse.increments[:] = 0.0
+
     def note(self) -> None:
         self._steps_since = True
 
@@ -140,6 +153,7 @@ class LiveNetwork:
         self.net = self.reduction.linearise(V_b, self.source_voltage, self._inverters.theta())
         self.x = np.concatenate([V_b.real, V_b.imag])
         self._excess = 0
+        self._parts = None
 
     def _branch_voltages(self) -> Complex:
         m = self.x.size // 2

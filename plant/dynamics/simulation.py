@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from gridpeers.plant.dynamics.circuit import PHASES, Circuit, NoSolutionError, aligned_sum
 from gridpeers.plant.dynamics.equilibrium import OperatingPoint, equilibrium, set_equilibrium
 from gridpeers.plant.dynamics.inverters import Inverter, Inverters
+from gridpeers.plant.dynamics.island_parts import is_large
 from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Real
 from gridpeers.plant.dynamics.kernel.controller_pass import READING, Units
 from gridpeers.plant.dynamics.kernel.second_order_step import Slopes, run_second_order_steps
-from gridpeers.plant.dynamics.kernel.step import FAILURES, run_steps
+from gridpeers.plant.dynamics.kernel.step import FAILURES, run_steps, run_steps_unlocked
 from gridpeers.plant.dynamics.live_network import TOLERANCE, LiveNetwork, unsettled_island
 from gridpeers.plant.plant_config import Method
 
@@ -252,6 +253,13 @@ class Dynamics:
     def _advance(self, begin: int, steps: int, out: Real) -> int:
         units, network, arrays, tolerance = self.inverters, self.network, self.arrays(), self._tolerance
         if self._method == "first-order":
+            if steps == 0 and is_large(network.net):
+                run_steps_unlocked(0, 0, self.h, tolerance, network.net, arrays, network.x, out)
+            if begin == 0 and (parts := network.parts(arrays)):
+                iterations = parts.advance(steps, self.h, tolerance, arrays, network.x, out)
+                if iterations >= 0:
+                    return iterations
+                network.join_parts()
             return run_steps(begin, steps, self.h, tolerance, network.net, arrays, network.x, out)
         return run_second_order_steps(
             begin,

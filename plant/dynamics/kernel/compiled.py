@@ -93,12 +93,12 @@ class _Cache(FunctionCache):
             super().save_overload(sig, data)  # type: ignore[no-untyped-call]
 
 
-def compiled(function: Callable[_P, _R]) -> Callable[_P, _R]:
+def compiled(function: Callable[_P, _R], *, nogil: bool = False) -> Callable[_P, _R]:
     """Compile a function at its first call and keep the machine code on disk.
 
     No fast-math: sums keep their order, so the same inputs give the same bytes in every process.
     """
-    dispatcher: Any = njit(error_model="numpy")(function)
+    dispatcher: Any = njit(error_model="numpy", nogil=nogil)(function)
     if FOLDER:  # `cache=True` would take one of numba's own folders
         dispatcher._cache = _Cache(function)  # type: ignore[no-untyped-call]  # noqa: SLF001
     result: Callable[_P, _R] = dispatcher

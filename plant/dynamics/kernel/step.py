@@ -8,6 +8,7 @@ shrink; beginning at the unlimited solution differs a hundred times more. The co
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -111,3 +112,11 @@ def run_steps(begin: int, steps: int, h: float, tolerance: float, net: Any, unit
                 if units.online[i] and not np.isfinite(out[step, i, 0]):
                     return -1 - (FAILURES * step + 2)
     return total
+
+
+@partial(compiled, nogil=True)
+def run_steps_unlocked(
+    begin: int, steps: int, h: float, tolerance: float, net: Any, units: Any, x: Real, out: Real
+) -> int:
+    """Do the same without Python's lock, for networks so large that it is worth handing it back and forth."""
+    return run_steps(begin, steps, h, tolerance, net, units, x, out)

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-from threading import Event, Thread
 
 import numpy as np
 import pytest
 import scipy.sparse as sp
 from msgspec.structs import replace
-from threadpoolctl import threadpool_info, threadpool_limits
 
 from gridpeers.plant.dynamics import Circuit, Dynamics, PlantError
 from gridpeers.plant.dynamics.circuit import LoadLaw
@@ -17,7 +15,6 @@ from gridpeers.plant.dynamics.island_newton import Island, solve_island
 from gridpeers.plant.dynamics.kernel.compiled import Complex
 from gridpeers.plant.dynamics.live_network import unsettled_island
 from gridpeers.plant.dynamics.reduction import Reduction
-from gridpeers.plant.dynamics.threads import one_thread
 from gridpeers.plant.equipment.inverter_parameters import GfmParameters
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.feeder.circuits import Circuits
@@ -128,18 +125,6 @@ def test_the_island_with_more_load_than_it_can_carry_is_found(island: int, load:
     assert unsettled_island(net, dynamics.arrays(), dynamics.network.x, 1e-11 * V_B) == island
 
 
-def test_the_other_islands_go_on_beside_one_that_cannot_carry_its_load() -> None:
-    """It is de-energised, and the others have the readings that they have without it."""
-    alone, dynamics = lone_islands(1000.0), lone_islands(1000.0)
-    net = dynamics.network.net
-    net.S[net.branch_island == 1] *= 30.0
-    readings = dynamics.run(50)
-
-    assert [trip.inverters for trip in dynamics.take_trips()] == [(1,)]
-    assert readings[-1, 1, :4].tolist() == [0.0] * 4
-    assert readings[:, [0, 2]] == pytest.approx(alone.run(50)[:, [0, 2]], rel=1e-9, abs=1e-9 * S_B)
-
-
 I_B = S_B / (3.0 * V_B)
 
 
@@ -232,28 +217,3 @@ def test_a_start_beyond_the_limit_is_refused() -> None:
 
     with pytest.raises(PlantError, match=r"inv1 would have to carry \d+(\.\d+)? A in a phase, .*I_max_pu"):
         Plant(Network(read_feeder("microgrid123")), settings, 0.02, 0.02)
-
-
-def _threads() -> set[int]:
-    return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
-
-
-def test_a_thread_that_is_through_does_not_lift_the_limit_under_another() -> None:
-    """Runs in several threads of a notebook give the bytes that each gives alone; the last lifts the limit."""
-    inside, leave = Event(), Event()
-
-    def first() -> None:
-        with one_thread():
-            inside.set()
-            leave.wait(100.0)
-
-    with threadpool_limits(2, user_api="blas"):
-        before = _threads()
-        thread = Thread(target=first)
-        thread.start()
-        assert inside.wait(100.0)
-        with one_thread():
-            leave.set()
-            thread.join()
-            assert _threads() == {1}
-        assert _threads() == before
