@@ -215,10 +215,8 @@ class ClosedLoop:
         return links_of(name, self._netem)
 
     def _settle(self, process: LoopProcess, step: RecordedStep) -> None:
-        again, commanded = (
-            process.again,
-            isinstance(step.entry, ReceivedMessage) and kind_of(step.entry.key) in TO_LINKS,
-        )
+        again = process.again
+        commanded = isinstance(step.entry, ReceivedMessage) and kind_of(step.entry.key) in TO_LINKS
         if commanded and self._changed and again is not None and again.links is not None:
             for pattern in self._changes.without:  # the command may have healed them
                 cut = LinkCommand(fault=Fault(on=pattern, cut=True))

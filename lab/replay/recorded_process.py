@@ -258,13 +258,13 @@ class ReplayedProcess:
 
 
 @contextmanager
-def made_here(failing: str) -> Iterator[None]:
-    """Make a part of a recorded run again; ReplayError, which begins with `failing`, if it cannot be made here."""
+def made_here(failing: str, errors: tuple[type[Exception], ...] = (ValueError,)) -> Iterator[None]:
+    """Make a part of a recorded run again; ReplayError, which begins with `failing`, for one of `errors`."""
     try:
         yield
     except (RecordFileError, ReplayError):
         raise
-    except (ValueError, RuntimeError, OSError) as error:
+    except errors as error:
         raise ReplayError(f"{failing}: {error}") from None
 
 
@@ -300,5 +300,5 @@ def recorded_links(info: RecordInfo, name: str) -> Links | None:
 
 
 def start_plant_of(info: RecordInfo, make_plant: MakePlant) -> LivePlant:
-    with made_here("the plant of the record cannot be started here"):
+    with made_here("the plant of the record cannot be started here", (ValueError, RuntimeError, OSError)):
         return make_plant(info.plant)
