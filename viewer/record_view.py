@@ -117,7 +117,8 @@ class RecordView:
         )
 
     def decision(self, agent: str, t: float) -> str:
-        return str(ROOMS.resolve("explain")(self.record, agent, t))
+        self._read_events()
+        return str(ROOMS.resolve("explain")(self.record, agent, t, tuple(self._plant_events)))
 
     def _present(self, t: float, agents: Mapping[str, AgentMoment]) -> list[str]:
         """Return the agents that were there: by their decisions, or by the schedule if the record has none.

@@ -66,15 +66,16 @@ class Explanation:
         return text_of(self)
 
 
-def explain(record: RunRecord, agent: str, t: float) -> Explanation:
-    """Explain the decision of an agent that was in force at a run time (s)."""
+def explain(record: RunRecord, agent: str, t: float, events: tuple[PlantEvent, ...] | None = None) -> Explanation:
+    """Explain the decision of an agent that was in force at a run time (s); `events` are the record's, if known."""
     if agent not in record.agents:
         raise RecordFileError(f"{record.path}: there was no agent {agent!s:.64}; agents are {short(record.agents)}")
-    return explained(record, record.decision(agent, t), t)
+    return explained(record, record.decision(agent, t), t, record.events() if events is None else events)
 
 
-def explained(record: RunRecord, decision: RecordedDecision, asked: float) -> Explanation:
-    events = record.events()
+def explained(
+    record: RunRecord, decision: RecordedDecision, asked: float, events: tuple[PlantEvent, ...]
+) -> Explanation:
     return Explanation(
         scenario=record.info.scenario,
         case=record.info.case,
