@@ -77,10 +77,18 @@ def law_step(record: RunRecord, decision: RecordedDecision) -> LawStep | None:
 
 
 def _since_start(record: RunRecord, decision: RecordedDecision) -> tuple[RecordedDecision, ...]:
-    decisions = record.decisions(decision.agent, until=decision.t)
-    found = [each for each in decisions if each.state.epoch == decision.state.epoch]
-    starts = [i for i, each in enumerate(found) if each.restarted or (i > 0 and found[i - 1].action != "law")]
-    return tuple(each for each in found[starts[-1] if starts else 0 :] if each.action == "law")
+    back = 1.0
+    while True:
+        since = max(0.0, decision.t - back)
+        found = [
+            each
+            for each in record.decisions(decision.agent, since=since, until=decision.t)
+            if each.state.epoch == decision.state.epoch
+        ]
+        starts = [i for i, each in enumerate(found) if each.restarted or (i > 0 and found[i - 1].action != "law")]
+        if starts or since == 0.0:
+            return tuple(each for each in found[starts[-1] if starts else 0 :] if each.action == "law")
+        back *= 4.0
 
 
 def _parts(
