@@ -103,8 +103,8 @@ def objections(text: str, names: Iterable[str] | None, microgrids: Mapping[str, 
     agents = list(names or ())
     groups = list(dict.fromkeys(microgrids[name] for name in agents if name in microgrids))
     known = [*agents, *groups, PLANT, ANY]
-    lower = {*agents, PLANT, ANY, *(group.lower() for group in groups)}
-    if unknown := [name for name in named if name not in lower and name.lower() not in lower]:
+    lower = {group.lower() for group in groups}
+    if unknown := [name for name in named if name not in known and name.lower() not in lower]:
         return [
             f'"{text}" matches nothing: nobody is called "{name}"; {suggestion(name, known, "names")}'
             for name in unknown

@@ -77,6 +77,7 @@ def test_a_newcomer_is_meant_by_patterns_written_before_it_came() -> None:
         ("", ["names no links"]),
         ("inv1 ->", ["is no name"]),
         ("inv1 -> inv22", ['nobody is called "inv22"', 'did you mean "inv2"?']),
+        ("{INV1, inv2} -> inv3", ['nobody is called "INV1"', 'did you mean "inv1"?']),
         ("MG7 -> inv1", ['nobody is called "MG7"', 'did you mean "MG']),
         ("inv1 -> inv1", ["matches nothing: both ends are inv1 alone", 'two different ends, e.g. "inv1 <-> *"']),
         ("{inv1, inv1} <-> inv1", ["matches nothing: both ends are inv1 alone"]),
