@@ -22,9 +22,9 @@ MOST_ROWS = 20
 
 def read_delays(path: Path) -> tuple[tuple[float, ...], list[str]]:
     """Return the delays (s) of a CSV file with a column `delay_s`, one message a row, and its problems by row."""
-    if not path.is_file():  # a device or a pipe may never end
-        return (), [f'there is no file "{path}"; the path is seen from the scenario']
     try:
+        if not path.is_file():  # a device or a pipe may never end
+            return (), [f'there is no file "{path}"; the path is seen from the scenario']
         return _rows(path.read_bytes(), path.name)
     except OSError as error:
         return (), [f"{path}: cannot be read: {error.strerror}"]

@@ -314,6 +314,12 @@ def test_bad_rows_of_a_trace_are_named(tmp_path: Path, rows: str | None, words: 
     assert all(word in problem.text for word, problem in zip(words, wrong, strict=True))
 
 
+def test_a_path_that_no_system_takes_is_a_problem_too(tmp_path: Path) -> None:
+    _, (wrong,) = with_traces(Netem(links=(Fault(on="* -> *", delay=Trace(file="d" * 300)),)), tmp_path)
+
+    assert wrong.text.endswith("cannot be read: File name too long")
+
+
 TEXT = (Path(__file__).parents[3] / "docs" / "netem.md").read_text(encoding="utf-8")
 
 
