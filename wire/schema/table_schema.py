@@ -349,12 +349,15 @@ class Relation:
 @dataclass(frozen=True)
 class Below(Relation):
     or_equal: bool = False
+    unit: str = ""
+    """Unit of both, where the message is to name it."""
 
     def objection(self, value: float, other: float, key: str) -> str:
         if value <= other if self.or_equal else value < other:
             return ""
         rule = "not be above" if self.or_equal else "be below"
-        return f"{value:g} must {rule} {key} = {other:g}; swap them or set both"
+        unit = self.unit and f" {self.unit}"
+        return f"{value:g}{unit} must {rule} {key} = {other:g}{unit}; swap them or set both"
 
 
 class After(Relation):

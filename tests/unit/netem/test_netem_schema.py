@@ -91,7 +91,11 @@ def test_a_scenarios_entries_are_read_as_written() -> None:
         ('[[link]]\non = "* -> *"\nloss = 30', "link[0].loss", ["0 to 1, got 30", "0.3 (30 %)"]),
         ('[[link]]\non = "* -> *"\nrate = 0', "link[0].rate", ["bytes/s", "not bits"]),
         ('[[link]]\non = "* -> *"\nflap = {up_s = 0, down_s = 1}', "link[0].flap.up_s", ["above 0"]),
-        ('[[link]]\non = "* -> *"\nslots = {period_s = 1, length_s = 2}', "link[0].slots.length_s", ["period_s = 1"]),
+        (
+            '[[link]]\non = "* -> *"\nslots = {period_s = 1, length_s = 2}',
+            "link[0].slots.length_s",
+            ["2 s must not be above period_s = 1 s"],
+        ),
         ('[[link]]\non = "* -> *"\nloss = {model = "gilbert-elliott", p = 0.1, r = 0}', "link[0].loss.r", ["above 0"]),
         (
             '[[link]]\non = "* -> *"\nloss = {model = "markov", p13 = 0.7, p31 = 1, p14 = 0.7}',
