@@ -39,6 +39,10 @@ ROOM = 1_000_000
 NOTED_REJECTED = 200
 """Rejected messages that are noted between two times at which a journal is taken; the others are counted only."""
 
+COUNTED_KEYS = 200
+"""Keys and kinds of which a part counts messages, all further ones by their kind alone: whoever sends on keys with
+wildcards has any number of them."""
+
 AT_ONCE = 64
 """Most messages in one entry: of the longest there are, they fit into a part."""
 
@@ -51,7 +55,7 @@ class KeyEntry(Entry, frozen=True, array_like=True):
     at: float | None
     """Time on the own clock (s, monotonic), of a message its arrival; None in simulated time."""
     key: str
-    """Key, without `gridpeers/<run>/`."""
+    """Key, without `gridpeers/<run>/`; empty for all others, where there are too many to count each."""
 
 
 class Exchange(Entry, frozen=True, array_like=True, tag="exchange"):
@@ -203,6 +207,8 @@ class JournalBuffer:
 
     def count(self, rejected: RejectedCount) -> None:
         """Add to the entry about one key and kind; these come after all others, whatever room there is."""
+        if len(self._counts) >= COUNTED_KEYS and (rejected.key, rejected.kind) not in self._counts:
+            rejected = replace(rejected, key="")
         before = self._counts.get((rejected.key, rejected.kind))
         if before is not None:
             rejected = replace(rejected, count=before.count + rejected.count)

@@ -10,6 +10,7 @@ from gridpeers.scenarios.record.journal_reader import entries_of
 from gridpeers.wire.codec import encode
 from gridpeers.wire.journal import (
     AT_ONCE,
+    COUNTED_KEYS,
     NOTED_REJECTED,
     SHOWN_PAYLOAD,
     Entry,
@@ -169,3 +170,15 @@ def test_a_flood_of_rejected_messages_does_not_fill_the_journal() -> None:
 
             assert sum(isinstance(entry, ReceivedMessage) for entry in entries) == 1_000 + NOTED_REJECTED
             assert entries[-1] == RejectedCount(at, "state/inv2", "garbled", 1_000 - NOTED_REJECTED)
+
+
+def test_messages_on_keys_without_number_are_counted_by_kind_alone() -> None:
+    """A stranger's keys with wildcards reach every subscriber, and there are as many as he likes."""
+    journal = JournalBuffer()
+    traffic = TickTraffic(KEYS, ("inv2",), journal)
+    for number in range(3 * COUNTED_KEYS):
+        traffic.lost(f"{KEYS.prefix}state/{number}*", "excess", 2, 0.0)
+    *by_key, others = noted(journal)
+
+    assert len(by_key) == COUNTED_KEYS
+    assert others == RejectedCount(None, "", "excess", 4 * COUNTED_KEYS)
