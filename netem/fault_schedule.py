@@ -178,7 +178,8 @@ class LinkSchedules:
 
     def apply(self, change: Change) -> None:
         for link, before in self._schedules.items():
-            self._schedules[link] = changed(before, change, link, self._microgrids).lately(change.from_s)
+            if (after := changed(before, change, link, self._microgrids)) is not before:
+                self._schedules[link] = after.lately(change.from_s)
 
     def of(self, link: Link) -> FaultSchedule:
         """Return the schedule of a link after all changes so far."""
