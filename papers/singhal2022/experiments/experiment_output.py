@@ -10,7 +10,7 @@ import csv
 import io
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -74,8 +74,8 @@ class Page:
     columns: int
     names: Mapping[int, str]
     """Meaning of the styles, for the legend."""
-    looks: Mapping[Look, str] | None = None
-    """Meaning of the looks, for the legend; by default those of measured and predicted."""
+    looks: Mapping[Look, str] = field(default_factory=lambda: {"measured": "measured", "predicted": "predicted"})
+    """Meaning of the looks, for the legend."""
     share_y: bool = False
     height: float = 3.0
     """Height of a row of panels (inch)."""
@@ -166,7 +166,7 @@ def draw(page: Page) -> Figure:
             _draw(axes, panel)
         for axes in grid.flat[len(page.panels) :]:
             axes.set_visible(False)
-        if handles := [*_names(page), *_looks(page)]:
+        if handles := _legend(page):
             longest = max(len(str(handle.get_label())) for handle in handles)
             columns = max(1, min(len(handles), int(15 * width / (longest + 6))))
             figure.legend(handles=handles, loc="outside lower center", ncols=columns)
@@ -242,7 +242,8 @@ def _never(axes: Axes, panel: Panel) -> None:
         axes.annotate(r"$\infty$: not within the run", (1.0, 1.0), ha="right", fontsize=7, color="#444444", **note)
 
 
-def _names(page: Page) -> list[Line2D]:
+def _legend(page: Page) -> list[Line2D]:
+    """Return an entry for each style, and one for filled, hollow and dashed, as far as the page has them."""
     curves = [curve for panel in page.panels for curve in panel.curves]
     used = {curve.look for curve in curves}
     wide = {curve.style for curve in curves if curve.look == "reference"}
@@ -253,21 +254,13 @@ def _names(page: Page) -> list[Line2D]:
             width, alpha = (4.0, 0.6) if i in wide else (1.6, 1.0)
             look = {"linestyle": DASHES[i] if "trace" in used else "-", "lw": width, "alpha": alpha}
         found.append(Line2D([], [], color=COLOURS[i], label=name, **look))
-    return found
-
-
-def _looks(page: Page) -> list[Line2D]:
-    """Return legend entries for filled, hollow and dashed, as far as the page has them."""
-    used = {curve.look for panel in page.panels for curve in panel.curves}
     shapes: dict[str, dict[str, Any]] = {
         "measured": {"marker": "o", "ms": 4.5, "lw": 1.2},
         "points": {"marker": "o", "ms": 4, "lw": 0},
         "hollow": {"marker": "o", "mfc": "none", "ms": 6.5, "lw": 0},
         "predicted": {"linestyle": "--", "lw": 1.6},
-        "limit": {"linestyle": (0, (4, 2)), "lw": 1.4},
     }
-    words: dict[str, str] = {"measured": "measured", "predicted": "predicted"}
-    words = {look: text for look, text in (words if page.looks is None else page.looks).items() if look in used}
+    words = [(shapes[look], text) for look, text in page.looks.items() if look in used]
     if any(panel.lines for panel in page.panels):
-        words["limit"] = "predicted limit"
-    return [Line2D([], [], color="#333333", label=text, **shapes[look]) for look, text in words.items()]
+        words.append(({"linestyle": (0, (4, 2)), "lw": 1.4}, "predicted limit"))
+    return [*found, *(Line2D([], [], color="#333333", label=text, **shape) for shape, text in words)]
