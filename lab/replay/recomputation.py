@@ -34,14 +34,13 @@ class Recomputed(NamedTuple):
 def recomputed(record: RunRecord, agent: str, law: Law | None = None) -> Iterator[Recomputed]:
     """Yield the decisions of an agent, each with its state computed again.
 
-    A law may have a memory, so this begins with the first decision. It ends with the first that is not whole, as where
-    the record is cut off.
+    A law may have a memory, so this begins with the first decision, and each process of the agent has a law of its own
+    unless `law` is given. It ends with the first decision that is not whole, as where the record is cut off.
     """
     config = record.info.agent(agent)
     assert config is not None
     config = config if config.clock == "wall" else config.by_own_clock()
     with ExitStack() as ends:
-        law = law or ends.enter_context(closing(make_law(config.control)))
         core: Agent | None = None
         epoch = -1
         for decision in record.decisions(agent):
@@ -49,7 +48,8 @@ def recomputed(record: RunRecord, agent: str, law: Law | None = None) -> Iterato
                 return
             if core is None or decision.state.epoch != epoch:  # another process of this name
                 epoch = decision.state.epoch
-                core = Agent(replace(config, epoch=epoch), law)
+                own = law or ends.enter_context(closing(make_law(config.control)))
+                core = Agent(replace(config, epoch=epoch), own)
             yield Recomputed(decision, _decided_again(core, config, decision))
 
 

@@ -86,3 +86,57 @@ def test_every_driver_records_what_the_bus_carries(tmp_path: Path) -> None:
                 (d.neighbours, d.before, d.action, d.state) for d in bus.decisions(agent)
             ]
         assert other.events() == bus.events()
+
+
+REJOIN = """
+seed = 7
+[time]
+end_s = 0.8
+[plant]
+feeder = "microgrid123"
+load_set = "main"
+P_set0_pu = 0.647
+[[event]]
+label = "islanding"
+t_s = 0.1
+open = ["13-152"]
+[[event]]
+label = "leave"
+t_s = 0.3
+leave = ["inv2"]
+[[event]]
+label = "return"
+t_s = 0.4
+join = ["inv2"]
+[[link]]
+on = "inv1 -> inv3"
+delay = 0.02
+[case.case]
+secondary = "all"
+graph = "full"
+law = "counting:Counting"
+"""
+
+COUNTING = """
+import gridpeers as gp
+
+
+class Counting(gp.Law):
+    steps = 0
+
+    def step(self, own, neighbours, T):
+        self.steps += 1
+        return gp.SetPoints(0.647 + 1e-4 * (self.steps % 17), 1.0)
+"""
+
+
+def test_each_process_of_an_agent_has_a_law_of_its_own(tmp_path: Path) -> None:
+    """Also one that does not forget at its start; what the last part of the journal would have had is left out."""
+    (tmp_path / "rejoin.toml").write_text(REJOIN, encoding="utf-8")
+    (tmp_path / "counting.py").write_text(COUNTING, encoding="utf-8")
+    record = recorded_run(tmp_path / "rejoin.toml", "case", tmp_path / "case")
+
+    again = list(recomputed(record, "inv2"))
+
+    assert {each.decision.state.epoch for each in again if each.decision.action == "law"} == {1, 2}
+    assert [each.decision.tick for each in again if not each.agrees] == []
