@@ -175,7 +175,10 @@ class RunRecord:
         tick = int(t / self.info.T_c + 1e-6)
         state = self.index.state(agent, tick, t) if self.info.simulated else None
         if state is not None and not (state.idle or self.entries_of_decisions.know(state, state.t)):
-            raise RecordFileError(f"{self.path}: it lacks how {agent} decided at t = {t:g} s: its journal ends before")
+            last = "" if found is None else f"; its last decision in the record is of t = {found.t:.2f} s"
+            raise RecordFileError(
+                f"{self.path}: it lacks how {agent} decided at t = {t:g} s: its journal ends before{last}"
+            )
         if found is None:
             first = next(self.decisions(agent), None)
             more = ", nor later" if first is None else f"; its first decision is of t = {first.t:.2f} s"
