@@ -174,7 +174,7 @@ def test_a_stale_neighbour_is_told(record: RunRecord) -> None:
     """Once its last state is older than max_age it is left out, with what became of the later ones."""
     decision = next(each for each in record.decisions("inv2", since=0.9, until=1.08) if uses(each, "inv1"))
 
-    of = {each.name: each for each in explained(record, decision, decision.t).neighbours}
+    of = {each.name: each for each in explained(record, decision, decision.t, record.events()).neighbours}
 
     assert of["inv3"].why.startswith("stale: older than max_age = 0.25 s; ")
     assert "cut off by a partition" in of["inv3"].why
@@ -254,7 +254,7 @@ def test_each_kind_of_rejected_message_is_told(tmp_path: Path) -> None:
     assert rejected | unread == set(hostile(1))
     assert "oversized" in unread
     decision = next(each for each in found.decisions("inv2", since=3.6) if uses(each, "inv3"))
-    explanation = explained(found, decision, decision.t)
+    explanation = explained(found, decision, decision.t, found.events())
     (told,) = [each.why for each in explanation.neighbours if each.name == "inv1"]
     assert "lost on the link" in told
     for kind in hostile(1):
