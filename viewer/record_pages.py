@@ -215,7 +215,7 @@ class RecordedRun:
     def news(self, case: str, events: int) -> RecordNews:
         """Return what is new of a record, whose first events are known; of the latest without a case."""
         view = self.view(case)
-        record = view.record
+        record, later = view.record, tuple(view.events[events:])  # to read them meets what is damaged
         growth, text = self._growth(record)
         damage = record.damage if growth != "recording" else ()
         return RecordNews(
@@ -225,7 +225,7 @@ class RecordedRun:
             growth=growth,
             text=text,
             notes=(*view.missing, *(f"{each[:1].upper()}{each[1:]}." for each in damage)),
-            events=tuple(view.events[events:]),
+            events=later,
         )
 
     def _files(self) -> dict[str, Path]:
@@ -245,6 +245,8 @@ class RecordedRun:
             return False
 
     def _growth(self, record: RunRecord) -> tuple[Growth, str]:
+        if record.index.file.damaged:
+            return "cut", "The file is damaged, and read up to there."
         if record.complete:
             outcome = record.outcome
             if outcome:

@@ -65,7 +65,8 @@ class RecordFile:
         self.complete = False
         """True if the file was closed properly: everything that was recorded is in it."""
         self._end = ""
-        self._damaged = False
+        self.damaged = False
+        """True once a damaged chunk was met: the file ends there then."""
         self._offset = 0
         """Where the first record begins that could not be read yet."""
         self._topics: dict[int, Topic] = dict(enumerate(get_args(Topic), 1))
@@ -108,7 +109,7 @@ class RecordFile:
 
     def refresh(self) -> None:
         """Note what was written since, of a run that is still recorded."""
-        if self._damaged:
+        if self.damaged:
             return
         try:
             with self.path.open("rb") as file:
@@ -194,7 +195,7 @@ class RecordFile:
             raise RecordFileError(f"{self.path}: cannot be read: {error.strerror}") from None
         except _BROKEN as error:
             del self.ends[index:], self._chunks[index:]
-            self._damaged, self.complete = True, False
+            self.damaged, self.complete = True, False
             why = str(error)[:100] or type(error).__name__
             self._end = f"the file is damaged after t = {self.t_end:.2f} s, and read up to there: {why}"
             return ()
