@@ -173,6 +173,7 @@ class BridgedPlant(FederatePlant):
         """Set-points of the inverters that outside federates control."""
         self._rows, self._events = list(plant.take_rows()), list(plant.take_events())
         self._row_keys = self._keys(plant.inverters, SENSORS, HELD)
+        self._where_keys = self._keys(plant.inverters, WHERE)
         self._where: dict[str, Value] = {}  # flags and names that were published last: they go out when they change
         try:
             asked = topics(self._prefix, outside, SET_POINTS)
@@ -224,7 +225,7 @@ class BridgedPlant(FederatePlant):
         numbers = [float(x) for r in readings for x in (r.f, r.P, r.Q, r.V, r.P_set, r.V_set)]
         before = self._where
         flags: list[Value] = [x for r in readings for x in (r.grid_connected, r.island)]
-        self._where = dict(zip(self._keys(self.inverters, WHERE), flags, strict=True))
+        self._where = dict(zip(self._where_keys, flags, strict=True))
         changed = {key: value for key, value in self._where.items() if before.get(key) != value}
         told = {self._events_key: msgspec.json.encode(tuple(happened)).decode()} if happened else {}
         return {**dict(zip(self._row_keys, numbers, strict=True)), **changed, **told}
