@@ -37,9 +37,9 @@ def main() -> None:
 
 
 def read_circuit(request: dict[str, Any], tell: Tell) -> FeederImport:
-    """Return the circuit of a script, of the arguments of `read_opendss`; FeederError has all that the engine refuses.
+    """Return the circuit of a script; FeederError has all that the engine refuses.
 
-    What the engine writes by itself goes where this process stands.
+    `request` has the arguments of `read_opendss`. What the engine writes by itself goes where this process stands.
     """
     path, wanted = Path(request["path"]), request["switches"]
     try:
@@ -61,8 +61,7 @@ def read_circuit(request: dict[str, Any], tell: Tell) -> FeederImport:
     everything = [str(element.Name).lower() for element in elements if element.Enabled]
     left_out = found.leave_out(everything, request["leave_out"], "PVSystem.pv1")
     there = [name for name in everything if name not in left_out]
-    taken = DssElements(engine, found, wanted)
-    taken.order = [(taken.bus_names[bus], letter_of(int(number))) for bus, _, number in nodes]
+    taken = DssElements(engine, found, wanted, [(bus, letter_of(int(number))) for bus, _, number in nodes])
     found.V = dict(zip(taken.order, complexes(circuit.YNodeVarray).tolist(), strict=True))
     generated: list[LoadPart] = []
     for name in there:
@@ -97,13 +96,13 @@ class DssElements:
     Lines that are named in `switches` can be opened, beside the script's own switches.
     """
 
-    def __init__(self, engine: DssEngine, found: FeederImport, switches: Sequence[str]) -> None:
+    def __init__(self, engine: DssEngine, found: FeederImport, switches: Sequence[str], order: Sequence[Node]) -> None:
         self._engine, self._found = engine, found
         self._wanted = {name.lower() for name in switches}
         names = [str(name).lower() for name in engine.circuit.AllBusNames]
         self.bus_names = found.name_buses(names)  # by those of the script
         self.unbased: list[str] = []  # buses without a voltage base
-        self.order: list[Node] = []  # nodes in the engine's order
+        self.order = [(self.bus_names[bus], letter) for bus, letter in order]  # nodes in the engine's order
         for name in names:
             found.buses[self.bus_names[name]] = self._place(name)
 
