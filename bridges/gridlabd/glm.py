@@ -209,8 +209,9 @@ def export_glm(feeder: Feeder, settings: PlantSettings, seconds: int, voltages: 
     has all that the model cannot represent; without an operating point it is a RuntimeError.
     """
     problems = unrepresentable(feeder)
+    parameters = {row.name: feeder.parameters_of(row, settings.gfm, settings.gfl) for row in feeder.inverters}
     for row in feeder.inverters:
-        for key, value in beyond_gridlabd(feeder.parameters_of(row, settings.gfm, settings.gfl)).items():
+        for key, value in beyond_gridlabd(parameters[row.name]).items():
             problems.append(f"{row.name} has {key} = {value}, which no {row.kind} of GridLAB-D has; leave it out")
     if problems:
         raise FeederError(feeder.name, tuple(problems))
@@ -218,7 +219,6 @@ def export_glm(feeder: Feeder, settings: PlantSettings, seconds: int, voltages: 
         folder = Path(name)
         write_tables(feeder, folder)
         if feeder.inverters:
-            parameters = {row.name: feeder.parameters_of(row, settings.gfm, settings.gfl) for row in feeder.inverters}
             plant = Plant(Network(feeder), settings, settings.h, settings.h)
             start = {name: complex(reading.P, reading.Q) for name, reading in plant.measure().items()}
             text = write_glm(folder, feeder.load_set, start, parameters, settings.h, seconds)
