@@ -126,7 +126,7 @@ class AgentMoments:
         counts: Counter[str] = Counter()
         for part in self._index.near(since, until):
             for name, times in self._sent_in(part).items():
-                counts[name] += bisect_right(times, until + 1e-9) - bisect_right(times, since + 1e-9)
+                counts[name] += _between(times, since, until)
         return counts
 
     def _in_ticks(self, t: float) -> list[AgentMoment]:
