@@ -305,8 +305,8 @@ def shrink_number(
     lacks: list[MachineError] = []
 
     def row_of(schedule: Schedule) -> ChaosRow:
-        again = violated == REPEATS
-        row = run_schedule(base, schedule, seed_of(seed, number), number, driver, again=again, within=within)
+        repeats = violated == REPEATS
+        row = run_schedule(base, schedule, seed_of(seed, number), number, driver, again=repeats, within=within)
         return rows.setdefault(msgspec.json.encode(schedule), row)
 
     def fails(schedule: Schedule) -> bool:
