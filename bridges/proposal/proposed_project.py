@@ -154,7 +154,8 @@ class _Project:
     def can_start(self) -> bool:
         """Choose the largest part of P_set0 with which the plant starts; say why there is none."""
         problems = []
-        for self.part in PARTS:
+        for part in PARTS:
+            self.part = part
             if not (problem := start_problem(*self.write())):
                 return True
             problems.append(problem)
