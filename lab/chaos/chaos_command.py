@@ -177,7 +177,7 @@ def _try_undisturbed(console: Console, campaign: Campaign) -> None:
 
 @contextmanager
 def _told_if_ended(campaign: Campaign, words: list[str]) -> Iterator[None]:
-    """Say what is kept of a campaign that ends early, and by which command, in words, it goes on."""
+    """Say what is kept of a campaign that ends early; the command of these words takes it up with --resume."""
     from gridpeers.cli.usage import exit_code, interruptible
     from gridpeers.lab.chaos.chaos_run import MachineError, machine_error
     from gridpeers.scenarios.results.run_files import refusal, shown
