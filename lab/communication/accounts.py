@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict, deque
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from itertools import takewhile
+from itertools import permutations, takewhile
 from math import inf, nextafter
 
 from gridpeers.lab.communication.sent_states import Link, SentState, SentStates, StateWindow, Uses
@@ -228,15 +228,13 @@ class Heals:
         self._listens: set[Link] = set()
         self._losses: dict[Link, list[Span]] = {}
         """Planned cuts and losses of each link."""
-        setup, names = info.emulation, info.agent_names
-        for link in ((src, dst) for src in names for dst in names if src != dst):
-            if setup is None:
-                break
-            spans = setup.netem.spans(LinkEnds(*link), setup.microgrids)
-            self._losses[link] = [span for span in spans if span.kind in LOSSES]
-            for t, again in _ends(self._losses[link]):
-                if t < t_end:
-                    self._add(Heal(link, t, lost_again=again))
+        if setup := info.emulation:
+            for link in permutations(info.agent_names, 2):
+                spans = setup.netem.spans(LinkEnds(*link), setup.microgrids)
+                self._losses[link] = [span for span in spans if span.kind in LOSSES]
+                for t, again in _ends(self._losses[link]):
+                    if t < t_end:
+                        self._add(Heal(link, t, lost_again=again))
 
     def trace(self, trace: LinkTrace) -> None:
         link = trace.src, trace.dst
