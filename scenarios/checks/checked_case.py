@@ -150,11 +150,15 @@ class CheckedCase:
         end = self.scenario.time.end_s
         return read_only(self.history.until(end)) if window.end <= end < self.history.t[-1] else self.history
 
-    def parts(self, window: Window) -> list[IslandWindow]:
-        """Return each island with inverters at the end of a window, see `islands_at_end`.
+    @cached_property
+    def parts(self) -> Mapping[Window, Sequence[IslandWindow]]:
+        """Each island with inverters at the end of each window, see `islands_at_end`.
 
         An island that came about within the window is judged from then on (`rows_from`).
         """
+        return {window: self._parts_of(window) for window in self.windows}
+
+    def _parts_of(self, window: Window) -> list[IslandWindow]:
         rows, found = window.cut(self.seen_by(window)), []
         for name, island in (at_end := islands_at_end(self.islands, window)).items():
             label = window.label + (f", island of {name}" if len(at_end) > 1 else "")

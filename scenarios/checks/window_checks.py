@@ -32,7 +32,7 @@ def _each_island(
     if not case.windows:
         raise NotJudgedError("the run has no event")
     judged = 0
-    for part in (part for window in case.windows for part in case.parts(window) if part.history.t.size):
+    for part in (part for parts in case.parts.values() for part in parts if part.history.t.size):
         found = judge(part, case.rows_from(part, delay_s, since_s))
         if found is not None:
             judged += 1

@@ -103,7 +103,7 @@ def find(cases: Mapping[str, CheckedCase]) -> Findings:
         results[name], settled[name], islands[name] = {}, {}, {}
         own |= {name: {}} if metrics else {}
         for window in case.windows:
-            parts = case.parts(window)
+            parts = case.parts[window]
             several = {
                 part.nameplates.names[0]: measure(part.history, part.nameplates, window, f_nom)
                 for part in parts

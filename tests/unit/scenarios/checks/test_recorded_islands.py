@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import pytest
@@ -14,8 +15,8 @@ from gridpeers.wire.messages import PlantEvent
 from tests.unit.scenarios.checks.cases import ran, verdict
 
 
-def _parts(case: CheckedCase, label: str) -> list[IslandWindow]:
-    return next(case.parts(window) for window in case.windows if window.label == label)
+def _parts(case: CheckedCase, label: str) -> Sequence[IslandWindow]:
+    return next(parts for window, parts in case.parts.items() if window.label == label)
 
 
 def _islands(case: CheckedCase, label: str) -> set[tuple[str, ...]]:
