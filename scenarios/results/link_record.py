@@ -58,10 +58,12 @@ class LinkRecord:
     def _keep(self, traces: tuple[LinkTrace, ...]) -> None:
         if traces and self._path is not None and not self._parts:
             self._file = self._path.open("w+b")
+        self._file.seek(0, SEEK_END)
         for trace in traces:
-            self._parts.setdefault((trace.src, trace.dst), []).append(self._file.seek(0, SEEK_END))
+            self._parts.setdefault((trace.src, trace.dst), []).append(self._file.tell())
             encoded = _encode(trace)
             self._file.write(len(encoded).to_bytes(_SIZE, "little") + encoded)
+        self._file.flush()  # a run that is killed leaves its verdicts
 
     @property
     def sent(self) -> int:
