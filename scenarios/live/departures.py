@@ -168,9 +168,11 @@ def _departures(
     first = {row.name for row in feeder.inverters}
     for event in events:
         done, name = "", event.subject
-        if event.kind == "switch" and not event.text.endswith(" already"):  # to open an open switch changes nothing
+        if event.kind in ("switch", "load") and event.text.endswith(" already"):
+            continue  # to open an open switch changes nothing
+        if event.kind == "switch":
             done, name = "closed" if is_closed(event) else "opened", switches.get(name, name)
-        elif event.kind == "load" and not event.text.endswith(" already"):
+        elif event.kind == "load":
             done = "load"
         elif event.kind == "roster" and not _AGAIN.match(event.text):
             if _SILENCE.match(event.text) and any(
