@@ -78,7 +78,7 @@ class Constant(DelayModel, frozen=True, kw_only=True, tag="constant"):
 class Uniform(RandomDelay, frozen=True, kw_only=True, tag="uniform"):
     """Delay uniform on (low, high): F^-1(u) = low + u (high - low)."""
 
-    low_s: Annotated[float, Unit("s"), DELAY, Below("high_s", unit="s")]
+    low_s: Annotated[float, Unit("s"), DELAY, Below("high_s")]
     """Shortest delay (s)."""
     high_s: Annotated[float, Unit("s"), DELAY]
     """Longest delay (s)."""

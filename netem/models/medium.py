@@ -90,15 +90,13 @@ class Slots(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
     period_s: Annotated[float, Unit("s"), Plausible("the period of slots", 0.0, 10.0, above_zero=True)]
     """Distance of the slots' beginnings (s)."""
-    offset_s: Annotated[float, Unit("s"), Plausible("the offset of slots", 0.0, 10.0), Below("period_s", unit="s")] = (
-        0.0
-    )
+    offset_s: Annotated[float, Unit("s"), Plausible("the offset of slots", 0.0, 10.0), Below("period_s")] = 0.0
     """Beginning of the first slot (s), below period_s."""
     length_s: Annotated[
         float,
         Unit("s"),
         Plausible("the length of a slot", 0.0, 10.0, above_zero=True),
-        Below("period_s", or_equal=True, unit="s"),
+        Below("period_s", or_equal=True),
     ]
     """Length of a slot (s), up to period_s."""
 

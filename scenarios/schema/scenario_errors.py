@@ -97,7 +97,8 @@ class Problems:
 
 def multiple(path: str, value: float, of: str, step: float, rule: str, problems: Problems) -> None:
     """Note a time (s) that is no whole multiple of a step (s); `rule` says what takes place at such times."""
-    if not problems.touch(path, of) and (text := MultipleOf(of).objection(value, step, of.rpartition(".")[2], rule)):
+    key = of.rpartition(".")[2]
+    if not problems.touch(path, of) and (text := MultipleOf(of).objection(value, step, key, " s", rule)):
         problems.add(path, text)
 
 

@@ -341,55 +341,53 @@ class Relation:
     only_with: str = ""
     """Name of a field without which, or with 0 in which, the relation does not hold."""
 
-    def objection(self, value: float, other: float, key: str) -> str:
-        """Return why a number contradicts the one at `key`, "" if it does not."""
+    def objection(self, value: float, other: float, key: str, unit: str) -> str:
+        """Return why a number contradicts the one at `key`, "" if it does not; `unit`: of both, after a space."""
         raise NotImplementedError
 
 
 @dataclass(frozen=True)
 class Below(Relation):
     or_equal: bool = False
-    unit: str = ""
-    """Unit of both, where the message is to name it."""
 
-    def objection(self, value: float, other: float, key: str) -> str:
+    def objection(self, value: float, other: float, key: str, unit: str) -> str:
         if value <= other if self.or_equal else value < other:
             return ""
         rule = "not be above" if self.or_equal else "be below"
-        unit = self.unit and f" {self.unit}"
         return f"{value:g}{unit} must {rule} {key} = {other:g}{unit}; swap them or set both"
 
 
 class After(Relation):
-    """An end (s) that must come after the beginning of another field."""
+    """An end that must come after the beginning of another field."""
 
-    def objection(self, value: float, other: float, key: str) -> str:
+    def objection(self, value: float, other: float, key: str, unit: str) -> str:
         if value > other:
             return ""
-        return f"{value:g} s is not after {key} = {other:g} s, so that the entry never holds"
+        return f"{value:g}{unit} is not after {key} = {other:g}{unit}, so that the entry never holds"
 
 
 class MultipleOf(Relation):
-    """A time (s) that must be a whole multiple of the step (s) of another field."""
+    """A time that must be a whole multiple of the step of another field."""
 
-    def objection(self, value: float, other: float, key: str, rule: str = "") -> str:
+    def objection(self, value: float, other: float, key: str, unit: str, rule: str = "") -> str:
         if value <= 0 or other <= 0 or _whole(value / other):
             return ""
         near = f"{max(round(value / other), 1) * other:.9g}"
-        return f"{value:g} s is not a multiple of {key} = {other:g} s{rule and f', {rule}'}; the nearest is {near}"
+        rule = rule and f", {rule}"
+        return f"{value:g}{unit} is not a multiple of {key} = {other:g}{unit}{rule}; the nearest is {near}"
 
 
 class Divides(Relation):
-    """A step (s) that must divide the time (s) of another field."""
+    """A step that must divide the time of another field."""
 
-    def objection(self, value: float, other: float, key: str) -> str:
+    def objection(self, value: float, other: float, key: str, unit: str) -> str:
         if value <= 0 or other <= 0 or _whole(other / value):
             return ""
         ratio = other / value
         # a step that can be written down in microseconds, for 0.02 / 7 cannot be typed
         whole = [n for n in range(1, 2 * round(ratio) + 2) if abs(round(other / n, 6) * n - other) < 1e-12]
         near = other / min(whole, key=lambda n: abs(n - ratio), default=1)
-        return f"{value:g} s does not divide {key} = {other:g} s; the nearest that does is {near:g}"
+        return f"{value:g}{unit} does not divide {key} = {other:g}{unit}; the nearest that does is {near:g}"
 
 
 def _whole(ratio: float) -> bool:
@@ -407,7 +405,8 @@ def contradictions(cls: type, values: Any, known: Callable[[Field], bool] = lamb
             if idle or (relation.only_with and not getattr(values, relation.only_with)):
                 continue
             numbers = getattr(values, field.name), getattr(values, other.name)
-            if None not in numbers and (text := relation.objection(*numbers, other.key)):
+            unit = field.unit and f" {field.unit}"
+            if None not in numbers and (text := relation.objection(*numbers, other.key, unit)):
                 found[field.key] = text
     return [Problem(key, text) for key, text in found.items()]
 

@@ -158,7 +158,7 @@ def _text(path: Path) -> str:
     ({}, r'case.IV.law: needs one of use, command, fmu; got none; e.g. law = "mine:Mine"'),
     ({"use": "dapi", "fmu": "x.fmu"}, r"case.IV.law: needs one of use, command, fmu; got use and fmu"),
     ({"command": ["ls"], "folder": "/nowhere"}, r"case.IV.law.folder: there is no folder /nowhere"),
-    ({"use": "dapi", "P_set_min": 1.0, "P_set_max": 0.5}, r"law.P_set_min: 1 must not be above P_set_max = 0.5"),
+    ({"use": "dapi", "P_set_min": 1.0, "P_set_max": 0.5}, r"law.P_set_min: 1 pu must not be above P_set_max = 0.5 pu"),
     ({"command": "./nothing"}, r"case.IV.law.command: must be a list such as .*, the program first"),
     ({"fmu": __file__, "folder": "/"}, r"case.IV.law.fmu: test_failing_laws.py is no FMU: BadZipFile"),
 ])  # fmt: skip

@@ -84,7 +84,7 @@ def test_all_mistakes_of_a_set_come_at_once(tmp_path: Path) -> None:
         'row 3: set "a": T_pf_s: 20 s is not plausible for a time constant (1e-05 to 10 s); did you mean 0.02 (20 ms)?',
         'row 4: set "a": T_vf_s: must be a number, got "x"',
         'row 7: set "b" has P_max_pu already; give each parameter once',
-        'set "b": P_min_pu: 0.5 must be below P_max_pu = 0.1; swap them or set both',
+        'set "b": P_min_pu: 0.5 pu must be below P_max_pu = 0.1 pu; swap them or set both',
         'inverters.csv row 2: parameters "c": a GFM has no S_max_pu; give it a set of its own',
         'inverters.csv row 3: parameters "d": no such set; the sets are a, b, c, regfm_a1, regfm_a1_vflag0',
     ):
@@ -99,7 +99,10 @@ def test_all_mistakes_of_a_set_come_at_once(tmp_path: Path) -> None:
         ('[plant.inverter.inv2]\nparameters = "slwo"', r'no parameter set "slwo"; did you mean "slow"\?'),
         ('[plant.inverter.inv1]\nparameters = "slow"', r'set "slow" has k_pPLL, which a GFM has not'),
         ("[plant.inverter.inv1]\nT_p = 0.1", r"plant.inverter.inv1.T_p: unknown key; write T_p_s, in seconds"),
-        ("[plant.inverter.inv1]\nP_min_pu = 1.1", r"inv1.P_min_pu: 1.1 must be below P_max_pu = 1; .*\[plant.gfm\]"),
+        (
+            "[plant.inverter.inv1]\nP_min_pu = 1.1",
+            r"inv1.P_min_pu: 1.1 pu must be below P_max_pu = 1 pu; .*\[plant.gfm\]",
+        ),
         ("[plant.inverter.inv1]\nP_max_pu = 0.5", r"0.647 pu is above P_max_pu of inv1 = 0.5 pu"),
         ("[plant.inverter.inv1]\nT_p_s = 0.005", r"too long a step for T_p_s = 0.005 s of \[plant.inverter.inv1\]"),
     ],
