@@ -273,7 +273,9 @@ class Field(NamedTuple):
         return self.make_default()
 
     def objection(self, value: Any) -> str:
-        """Return why a number cannot be the field's, "" if it can."""
+        """Return why a number cannot be the field's, "" if it can, or if the value is None."""
+        if value is None:
+            return ""
         if (allowed := self._allowed) and (text := allowed.objection(value, self.unit)):
             return text
         return f"must be a finite number, got {value}" if isinstance(value, float) and not math.isfinite(value) else ""

@@ -2,12 +2,14 @@
 
 from collections.abc import Iterator
 from importlib import metadata
+from typing import Annotated
 
 import pytest
 
 from gridpeers.agents.graphs import GRAPHS, ring
 from gridpeers.wire.plugins import registry
 from gridpeers.wire.plugins.plugin import Plugin, callable_objection, made, plugin_problems
+from gridpeers.wire.schema.table_schema import Plausible, Range
 
 
 @pytest.fixture
@@ -45,6 +47,8 @@ def test_a_default_may_be_anything_of_its_type() -> None:
     class Star:
         hub: str | None = None
         reach: float | None = None
+        most: Annotated[float | None, Range(0, 10)] = None
+        delay_s: Annotated[float | None, Plausible("a delay", 0, 10)] = None
 
         def __call__(self, members: object) -> dict[str, set[str]]:
             return {}
