@@ -164,9 +164,10 @@ class Trace(DelayModel, frozen=True, kw_only=True, tag="trace"):
     def relations(self) -> list[Problem]:
         if not self.delays_s:
             return [] if self.file else [Problem("", 'a trace needs delays: write file = "delays.csv"')]
-        wrong = ((i, DELAY.objection(delay_s, "s")) for i, delay_s in enumerate(self.delays_s))
-        first = next(((i, text) for i, text in wrong if text), None)  # of a file each row has been told
-        return [Problem(f"delays_s[{first[0]}]", first[1])] if first else []
+        for i, delay_s in enumerate(self.delays_s):
+            if text := DELAY.objection(delay_s, "s"):
+                return [Problem(f"delays_s[{i}]", text)]  # one is enough: each row of a file is checked as it is read
+        return []
 
 
 AnyDelay = Constant | Uniform | Normal | Lognormal | Pareto | Trace
