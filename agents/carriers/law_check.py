@@ -31,7 +31,8 @@ def executable_problem(file: Path) -> str:
         return "has no first line such as #!/usr/bin/env python3, and is no compiled program; write one"
     if first.endswith(b"\r\n"):
         return "has lines that end as those of Windows, which #! cannot have; write it with Unix line ends"
-    interpreter, _, argument = first[2:].decode(errors="replace").strip().partition(" ")
+    line = first[2:].decode(errors="replace").strip().replace("\t", " ")
+    interpreter, _, argument = line.partition(" ")
     if not Path(interpreter).is_file():
         return f"asks in its first line for {interpreter or 'nothing'}, which is not there"
     argument = argument.strip()  # the system hands it on as one, blanks included

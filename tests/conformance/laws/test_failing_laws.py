@@ -175,6 +175,7 @@ def test_a_law_that_cannot_work_is_refused_before_anything_starts(law: Any, said
     ("print(1)\n", r"\./law has no first line such as #!/usr/bin/env python3, and is no compiled program; write one"),
     ("#!/nowhere/python\n", r"\./law asks in its first line for /nowhere/python, which is not there"),
     ("#!/usr/bin/env pithon3\n", r"\./law asks in its first line for pithon3, which is not there"),
+    ("#!/usr/bin/env\tpithon3\n", r"\./law asks in its first line for pithon3, which is not there"),
     ("#!/usr/bin/env python3 -u\n", r"\./law asks in its first line for python3 -u, which is not there"),
     ("#!/bin/sh\r\n", r"\./law has lines that end as those of Windows"),
 ])  # fmt: skip
