@@ -79,7 +79,10 @@ class LiveNetwork:
         self.reduction = self.reduced(circuit)
 
     def guess(self) -> None:
-        """Start the next solution from the last voltages, or where these were almost 0 from nominal ones in step."""
+        """Start the next solution from the last voltages.
+
+        Where these were almost 0 it starts from nominal ones, at the angle of the first GFM of the island.
+        """
         theta = self._inverters.theta() - np.angle(PHASES)[self._inverters.phase]
         angle = np.array([theta[k] if k >= 0 else 0.0 for k in self.reduction.leader])
         C = self.circuit.C.tocsc()
@@ -166,7 +169,7 @@ class LiveNetwork:
 def unsettled_island(net: Reduced, units: Units, x: Real, tolerance: float) -> int:
     """Return the island whose voltages still change most after as many iterations as the inner loop takes.
 
-    `net`: linearised at the present angles; `units`, `x`: where a solution within the current limits began, and failed.
+    A solution within the current limits began at `units` and `x`, and failed. `net`: linearised at the present angles.
     """
     x, J, V, limiting = x.copy(), units.J.copy(), units.V.copy(), units.limiting.copy()
     I_b = np.empty(x.size // 2, complex)

@@ -87,7 +87,10 @@ class Network:
         return text if text in self.switches else switch_name(self.feeder, text)
 
     def merge(self, closed: frozenset[str]) -> Merge:
-        """Return the nodes merged by these switches and the regulators; a source's or inverter's node represents."""
+        """Return the nodes that these switches and the regulators merge.
+
+        The node of a source or an inverter represents those that are merged with it.
+        """
         return merge_nodes(self._node_names(), self._ties(closed), self._wanted)
 
     def admittance(self, closed: frozenset[str]) -> sp.csc_array:
