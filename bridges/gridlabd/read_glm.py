@@ -76,17 +76,17 @@ def solved_model(path: Path, text: GlmText) -> dict[str, Any]:
             silent = f"GridLAB-D's process {last} and said nothing; run the model in GridLAB-D"
             model, said = {}, silent if error.ended else f"GridLAB-D: {last}"
         printed = messages(engine.printed)
-    if model.get("has_powerflow", True) and said:
+    if not model.get("has_powerflow", True):
+        raise FeederError(
+            path.name, (f"{path.name}: does not load GridLAB-D's powerflow; a feeder has a line module powerflow;",)
+        )
+    if said:
         problems = printed or [said]
         if (method := model.get("method", "NR")) != "NR":
             problems.append(f"{path.name}: has solver_method {method}, and is solved with NR here; try NR there, too")
         places = [text.place(match[1]) if (match := OBJECT.search(problem)) else "" for problem in problems]
         placed = (f"{at}: {problem}" if at else problem for at, problem in zip(places, problems, strict=True))
         raise FeederError(path.name, tuple(placed))
-    if said:
-        raise FeederError(
-            path.name, (f"{path.name}: does not load GridLAB-D's powerflow; a feeder has a line module powerflow;",)
-        )
     return model
 
 
