@@ -106,7 +106,7 @@ class ExperimentResult:
     digits: int = 3
     """Significant digits in Markdown; CSV has all."""
     apart: int = 0
-    """So many first columns split the table in Markdown: one table for each of their values."""
+    """Number of leading columns that split the table in Markdown: one table for each combination of their values."""
 
     def write(self, folder: Path) -> tuple[Path, ...]:
         """Write figure.png, table.csv and table.md into a folder; return the files."""

@@ -216,18 +216,7 @@ def places(sweep: SweepData) -> ExperimentResult:
     """
     panels, rows = [], []
     for (index, least, title, y_label, k_q), (on, place) in product(SWINGS, PLACES):
-        panel = Panel(
-            title=f"{title}: late {place}",
-            x_label=f"delay of {place} (s)",
-            y_label=y_label,
-            curves=(curves := []),
-            lines=(lines := []),
-            level=least,
-            log="y",
-            x_range=(-0.01, 0.62),
-            y_range=(LEAST, 1.0),
-        )
-        panels.append(panel)
+        curves, lines = [], []
         for style, case in enumerate(GRAPHS):
             x, y = sweep.curve(DELAY, index, {"case": case, ON: on, K_Q: k_q})
             curves.append(Curve(x, np.maximum(y, LEAST), style))
@@ -237,6 +226,18 @@ def places(sweep: SweepData) -> ExperimentResult:
             calm_s, swings_s = _between(x, y < least)
             row = {"what swings": title, "late": place, "graph": case, "predicted limit (s)": limit}
             rows.append(row | {"calm up to (s)": calm_s, "swings from (s)": swings_s})
+        panel = Panel(
+            title=f"{title}: late {place}",
+            x_label=f"delay of {place} (s)",
+            y_label=y_label,
+            curves=curves,
+            lines=lines,
+            level=least,
+            log="y",
+            x_range=(-0.01, 0.62),
+            y_range=(LEAST, 1.0),
+        )
+        panels.append(panel)
     page = Page(
         title="Where a delay sits decides whether it destabilises",
         panels=panels,

@@ -189,12 +189,17 @@ def machine() -> str:
 def metrics_json(whole: Reproduction) -> str:
     """Return the text of metrics.json: every number of the tables beside the paper's, every verdict, every measure."""
     claims = [
-        {"part": result.part.name, "claim": claim.name, "text": claim.text, "source": claim.source}
-        | {"status": verdict.status, "found": verdict.found}
-        | {"reason": claim.known_miss if verdict.status == "MISS" else ""}
+        {
+            "part": result.part.name,
+            "claim": verdict.claim.name,
+            "text": verdict.claim.text,
+            "source": verdict.claim.source,
+            "status": verdict.status,
+            "found": verdict.found,
+            "reason": verdict.claim.known_miss if verdict.status == "MISS" else "",
+        }
         for result in whole.results
         for verdict in result.verdicts
-        for claim in (verdict.claim,)
     ]
     topology = [
         {"links": run.links, "connected": run.connected}
