@@ -108,10 +108,12 @@ def show(keys: _Keys = Path()) -> None:
         typer.echo(f"site {known.site}, {LIST} is version {known.version}{authority}")
         width = max(len(member.name) for member in known.members)
         for member in sorted(known.members, key=lambda member: (member.role, member.name)):
-            key, state, here = f"{member.name}.key", "revoked", ""
+            state, here = "revoked", ""
             if not member.revoked:
                 state = f"{'expired ' if member.expires < now else 'valid    until'} {member.expires}"
-                here = ", key here" * (keys / key).is_file() + ", but see below" * (key in warnings)
+                key = f"{member.name}.key"
+                if (keys / key).is_file():
+                    here = ", key here, but see below" if key in warnings else ", key here"
             typer.echo(f"{member.role:9} {member.name:{width}}  {state}{here}")
         for warning in warnings.values():
             typer.echo(f"WARNING  {warning}")
