@@ -6,14 +6,15 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from time import monotonic
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from gridpeers.scenarios.short_texts import duration
 
-TellCase = Callable[[str, float, float], None]
-"""Takes a case, the time that it has reached and its end (s)."""
+if TYPE_CHECKING:
+    from gridpeers.scenarios.run_request import Progress as TellCase
 
 TellPart = Callable[[str, float], None]
 """Takes the present work, with its part behind a comma, and the amount of all that is done."""
