@@ -228,7 +228,7 @@ def glm(
 
 
 GROWN = Path(__file__).parents[1] / "grown_feeder.toml"
-"""Text of the scenario that `grow` writes, with fields in braces."""
+"""File with the text of the scenario that `grow` writes, with fields in braces."""
 
 
 @app.command()

@@ -64,7 +64,7 @@ class LiveRun:
     @contextmanager
     def client(self, *, meet_agents: bool = False, acts: bool = False) -> Iterator[RunClient]:
         """Yield a client to the run once its plant is there; one that `acts` changes something, which no viewer may."""
-        from gridpeers.scenarios.live.run_client import RunClient  # with Zenoh, which the help does without
+        from gridpeers.scenarios.live.run_client import RunClient  # the help does without a session
 
         check_wait(self.wait)
         roles: tuple[Role, ...] = COMMANDING if acts else ("operator", "viewer")

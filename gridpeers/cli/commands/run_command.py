@@ -162,7 +162,7 @@ def carry_out(
             why = f"FAILED  {error}" if by_law else f"the run broke: {error}"
             fail([why, *([left] if folder.is_dir() else [])], CLAIM_FAILED if by_law else BROKEN)
         from gridpeers.scenarios.checks.check_registry import LAW_FAILED
-        from gridpeers.scenarios.results.report import show  # with numpy, which no run waits for
+        from gridpeers.scenarios.results.report import show  # imports numpy, which the run does without
 
         show(report, console)
     failed = any(verdict.status == "FAIL" for verdict in report.verdicts) or report.fails(LAW_FAILED)

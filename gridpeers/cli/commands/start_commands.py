@@ -78,12 +78,7 @@ class Start:
 
 def _start(start: Start, *, agents: bool) -> None:
     """Run the plant, with its agents or without, until it ends; end with its exit code."""
-    from gridpeers.scenarios.live.live_options import (
-        check_alone,
-        chosen_case,
-        configure,
-        endpoint_for_run,
-    )
+    from gridpeers.scenarios.live.live_options import check_alone, chosen_case, configure, endpoint_for_run
 
     # first: reading a scenario takes seconds, and a forgotten run is reported at once
     run = check_name("--run", start.run)
