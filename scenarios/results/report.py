@@ -165,31 +165,18 @@ def _grid(report: RunReport, title: str, quantities: tuple[Quantity, ...]) -> Gr
 
     A value that is not steady is no number: the first words of its reason stand there, and all of it below the table.
     """
-    found, timed = report.findings, "f_error_Hz" in quantities
+    found = report.findings
     events = list(dict.fromkeys(event for steady in found.results.values() for event in steady))
-    columns = [*(heading(quantity, found.f_nom) for quantity in quantities), *["restored in"] * timed]
+    columns = [heading(quantity, found.f_nom) for quantity in quantities]
+    columns += ["restored in"] if "f_error_Hz" in quantities else []
     header = ("case", *(f"{event}\n{column}" for event in events for column in columns))
     rows, legend = [], []
-    for case, results in found.results.items():
+    for case in found.results:
         for island in ("", *dict.fromkeys(name for parts in found.islands.get(case, {}).values() for name in parts)):
-            row = [f"  island of {island}" if island else _case(report, case)]
-            for event in events:
-                islands = found.apart(case, event)
-                values = islands.get(island) if island else results.get(event)
-                if values is None:
-                    row += [""] * len(columns)
-                    continue
-                mixed = bool(islands) and not island
-                for name in quantities:
-                    dash = mixed and name in SHARING
-                    row.append("-" if dash else _cell(report, case, event, name, values, island))
-                    if name in values.reasons and not dash:
-                        where = f"{event}, island of {island}" if island else event
-                        legend.append(f"case {case}, {where}: {_why(values, name, found.f_nom)}")
-                if timed:
-                    restored = "never" if values.t_restore_s is None else f"{values.t_restore_s:.2f} s"
-                    row.append("-" if mixed or _nothing_shared(values, "MPSI") else restored)
-            rows.append(tuple(row))
+            words = f"  island of {island}" if island else _case(report, case)
+            cells = [cell for event in events for cell in _cells(report, case, event, island, quantities)]
+            rows.append((words, *(text for text, _ in cells)))
+            legend += [why for _, why in cells if why]
     beside = [one for one in report.benchmark.numbers if one.quantity in quantities and found.has(one)]
     sources = dict.fromkeys(one.source for one in beside)
     against = f", ours | paper's {' and '.join(sources)}" if sources else ""
@@ -200,6 +187,29 @@ def _grid(report: RunReport, title: str, quantities: tuple[Quantity, ...]) -> Gr
 
 def _case(report: RunReport, case: str) -> str:
     return f"{case} {report.titles.get(case, '')}".strip()
+
+
+def _cells(
+    report: RunReport, case: str, event: str, island: str, quantities: tuple[Quantity, ...]
+) -> Iterator[tuple[str, str]]:
+    """Yield the text of each cell of an event in a row, and for the legend why it is no number, or ""."""
+    found, timed = report.findings, "f_error_Hz" in quantities
+    islands = found.apart(case, event)
+    values = islands.get(island) if island else found.results[case].get(event)
+    if values is None:
+        yield from [("", "")] * (len(quantities) + timed)
+        return
+    mixed = bool(islands) and not island
+    where = f"{event}, island of {island}" if island else event
+    for name in quantities:
+        if mixed and name in SHARING:
+            yield "-", ""
+            continue
+        why = f"case {case}, {where}: {_why(values, name, found.f_nom)}" if name in values.reasons else ""
+        yield _cell(report, case, event, name, values, island), why
+    if timed:
+        restored = "never" if values.t_restore_s is None else f"{values.t_restore_s:.2f} s"
+        yield "-" if mixed or _nothing_shared(values, "MPSI") else restored, ""
 
 
 def _cell(report: RunReport, case: str, event: str, quantity: Quantity, values: Steady, island: str) -> str:
