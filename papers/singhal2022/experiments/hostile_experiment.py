@@ -77,12 +77,12 @@ def hostile(sweep: SweepData) -> ExperimentResult:
         share_y=True,
         height=3.0,
     )
-    rows = [
+    table = [
         {"graph": case, "numbers": what, "attack": attack}
         | {defence: cell(measured(case, attack, defence)) for defence in defences}
         for case, (what, cell), attack in product(GRAPHS, CELLS.items(), attacks)
     ]
-    return ExperimentResult(page, rows, apart=2)
+    return ExperimentResult(page, table, apart=2)
 
 
 def frequency_cell(found: Mapping[str, float]) -> str:

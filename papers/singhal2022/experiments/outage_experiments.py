@@ -132,9 +132,10 @@ def flapping(runs: CaseData) -> ExperimentResult:
     for case, rule in cases.items():
         rows.append(row := {"case": rule.title, "mean age added (s)": extra_age(rule)})
         for event, end in zip(events, ends, strict=True):
-            predicted, found = _flapping_predicted(runs, case, event.label), runs.settling(case, event.t_s, end)
+            times = _flapping_predicted(runs, case, event.label)
+            found = runs.settling(case, event.t_s, end)
             for index, (what, _) in INDEXES.items():
-                row[f"{event.label}, {what}, predicted (s)"] = predicted[index]
+                row[f"{event.label}, {what}, predicted (s)"] = times[index]
                 row[f"{event.label}, {what}, measured (s)"] = getattr(found, index)
     return ExperimentResult(page, rows)
 
