@@ -154,7 +154,6 @@ class LoadedFmu(Law):
         super().__init__()
         import fmpy
 
-        self._name = path.name
         description = fmpy.read_model_description(str(path))
         fmpy.extract(str(path), str(folder))
         self._inputs, self._outputs = variables(description, "input"), variables(description, "output")
@@ -250,7 +249,7 @@ def main(path: str, folder: str) -> None:
         if law is not None:
             law.close()
     except ANYTHING as error:  # the run is over
-        print(f"{law}: cannot be freed: {named(error)}", file=sys.stderr)
+        print(f"{Path(path).name}: cannot be freed: {named(error)}", file=sys.stderr)
     shutil.rmtree(folder, ignore_errors=True)
 
 
