@@ -1,0 +1,40 @@
+"""When a node ticks: the interface of the two policies, a barrier in simulated time and a timer in real time. Pure."""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple, Protocol
+
+from gridpeers.wire.messages import State
+from gridpeers.wire.timing import Awaited
+
+
+class Verdict(NamedTuple):
+    """What follows from a deadline that has passed."""
+
+    kind: Literal["wait", "over", "tick", "break"]
+    """Wait on; end the wait; do the tick that is due; or break the run, or leave it."""
+    reason: str = ""
+    """Why the run breaks, with the messages that are missing."""
+    warnings: tuple[str, ...] = ()
+
+
+WAIT = Verdict("wait")
+
+
+class TickPolicy(Protocol):
+    """Decides when a node ticks and with what; the node decides everything else. Times are s on the driver's clock."""
+
+    @property
+    def deadline(self) -> float | None:
+        """When to ask `passed` next."""
+
+    def due(self, now: float) -> int | None:
+        """Return the tick to do now, None if there is none."""
+
+    def counts(self, state: State) -> bool:
+        """Return whether a state off the wire enters the present tick; RejectedError if a later one came before."""
+
+    def missing(self) -> tuple[Awaited, ...]:
+        """Return the messages without which the tick is not due, and their senders."""
+
+    def passed(self, now: float) -> Verdict: ...
