@@ -9,7 +9,6 @@ import msgspec
 from msgspec.structs import replace
 
 from gridpeers.plant.equipment import Feeder, InverterRow, Switch
-from gridpeers.plant.equipment.imported_equipment import LinearElement
 from gridpeers.plant.plant_config import FeederChanges, InverterChange
 from gridpeers.wire.messages import MOST_INVERTERS
 
@@ -81,11 +80,11 @@ def joined_copies(feeder: AnyFeeder, copies: int, joint: str) -> AnyFeeder:
 
     All copies hang on the first one's substation by closed switches. A tie is a closed switch and a line, so the copies
     remain one network when each is cut off the substation. Spare inverters are left out. ValueError if the feeder has
-    no substation, the number is below 1 or makes too many inverters, or `joint` lacks a phase.
+    no substation or was imported, the number is below 1 or makes too many inverters, or `joint` lacks a phase.
     """
     bus = next((each for each in feeder.buses if each.name == joint), None)
-    if feeder.source is None:
-        raise ValueError(f'feeder "{feeder.name}" has no substation for its copies to share')
+    if feeder.source is None or feeder.elements:
+        raise ValueError(f'feeder "{feeder.name}": copies need a substation to share, and own tables of lines')
     most = MOST_INVERTERS // max(len(feeder.inverters), 1)
     if not 1 <= copies <= most:
         raise ValueError(
@@ -95,12 +94,6 @@ def joined_copies(feeder: AnyFeeder, copies: int, joint: str) -> AnyFeeder:
         raise ValueError(f'bus "{joint}": a tie needs a bus with phases A, B and C')
     fields = ("buses", "lines", "switches", "loads", "capacitors", "regulators", "transformers", "inverters")
     rows = {name: [row for k in range(1, copies + 1) for row in _copied(getattr(feeder, name), k)] for name in fields}
-    elements = [
-        replace(it, name=copy_name(it.name, k), nodes=tuple((copy_name(bus, k), phase) for bus, phase in it.nodes))
-        for k in range(1, copies + 1)
-        for it in feeder.elements
-    ]
-    parts = [part for k in range(1, copies + 1) for part in _copied(feeder.load_parts, k)]
     source = feeder.source.bus
     width = max(each.x for each in feeder.buses) - min(each.x for each in feeder.buses)
     rows["buses"] = [
@@ -112,24 +105,19 @@ def joined_copies(feeder: AnyFeeder, copies: int, joint: str) -> AnyFeeder:
         place = next(row for row in rows["buses"] if row.name == here)
         rows["buses"].append(replace(place, name=between, phases="ABC"))
         rows["switches"].append(_tie_switch(here, between, between))
-        if feeder.lines:
-            of_three = next(line for line in feeder.lines if line.phases == "ABC")
-            ends = {"name": between, "from_bus": between, "to_bus": there}
-            rows["lines"].append(replace(of_three, **ends, length=TIE_LENGTH))
-        else:
-            elements.append(_tie_element(feeder, bus.V_nom, between, there))
+        of_three = next(line for line in feeder.lines if line.phases == "ABC")
+        ends = {"name": between, "from_bus": between, "to_bus": there}
+        rows["lines"].append(replace(of_three, **ends, length=TIE_LENGTH))
     return replace(
         feeder,
         name=f"{feeder.name}_x{copies}",
         **{name: tuple(value) for name, value in rows.items()},
-        elements=tuple(elements),
-        load_parts=tuple(parts),
         spares=(),
     )
 
 
 def _copied(rows: tuple[Row, ...], k: int) -> Iterator[Row]:
-    """Yield the rows with the names of copy k; loads of another program keep theirs, which nothing refers to."""
+    """Yield the rows with the names of copy k."""
     for row in rows:
         fields = row.__struct_fields__
         changed = {name: copy_name(getattr(row, name), k) for name in (*_REFERENCES, *_NAMES) if name in fields}
@@ -140,14 +128,3 @@ def _copied(rows: tuple[Row, ...], k: int) -> Iterator[Row]:
 
 def _tie_switch(one: str, other: str, alias: str) -> Switch:
     return Switch(name=f"{one}-{other}", alias=alias, from_bus=one, to_bus=other, phases="ABC", closed=True)
-
-
-def _tie_element(feeder: Feeder, V_nom: float, one: str, other: str) -> LinearElement:
-    voltages = {bus.name: bus.V_nom for bus in feeder.buses}
-    for element in feeder.elements:
-        buses = [bus for bus, _ in element.nodes]
-        phases = [phase for _, phase in element.nodes]
-        if phases == ["A", "B", "C"] * 2 and all(abs(voltages[bus] / V_nom - 1.0) < 0.1 for bus in buses):
-            nodes = tuple((bus, phase) for bus in (one, other) for phase in "ABC")
-            return LinearElement(name=f"line.{one}", nodes=nodes, Y=element.Y)
-    raise ValueError("the feeder has no three-phase line that a tie could be like")

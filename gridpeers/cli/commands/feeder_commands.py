@@ -16,12 +16,11 @@ from gridpeers.cli.usage import BAD_INPUT, check_choice, fail, load, refuse
 from gridpeers.feeder import Feeder, reader_of
 from gridpeers.output_folders import FolderError, refusal, shown, whole_folder, write_whole
 from gridpeers.plant.equipment.connectivity import Connectivity
-from gridpeers.plant.equipment.derived_feeders import copy_name, joined_copies
 from gridpeers.plant.equipment.imported_equipment import is_behind
 from gridpeers.plant.equipment.neutrals import returns_in_words
 from gridpeers.plant.tables import FeederError, feeders
 from gridpeers.rooms import ROOMS
-from gridpeers.wire.wording import counted, suggestion
+from gridpeers.wire.wording import counted
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Import, check, solve, draw and export feeders.")
 
@@ -225,54 +224,6 @@ def glm(
     with _problems_told(feeder, file):
         write_whole(file, text)
     typer.echo(f"Model: {shown(file)}; GridLAB-D writes the voltages of its start to {file.stem}_voltages.csv")
-
-
-GROWN = Path(__file__).parents[1] / "grown_feeder.toml"
-"""File with the text of the scenario that `grow` writes, with fields in braces."""
-
-
-@app.command()
-def grow(
-    feeder: Annotated[
-        str, typer.Argument(metavar="FEEDER", help="A feeder with a substation, switches and inverters.")
-    ],
-    copies: Annotated[int, typer.Option("--copies", metavar="N", help="How many, the first included.")],
-    joint: Annotated[str, typer.Option("--joint", metavar="BUS", help="Bus of each copy that ties lead from and to.")],
-    switch: Annotated[
-        str, typer.Option("--switch", metavar="SWITCH", help="Switch that cuts a copy off the substation.")
-    ],
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="New or empty folder for tables and scenario.")],
-    T_c: Annotated[float, typer.Option("--T-c", metavar="SECONDS", help="Control period of the scenario.")] = 0.1,
-) -> None:
-    """Join copies of a feeder, and write their tables and a scenario that islands all of them.
-
-    The copies hang on one substation, and are tied to each other in a chain beyond it.
-
-    Exit code: 0 it was written, 2 the feeder or an option cannot be used.
-
-    Example:  gridpeers feeder grow microgrid123 --copies 11 --joint 450 --switch 13-152 --out hundred
-    """
-    with _problems_told(feeder, out):
-        tables = Feeder.read(feeder)
-        grown = joined_copies(tables, copies, joint)
-        found = next((one for one in tables.switches if switch in one.names), None)
-        if found is None:
-            names = [one.alias or one.name for one in tables.switches]
-            fail([f'--switch: no switch "{switch}"; {suggestion(switch, names, "switches")}'], BAD_INPUT)
-        of_copies = (f"{copy_name(found.from_bus, k)}-{copy_name(found.to_bus, k)}" for k in range(1, copies + 1))
-        text = GROWN.read_text(encoding="utf-8").format(
-            feeder=feeder,
-            name=grown.name,
-            copies=copies,
-            inverters=len(grown.inverters),
-            T_c=T_c,
-            switches=", ".join(f'"{name}"' for name in of_copies),
-        )
-        with whole_folder(out):
-            grown.save(out / grown.name)
-            (out / "islanding.toml").write_text(text, encoding="utf-8")
-    size = f"{counted(len(grown.buses), 'bus', 'buses')}, {counted(len(grown.inverters), 'inverter')}"
-    typer.echo(f"{size}: {shown(out / 'islanding.toml')}")
 
 
 def read_script(name: str, switches: list[str], leave_out: list[str]) -> Feeder:

@@ -290,27 +290,10 @@ def test_a_feeder_that_cannot_be_used_is_told_in_lines(elsewhere: Path, words: t
     assert [path.name for path in Path().iterdir()] == ["bad.dss"]
 
 
-def test_copies_of_a_feeder_become_a_scenario_that_can_be_run(elsewhere: Path) -> None:
-    """`feeder grow` writes what `check` finds no problem in; a wrong bus or switch is told, and nothing is written."""
-    options = ("--copies", "2", "--out", "grown")
-    grown, _ = invoke("feeder", "grow", "microgrid123", "--joint", "450", "--switch", "13-152", *options)
-    checked, text = invoke("check", "grown/islanding.toml")
-
-    assert (grown, checked) == (0, 0)
-    assert "18 inverters" in text
-    for words, said in (
-        (("--joint", "nope", "--switch", "13-152"), "needs a bus with phases"),
-        (("--joint", "450", "--switch", "13-150"), 'no switch "13-150"'),
-    ):
-        code, text = invoke("feeder", "grow", "microgrid123", *words, "--copies", "2", "--out", "second")
-        assert (code, said in text, Path("second").exists()) == (2, True, False)
-
-
 @pytest.mark.skipif(sys.platform != "linux", reason="limits the size of files as Linux does")
 @pytest.mark.parametrize("words", [
     ("solve", "microgrid123", "--csv", "v.csv"),
     ("glm", "standard123", "--out", "feeder.glm"),
-    ("grow", "microgrid123", "--joint", "450", "--switch", "13-152", "--copies", "2", "--out", "grown"),
 ])  # fmt: skip
 def test_a_disk_that_fills_up_leaves_nothing_half_written(elsewhere: Path, words: tuple[str, ...]) -> None:
     """A file or folder is there as a whole, or not at all; the error names it."""
