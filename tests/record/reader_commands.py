@@ -2,27 +2,31 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from gridpeers.cli.root import COMMANDS
 from gridpeers.scenarios.record.record_reader import RunRecord
 from tests.command_line import invoke
 
 
 def assert_commands_read(record: RunRecord, agent: str = "inv4") -> None:
-    """`metrics`, `why`, and `replay` where there is one, do their work, and tell the cut.
+    """`metrics`, `why`, `trace` in both formats, and `replay` where there is one, do their work, and tell the cut.
 
     Of a run that was killed in its first moments there may be no decision yet: then `why`, and `replay`, say so. There
     may not even be a row: then they say so too, or have nothing to show.
     """
     begun = record.t_end > 0.0
     decided = next(record.decisions(agent), None) is not None
-    file, t = str(record.path), f"{record.t_end:.3f}"
+    file, folder, t = str(record.path), record.path.parent, f"{record.t_end:.3f}"
     commands = {
         "metrics": (file,),
         "why": (file, agent, t, "--follow"),
+        "trace": (file, "--out", str(folder / "trace.pftrace")),
+        "trace --svg": (file, "--svg", str(folder / "trace.svg"), "--from", f"{max(0.0, record.t_end - 0.1):.3f}"),
         "replay": (file,),
     }
-    for command, arguments in commands.items():
-        if command not in COMMANDS.names:
+    for name, arguments in commands.items():
+        if (command := name.split()[0]) not in COMMANDS.names:
             continue
         code, printed = invoke(command, *arguments)
         if not begun:
@@ -39,4 +43,10 @@ def assert_commands_read(record: RunRecord, agent: str = "inv4") -> None:
             continue
         assert code == 0, f"gridpeers {command} {' '.join(arguments)}: {code}: {printed}"
         assert "Traceback" not in printed
-        assert record.complete or command == "replay" or "cut off" in printed, f"{command}: {printed}"
+        assert record.complete or command == "replay" or "cut off" in printed, f"{name}: {printed}"
+    for made in (folder / "trace.pftrace", folder / "trace.svg"):
+        assert not begun or _size(made) > 500
+
+
+def _size(file: Path) -> int:
+    return file.stat().st_size if file.exists() else 0

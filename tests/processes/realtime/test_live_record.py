@@ -15,6 +15,7 @@ from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.lab.explanation.explanation import explained
 from gridpeers.lab.explanation.law_step import law_step
 from gridpeers.lab.replay.recomputation import recomputed
+from gridpeers.lab.trace import flows
 from gridpeers.netem.models.delay import Normal
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem, NodeFault
@@ -178,6 +179,16 @@ def test_a_stale_neighbour_is_told(record: RunRecord) -> None:
     assert of["inv3"].why.startswith("stale: older than max_age = 0.25 s; ")
     assert "cut off by a partition" in of["inv3"].why
     assert of["inv1"].used
+
+
+def test_messages_take_their_time(record: RunRecord) -> None:
+    """Each arrives after it was sent, and on an emulated link as many are lost as it has counted."""
+    found = flows(record)
+
+    assert all(flow.arrived >= flow.sent for flow in found if flow.arrived is not None)
+    lost = [flow for flow in found if flow.is_lost and (flow.src, flow.dst, flow.fate) == ("inv1", "inv2", "loss")]
+    assert len(lost) == record.link_counts()["inv1", "inv2"].dropped["loss"] > 10
+    assert {flow.dst for flow in found} == {"plant", *record.agents}
 
 
 def hostile(epoch: int) -> dict[str, bytes]:
