@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from gridpeers.lab.space_time_diagram import space_time_diagram
 from gridpeers.lab.trace import Flow, flows
 from gridpeers.scenarios.record.record_reader import RunRecord
 from tests.command_line import invoke
@@ -124,37 +121,3 @@ def test_the_perfetto_trace(lossy: RunRecord, tmp_path: Path) -> None:
     assert sum(packet.track_event.name == "cut" for packet in events) >= 2
     stamps = [packet.timestamp for packet in trace.packet]
     assert stamps == sorted(stamps)
-
-
-def test_the_diagram(lossy: RunRecord, tmp_path: Path) -> None:
-    """A line for each message of the window, and a cross for each lost one; the file is the same each time."""
-    found = [flow for flow in flows(lossy, 0.2, 0.29) if {flow.src, flow.dst} <= {"inv4", "inv7"}]
-
-    figure = space_time_diagram(found, ("inv4", "inv7"), 0.2, 0.3, 0.02, "cut")
-
-    lines, crosses = figure.axes[0].collections[1:3]
-    assert len(found) == len(lines.get_paths()) == len(np.asarray(crosses.get_offsets())) > 8
-    assert {flow.fate for flow in found} == {"cut"}
-    arguments = ("trace", str(lossy.path), "--from", "0.1", "--to", "0.3", "--agents", "inv1,inv4,inv7")
-    for name in ("a.svg", "b.svg"):
-        code, printed = invoke(*arguments, "--svg", str(tmp_path / name))
-        assert (code, re.search(r"\d+ messages, \d+ of them lost", printed) is not None) == (0, True)
-    assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.svg").read_bytes()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "complaint"),
-    [
-        (("--svg", "a.gif"), "must end in .svg, .pdf, .png"),
-        (("--svg", "a.svg", "--from", "3"), "the record ends at 0.40 s"),
-        (("--svg", "a.svg", "--agents", "inv77"), "there was no agent inv77; agents are inv1-9, and plant"),
-        (("--from", "0.1", "--agents", "inv1"), "--from, --agents: for a diagram; add --svg FILE"),
-    ],
-)
-def test_bad_input(arguments: tuple[str, ...], complaint: str, calm: RunRecord) -> None:
-    """One line says what is wrong, and what there is."""
-    code, printed = invoke("trace", str(calm.path.parent), *arguments)
-
-    assert code == 2
-    assert complaint in printed
-    assert printed.count("\n") == 1
