@@ -14,8 +14,9 @@ from gridpeers.agents.agent_config import AgentConfig, check_nameplate
 from gridpeers.agents.laws.law import Law
 from gridpeers.wire.codec import RejectedError, encode
 from gridpeers.wire.links import Links, arrived, is_usable
+from gridpeers.wire.membership import Membership
 from gridpeers.wire.messages import PLANT, Measurement, Nameplate, State, Stop
-from gridpeers.wire.node import Listen, PlantFollower, Route
+from gridpeers.wire.post import FollowedPlant, Post, Route
 
 
 class NeighbourStates:
@@ -66,15 +67,28 @@ _KEPT = State, Measurement
 """Messages that links deliver and a node keeps: as a tuple, for a union would be made anew for every message."""
 
 
-class AgentNode(PlantFollower):
+class AgentNode:
     """One agent as a participant of a run.
 
     `instance` is the id of this process, unique in the run, and part of the agent's token. Without `links` none are
     emulated; without a law it is the paper's.
     """
 
-    def __init__(self, config: AgentConfig, instance: str, links: Links | None, law: Law | None) -> None:
-        super().__init__(config.name, config.run)
+    def __init__(
+        self,
+        config: AgentConfig,
+        instance: str,
+        links: Links | None,
+        law: Law | None,
+        members: Membership | None = None,
+    ) -> None:
+        post = self.post = Post(config.name, config.run, config.epoch, members)
+        post.on_nameplate = self._on_nameplate
+        self.plant = FollowedPlant(post, self._follow)
+        self.keys, self.members, self.admission, self.rejects = post.keys, post.members, post.admission, post.rejects
+        self.name, self.routes, self.watched = config.name, post.routes, post.keys.any_alive
+        self.take_actions, self.take_rejects = post.take_actions, post.take_rejects
+        self.is_known, self.lost = post.is_known, post.lost
         check_nameplate(config)
         self.stopped = ""
         self.failed = ""
@@ -89,12 +103,16 @@ class AgentNode(PlantFollower):
 
     @property
     def token(self) -> str:
-        return self.keys.alive_agent(self._name, self._instance)
+        return self.keys.alive_agent(self.name, self._instance)
+
+    @property
+    def tokens(self) -> tuple[str, ...]:
+        return (self.token,)
 
     @property
     def nameplate(self) -> tuple[str, bytes]:
         """Key of the own queryable, and its answer."""
-        return self.keys.nameplate(self._name, self._instance), encode(self._agent.nameplate)
+        return self.keys.nameplate(self.name, self._instance), encode(self._agent.nameplate)
 
     @property
     def subscriptions(self) -> tuple[str, ...]:
@@ -103,6 +121,13 @@ class AgentNode(PlantFollower):
     @property
     def finished(self) -> bool:
         return bool(self.stopped or self.failed)
+
+    def received(self, key: str, payload: bytes, now: float) -> None:
+        if not self.finished:
+            self.post.received(key, payload, now)
+
+    def _follow(self, epoch: int) -> None:
+        """Note that the node follows another plant, or the first."""
 
     def use_links(self, links: Links) -> None:
         self._links = links
@@ -114,24 +139,22 @@ class AgentNode(PlantFollower):
         return False
 
     def appeared(self, key: str, now: float) -> None:
-        self._note_token(key, now, appeared=True)
-        match self.keys.parts(key):
-            case ("alive", "plant", epoch) if self._plant_appeared(epoch):
+        match self.post.token(key, now, appeared=True):
+            case ("alive", "plant", epoch) if self.plant.appeared(epoch):
                 self.plant_seen = True
                 self._plant_came(now)
-            case ("alive", "agent", name, instance) if name != self._name:
-                self._process_came(name, instance)
+            case ("alive", "agent", name, instance) if name != self.name:
+                self.post.process_came(name, instance)
 
     def vanished(self, key: str, now: float) -> None:
-        self._note_token(key, now, appeared=False)
-        match self.keys.parts(key):
-            case ("alive", "plant", epoch) if self._plant_vanished(epoch):
+        match self.post.token(key, now, appeared=False):
+            case ("alive", "plant", epoch) if self.plant.vanished(epoch):
                 self._plant_gone(now)
-            case ("alive", "agent", name, instance) if self._forget_process(name, instance):
+            case ("alive", "agent", name, instance) if self.post.process_gone(name, instance):
                 self._agent_gone(name, instance, now)
 
-    def _met(self, nameplate: Nameplate, now: float) -> None:
-        self._agent.meet(nameplate)
+    def _on_nameplate(self, instance: str, nameplate: Nameplate, first: bool, now: float) -> None:
+        raise NotImplementedError
 
     def _plant_came(self, now: float) -> None:
         raise NotImplementedError
@@ -143,13 +166,10 @@ class AgentNode(PlantFollower):
         raise NotImplementedError
 
     def _listen_to(self, name: str) -> None:
-        key = self.keys.state(name)
-        if key not in self.routes:
-            self.routes[key] = Route(name, (State,), self._on_state)
-            self._actions.append(Listen(key))
+        self.post.listen(self.keys.state(name), Route(name, (State,), self._on_state))
 
     def _on_own_measurement(self, message: Measurement, payload: bytes, now: float) -> None:
-        if message.to != self._name:
+        if message.to != self.name:
             raise RejectedError("unexpected", f"the measurement of {message.to}")
         self._on_measurement(message, payload, now)
 
@@ -179,5 +199,5 @@ class AgentNode(PlantFollower):
         self.states.keep(message, at)
 
     def _report_links(self, *, final: bool = False) -> None:
-        key, epoch = self.keys.report(self._name), self._config.epoch
-        self._publish_link_reports(key, self._links, epoch, instance=self._instance, last=final)
+        for part in self.post.take_link_reports(self._links, instance=self._instance, last=final):
+            self.post.publish(self.keys.report(self.name), encode(part))

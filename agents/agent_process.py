@@ -109,7 +109,7 @@ def _run(configs: Sequence[AgentConfig], laws: Sequence[Law], make_links: MakeLi
                 agent.host_moved = partial(getattr, session, "moved")
             if credentials is not None:
                 for node in nodes:
-                    node.vouches = session.vouches
+                    node.post.vouches = session.vouches
             take_part(core, nodes, session, logging.getLogger(first.name))
         finally:
             session.close()

@@ -19,8 +19,8 @@ from gridpeers.wire.codec import RejectedError, decode, encode
 from gridpeers.wire.journal import JournalBuffer
 from gridpeers.wire.links import REPORT_TICKS, Links
 from gridpeers.wire.membership import ASKED_AT_ONCE, Admission, Membership
-from gridpeers.wire.messages import PLANT, AnyMessage, Measurement, Nameplate, Prepare, Ready, State, Stop, Waiting
-from gridpeers.wire.node import Route
+from gridpeers.wire.messages import PLANT, Measurement, Nameplate, Prepare, Ready, State, Stop, Waiting
+from gridpeers.wire.post import Route
 from gridpeers.wire.timing import Awaited, TickBarrier, time_of
 
 CLOSING = 2.0
@@ -101,18 +101,17 @@ class LockstepAgent(AgentNode):
         law: Law | None = None,
         known: KnownAgents | None = None,
     ) -> None:
-        super().__init__(config, instance, links, law)
         self._known = KnownAgents(config.control) if known is None else known
+        super().__init__(config, instance, links, law, self._known.members)
         self._known.add(self._agent.nameplate)
-        self.members = self._known.members
         if config.clock_rate != 1.0:  # its periods seem longer to it than they are
             self._agent = Agent(config.by_own_clock(), law)
         if config.record != "physics":
-            self.journal = JournalBuffer()
-            self._decisions = DecisionJournal(self._agent, self.journal)
+            self.post.journal = JournalBuffer()
+            self._decisions = DecisionJournal(self._agent, self.post.journal)
         self.routes[self.keys.control] = Route(PLANT, (Prepare, Waiting, Stop), self._on_control)
         self._barrier = TickBarrier(config.name, DEADLINES * config.deadline)
-        self._last_heard = self._barrier.last_heard
+        self._last_heard = self._barrier.last_heard = self.post.last_heard
         self._pairwise = is_pairwise(config.control)
         self._roster: Prepare | None = None
         self._processes: dict[str, str] = {}
@@ -139,7 +138,7 @@ class LockstepAgent(AgentNode):
 
     @property
     def publications(self) -> tuple[str, ...]:
-        keys, name = self.keys, self._name
+        keys, name = self.keys, self.name
         return keys.ready(name), keys.state(name), keys.report(name), keys.journal(name)
 
     @property
@@ -163,7 +162,7 @@ class LockstepAgent(AgentNode):
         if self._roster is None:
             return (Awaited("Prepare", PLANT),)
         if not self._ready:
-            return tuple(Awaited("nameplate", name) for name in self._known.unmet(self._name) or self._unproven or ())
+            return tuple(Awaited("nameplate", name) for name in self._known.unmet(self.name) or self._unproven or ())
         missing = self._barrier.missing_messages()  # without a measurement, the states do not matter yet
         return missing[:1] if self._barrier.awaits(PLANT) else missing
 
@@ -185,12 +184,12 @@ class LockstepAgent(AgentNode):
             self.stopped = self._ending
         elif not self.finished:
             tick = "" if self._tick is None else f" at tick {self._tick}"
-            self.failed = f"{self._name}: the plant is gone{tick}; the run has ended"
+            self.failed = f"{self.name}: the plant is gone{tick}; the run has ended"
 
     def vanished(self, key: str, now: float) -> None:
         match self.keys.parts(key):
             case ("alive", "agent", name, instance):
-                if self._forget_process(name, instance) or self._processes.get(name) == instance:
+                if self.post.process_gone(name, instance) or self._processes.get(name) == instance:
                     self._agent_gone(name, instance, now)
             case _:
                 super().vanished(key, now)
@@ -231,9 +230,6 @@ class LockstepAgent(AgentNode):
                 return
         super().received(key, payload, now)
 
-    def _used(self, message: AnyMessage, now: float) -> None:
-        self._last_heard[message.sender] = message.seq, now
-
     def _on_control(self, message: Prepare | Waiting | Stop, payload: bytes, now: float) -> None:
         if isinstance(message, Stop):
             self._end(message.reason, now)
@@ -254,7 +250,7 @@ class LockstepAgent(AgentNode):
         elif not self._answered:
             unproven = list((self._unproven or {}).items())[:ASKED_AT_ONCE]
             for name, instance in unproven or self.members.next_unmet():
-                self._ask(name, instance)
+                self.post.ask(name, instance)
         self._answered = False
 
     def _on_stop_request(self, message: Stop, payload: bytes, now: float) -> None:
@@ -278,8 +274,7 @@ class LockstepAgent(AgentNode):
             self._publish_decisions()
             self._report_links(final=True)
 
-    def _on_nameplate(self, instance: str, nameplate: Nameplate, payload: bytes, now: float) -> None:
-        super()._on_nameplate(instance, nameplate, payload, now)
+    def _on_nameplate(self, instance: str, nameplate: Nameplate, first: bool, now: float) -> None:
         self._answered = True
         name = nameplate.sender
         process = name, instance
@@ -288,19 +283,16 @@ class LockstepAgent(AgentNode):
             if self._unproven and self._unproven.get(name) == instance:
                 del self._unproven[name]
         elif self._pairwise and self.members.instance(name) == instance:
-            pair = {self._name: self._agent.nameplate, name: nameplate}
-            if in_neighbours(self._config.control, self._name, pair):
+            pair = {self.name: self._agent.nameplate, name: nameplate}
+            if in_neighbours(self._config.control, self.name, pair):
                 self._ask_for_proof(name)
         self._get_ready(now)
-
-    def _met(self, nameplate: Nameplate, now: float) -> None:
-        """Do nothing: the roster decides which nameplates count."""
 
     def _prepare(self, message: Prepare) -> None:
         if self._roster is not None and message.seq <= self._roster.seq:
             raise RejectedError("stale", f"roster {message.seq}, {self._roster.seq} is known")
         instances = self._known.processes(message)
-        if instances.get(self._name) != self._instance:
+        if instances.get(self.name) != self._instance:
             raise RejectedError("unexpected", f"roster {message.seq} is without this process")
         self._roster, self._processes, self._ready, self._unproven = message, instances, False, None
         self._known.take(message)
@@ -312,14 +304,14 @@ class LockstepAgent(AgentNode):
         self._proofs[name, instance] = False
         self._listen_to(name)
         self._states_on[self.keys.state(name)] = name
-        self._ask(name, instance)
+        self.post.ask(name, instance)
 
     def _meet_neighbours(self) -> dict[str, str]:
         """Note the in-neighbours on the roster; return those without proof that they know of the subscription."""
         neighbours: tuple[str, ...] = ()
         self._agent.graph_error = ""
         try:
-            neighbours = self._known.in_neighbours(self._name)
+            neighbours = self._known.in_neighbours(self.name)
         except GraphError as error:
             self._agent.graph_error = str(error)
         for name in neighbours:
@@ -336,7 +328,7 @@ class LockstepAgent(AgentNode):
         if self._roster is None or self._ready or self._unproven:
             return
         if self._unproven is None:
-            if self._known.unmet(self._name):
+            if self._known.unmet(self.name):
                 return
             self._unproven = self._meet_neighbours()
             for name, instance in self._unproven.items():
@@ -354,8 +346,8 @@ class LockstepAgent(AgentNode):
     def _send_ready(self) -> None:
         assert self._roster is not None
         t = time_of(self._tick or 0, self._config.T_c)
-        ready = Ready(sender=self._name, epoch=self._config.epoch, seq=self._roster.seq, t=t)
-        self._publish(self.keys.ready(self._name), encode(ready))
+        ready = Ready(sender=self.name, epoch=self._config.epoch, seq=self._roster.seq, t=t)
+        self.post.publish(self.keys.ready(self.name), encode(ready))
 
     def _on_measurement(self, message: Measurement, payload: bytes, now: float) -> None:
         if not self._ready:
@@ -419,11 +411,11 @@ class LockstepAgent(AgentNode):
             if measured is not grant:
                 measured = replace(measured, seq=grant.seq, t=grant.t)
             state = self._agent.tick(measured, neighbours)
-            noted = self.journal is not None and self._decisions.tick(grant.seq, grant.seq - seq, neighbours)
+            noted = self.post.journal is not None and self._decisions.tick(grant.seq, grant.seq - seq, neighbours)
             if noted and self._links is None:
                 # Entries are rare then, and none may wait: once the plant has the last state, the run is over.
                 self._publish_decisions()
-        self._publish(self.keys.state(self._name), encode(state))
+        self.post.publish(self.keys.state(self.name), encode(state))
         reports = (grant.seq + 1) % REPORT_TICKS == 0
         if self._links is not None and (reports or now - self._journal_at >= JOURNAL_PERIOD):
             self._journal_at = now
@@ -435,7 +427,8 @@ class LockstepAgent(AgentNode):
     def _publish_decisions(self) -> None:
         """Send the journal; with emulated links an empty one too, as it says up to when nothing has changed."""
         t = time_of(self._tick or 0, self._config.T_c)
-        self._publish_journal(self.keys.journal(self._name), self._config.epoch, t, empty=self._links is not None)
+        for part in self.post.take_journal(t, empty=self._links is not None):
+            self.post.publish(self.keys.journal(self.name), encode(part))
 
     def _await_next(self, grant: Measurement, now: float) -> None:
         """Start the wait for the next tick: it needs the states of this one, and some may be here already."""

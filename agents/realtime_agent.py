@@ -38,7 +38,6 @@ from gridpeers.wire.messages import (
     MOST_COUNT,
     PLANT,
     AgentStatus,
-    AnyMessage,
     Leave,
     LinkRequest,
     Measurement,
@@ -47,7 +46,8 @@ from gridpeers.wire.messages import (
     Stop,
     Waiting,
 )
-from gridpeers.wire.node import CLOCK_ALONE, Route
+from gridpeers.wire.node import CLOCK_ALONE
+from gridpeers.wire.post import Route
 from gridpeers.wire.timing import Timer
 from gridpeers.wire.wording import printable
 
@@ -72,7 +72,6 @@ class AgentStatistics:
     missed: int = 0
     sent: int = 0
     """States sent; the number of the next."""
-    used: int = 0
     lost: int = 0
     """Messages that did not come off the wire, as the numbers of those that did show."""
     lateness: float = 0.0
@@ -91,9 +90,9 @@ class RealtimeAgent(AgentNode):
         self._first_routes = dict(self.routes)
         self._timed: TimedTraffic | None = None
         if config.record != "physics":
-            self.journal = JournalBuffer()
-            self._timed = TimedTraffic(self.keys, self.journal, arrivals=config.record == "all")
-            self.traffic, self._decisions = self._timed, DecisionJournal(self._agent, self.journal)
+            journal = self.post.journal = JournalBuffer()
+            self._timed = self.post.traffic = TimedTraffic(self.keys, journal, arrivals=config.record == "all")
+            self._decisions = DecisionJournal(self._agent, journal)
         self._journal_timer = Timer(JOURNAL_PERIOD, 0.0)
         self.phase: Phase = "seeking"
         self.statistics = AgentStatistics()
@@ -101,7 +100,8 @@ class RealtimeAgent(AgentNode):
         self._link_commands = LinkCommandReceiver(config.name, config.epoch, links)
         # a clock that is to drift must drift
         self._timer = TickTimer(config.T_c / config.speed / config.clock_rate, keeps_clear=config.clock_rate == 1.0)
-        self._report_ticks = REPORT_TICKS if self.journal is None else max(1, round(LINKS_PERIOD / self._timer.period))
+        recorded = self.post.journal is not None
+        self._report_ticks = max(1, round(LINKS_PERIOD / self._timer.period)) if recorded else REPORT_TICKS
         self._status = Timer(STATUS_PERIOD, 0.0)
         self._give_up: float | None = None
         self._health = SessionHealth(config.name)
@@ -115,8 +115,9 @@ class RealtimeAgent(AgentNode):
 
     def _forget_everybody(self) -> None:
         self.phase = "seeking"
-        self.routes = dict(self._first_routes)
-        self._plants.clear()
+        self.routes.clear()
+        self.routes.update(self._first_routes)
+        self.plant.present.clear()
         self.admission.release(PLANT)
         for name in self.members.nameplates:
             self._agent.forget(name)
@@ -130,7 +131,7 @@ class RealtimeAgent(AgentNode):
 
     @property
     def publications(self) -> tuple[str, ...]:
-        keys, name = self.keys, self._name
+        keys, name = self.keys, self.name
         own = keys.state, keys.set_points, keys.leave, keys.status, keys.report, keys.link_acknowledgement, keys.journal
         return tuple(key(name) for key in own)
 
@@ -170,11 +171,11 @@ class RealtimeAgent(AgentNode):
         skipped = self._timer.take(now)
         if self._leaving:
             self._left += 1
-            if self._left * self._timer.period >= LEAVING or not self._plants:
+            if self._left * self._timer.period >= LEAVING or not self.plant.present:
                 self.stopped = self._leaving
             return
         if self._give_up is not None and not self.plant_seen and now >= self._give_up:
-            self.failed = f"{self._name}: no plant of run {self._config.run} within {self._config.deadline:g} s"
+            self.failed = f"{self.name}: no plant of run {self._config.run} within {self._config.deadline:g} s"
             return
         if self.phase == "running":
             self.statistics.missed += skipped
@@ -192,8 +193,7 @@ class RealtimeAgent(AgentNode):
         due = now >= self._status.due
         if due:
             self._status.take(now)
-            for name, instance in self.members.next_unmet():
-                self._ask(name, instance)
+            self.post.ask_again()
         if due or (self.phase, self._used_neighbours) != before:
             self._publish_status(at)
 
@@ -202,11 +202,11 @@ class RealtimeAgent(AgentNode):
         measured = self.states.measurement if self.phase == "running" else None
         roster = None if measured is None else measured.roster
         if roster is not None and self._agent.fault:
-            roster = (*roster, self._name)  # who says nothing is not heard, and no session changes that
+            roster = (*roster, self.name)  # who says nothing is not heard, and no session changes that
         met, moved = self.members.nameplates, "this host has another address" if self.host_moved() else ""
         if problem := moved or self._health.problem(roster, met=met, neighbours=self._neighbours, now=now):
             self.session_broken = True
-            self._say(f"{problem}; opens a new session")
+            self.post.say(f"{problem}; opens a new session")
 
     def leave(self, reason: str) -> None:
         """Leave properly: have the own inverter taken off the network, and close once the plant says that it is."""
@@ -214,10 +214,10 @@ class RealtimeAgent(AgentNode):
             return
         self._report_journal()
         self._report_links(final=True)
-        name, epoch = self._name, self._config.epoch
+        name, epoch = self.name, self._config.epoch
         message = Leave(sender=name, epoch=epoch, seq=self.statistics.sent, t=self.states.t)
-        self._publish(self.keys.leave(name), encode(message))
-        if self._plants:
+        self.post.publish(self.keys.leave(name), encode(message))
+        if self.plant.present:
             self._leaving = reason
         else:
             self.stopped = reason
@@ -231,19 +231,19 @@ class RealtimeAgent(AgentNode):
     def change(self, config: AgentConfig, law: Law | None = None) -> None:
         """Go on under another rule of control, with the set-points of now; see `Agent.taken_over`."""
         self._config, self._agent = config, self._agent.taken_over(config, law)
-        if self.journal is not None:
-            self._decisions = DecisionJournal(self._agent, self.journal)
+        if self.post.journal is not None:
+            self._decisions = DecisionJournal(self._agent, self.post.journal)
         self._listen()
 
     def _plant_came(self, now: float) -> None:
         self._health.plant_seen(now)
         if self.phase == "seeking":
             self.phase = "waiting"
-            self._say("the plant is there; waits for its measurement")
+            self.post.say("the plant is there; waits for its measurement")
 
     def _plant_gone(self, now: float) -> None:
         self._hold("the plant is gone; holds, and seeks it again")
-        self.phase = "waiting" if self._plants else "seeking"
+        self.phase = "waiting" if self.plant.present else "seeking"
 
     def _agent_gone(self, name: str, instance: str, now: float) -> None:
         self._agent.forget(name)
@@ -253,12 +253,13 @@ class RealtimeAgent(AgentNode):
             self._agent.meet(self.members.nameplates[name])
         self._listen()
 
-    def _met(self, nameplate: Nameplate, now: float) -> None:
-        super()._met(nameplate, now)
-        self._listen()
+    def _on_nameplate(self, instance: str, nameplate: Nameplate, first: bool, now: float) -> None:
+        if first:
+            self._agent.meet(nameplate)
+            self._listen()
 
     def _listen(self) -> None:
-        self._neighbours = self._agent.in_neighbours((self._name, *sorted(self.members.nameplates)))
+        self._neighbours = self._agent.in_neighbours((self.name, *sorted(self.members.nameplates)))
         for name in self._neighbours:
             self._listen_to(name)
 
@@ -270,9 +271,6 @@ class RealtimeAgent(AgentNode):
             self._link_commands.restart()
             self._health.forget(PLANT)
         self._plant_epoch = epoch
-
-    def _used(self, message: AnyMessage, now: float) -> None:
-        self.statistics.used += 1
 
     def _on_control(self, message: Waiting | Stop, payload: bytes, now: float) -> None:
         if isinstance(message, Waiting):
@@ -306,12 +304,12 @@ class RealtimeAgent(AgentNode):
     def _on_link_command(self, message: LinkRequest, payload: bytes, now: float) -> None:
         answer = self._link_commands.take(message, self._run_time)
         if answer is not None:
-            self._publish(self.keys.link_acknowledgement(self._name), encode(answer))
+            self.post.publish(self.keys.link_acknowledgement(self.name), encode(answer))
 
     def _hold(self, why: str) -> None:
         if self.phase == "running":
             self.phase = "waiting"
-            self._say(why)
+            self.post.say(why)
         self._used_neighbours = ()
         self.states.clear()
         self._agent.restart()
@@ -327,7 +325,7 @@ class RealtimeAgent(AgentNode):
         if self.phase != "running":
             self.phase = "running"
             m, joins = measurement, "goes on" if self._ran else "joins"
-            self._say(f"{joins} at t = {m.t:.2f} s, from {m.P_set:.0f} W and {m.V_set:.1f} V")
+            self.post.say(f"{joins} at t = {m.t:.2f} s, from {m.P_set:.0f} W and {m.V_set:.1f} V")
             self._ran = True
         if self._agent.fault:
             return
@@ -346,18 +344,19 @@ class RealtimeAgent(AgentNode):
         self._send(state)
 
     def _report_journal(self) -> None:
-        self._publish_journal(self.keys.journal(self._name), self._config.epoch, self.states.t)
+        for part in self.post.take_journal(self.states.t):
+            self.post.publish(self.keys.journal(self.name), encode(part))
 
     def _send(self, state: State) -> None:
         """Send a state to everybody, or to the plant alone if the law does not tell the neighbours."""
         if state.fault:
-            self._say(f"{state.fault}; idle, its inverter stays on primary droop")
+            self.post.say(f"{state.fault}; idle, its inverter stays on primary droop")
         if state.quiet:
             self._skipped += 1
-            self._publish(self.keys.set_points(self._name), encode(state))
+            self.post.publish(self.keys.set_points(self.name), encode(state))
         else:
             state, self._skipped = replace(state, skipped=self._skipped) if self._skipped else state, 0
-            self._publish(self.keys.state(self._name), encode(state))
+            self.post.publish(self.keys.state(self.name), encode(state))
 
     def _publish_status(self, at: float) -> None:
         config, statistics, states = self._config, self.statistics, self.states
@@ -380,7 +379,7 @@ class RealtimeAgent(AgentNode):
             neighbours=self._neighbours,
             ages=tuple(age if age < inf else -1.0 for age in ages),
             used=self._used_neighbours,
-            received=statistics.used,
+            received=self.post.used,
             sent=statistics.sent,
             rejected=sum(self.rejects.counts.values()),
             lost=min(statistics.lost + dropped, MOST_COUNT),
@@ -390,4 +389,4 @@ class RealtimeAgent(AgentNode):
             impaired=() if self._links is None else self._links.impaired(self._run_time),
         )
         statistics.lateness = 0.0
-        self._publish(self.keys.status(self._name), encode(status))
+        self.post.publish(self.keys.status(self.name), encode(status))

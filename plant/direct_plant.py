@@ -50,9 +50,9 @@ class DirectPlant(LockstepPlant):
         self._on_telemetry(message)
 
     def _report_journal(self, *, last: bool = False) -> None:
-        if self.journal is None or self._tick_traffic is None:
+        if self.post.journal is None or self._tick_traffic is None:
             return
-        if len(self.journal) < LOT and not last:  # some milliseconds of this run: no kill can take more
+        if len(self.post.journal) < LOT and not last:  # some milliseconds of this run: no kill can take more
             return
-        for journal in self._take_journal(self.config.epoch, self.t):
+        for journal in self.post.take_journal(self.t):
             self._on_own_journal(journal)

@@ -35,7 +35,6 @@ from gridpeers.wire.links import REPORT_TICKS, Links, is_usable
 from gridpeers.wire.messages import (
     PLANT,
     Answer,
-    AnyMessage,
     Command,
     Journal,
     LinkReport,
@@ -46,7 +45,8 @@ from gridpeers.wire.messages import (
     State,
     Waiting,
 )
-from gridpeers.wire.node import ANYBODY, Publish, Route
+from gridpeers.wire.node import Publish
+from gridpeers.wire.post import ANYBODY, Route
 from gridpeers.wire.timing import Awaited, TickBarrier
 
 Phase = Literal["gathering", "preparing", "ticking", "joining", "holding", "closing", "over"]
@@ -71,7 +71,7 @@ class LockstepPlant(PlantNode):
         self._roster_changed = False  # whether an agent has joined or gone since
         self._joining: tuple[str, ...] = ()  # newcomers that the held tick waits for; they may appear then
         self._barrier = TickBarrier(PLANT, config.deadline)
-        self._last_heard = self._barrier.last_heard
+        self._barrier.last_heard = self.post.last_heard
         self._ask_at = inf  # when open questions are asked again (s on the driver's clock)
         self._unacknowledged = UnacknowledgedTelemetry(config.recorders)
         self._recorders_at = dict.fromkeys(config.recorders, -inf)  # when each recorder spoke last (s, driver's clock)
@@ -86,8 +86,8 @@ class LockstepPlant(PlantNode):
             self.routes[self.keys.request] = Route(ANYBODY, (Command,), self._on_request)
         self.subscriptions = tuple(self.routes)
         self._tick_traffic: TickTraffic | None = None
-        if self.journal is not None:
-            self._tick_traffic = self.traffic = TickTraffic(self.keys, self._everyone, self.journal)
+        if self.post.journal is not None:
+            self._tick_traffic = self.post.traffic = TickTraffic(self.keys, self._everyone, self.post.journal)
         self._measurement_keys = {name: self.keys.measurement(name) for name in self._everyone}
 
     # ---------------------------------------------------------------- what the driver needs
@@ -181,8 +181,7 @@ class LockstepPlant(PlantNode):
         if self.phase == "preparing":
             self._publish_aside(self.keys.control, self._prepare_bytes)
         elif self.phase != "holding":
-            for name, instance in self.members.next_unmet():
-                self._ask(name, instance)
+            self.post.ask_again()
         if self.phase in ("gathering", "holding", "joining"):
             missing = dict.fromkeys(who for _, who in self.missing_messages())
             waits_for = tuple(missing) or self.config.recorders
@@ -217,9 +216,6 @@ class LockstepPlant(PlantNode):
 
     # ---------------------------------------------------------------- messages
 
-    def _used(self, message: AnyMessage, now: float) -> None:
-        self._last_heard[message.sender] = message.seq, now
-
     def _on_state(self, state: State, payload: bytes, now: float) -> None:
         if self.phase != "ticking" or state.seq != self.tick or not self._barrier.awaits(state.sender):
             kind = "stale" if state.seq <= self.tick else "unexpected"
@@ -242,6 +238,7 @@ class LockstepPlant(PlantNode):
         if command.verb != "telemetry" or name not in self._recorders_at or not (text.isascii() and text.isdigit()):
             raise RejectedError("unexpected", f'"{command.verb}" of {name}, in simulated time')
         self._recorders_at[name] = now
+        self.post.last_heard[name] = command.seq, now
         again = self._unacknowledged.acknowledged(name, int(text))
         if again is not None:
             answer = Answer(sender=PLANT, epoch=self.config.epoch, seq=command.seq, t=self.t, ok=True, text=text)
@@ -257,7 +254,7 @@ class LockstepPlant(PlantNode):
 
     def _publish_aside(self, key: str, payload: bytes) -> None:
         """Publish what depends on the time that others take: the record, the same in every run, is without it."""
-        self._actions.append(Publish(key, payload))
+        self.post.actions.append(Publish(key, payload))
 
     # ---------------------------------------------------------------- the roster
 

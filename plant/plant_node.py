@@ -16,8 +16,8 @@ from gridpeers.wire.codec import encode
 from gridpeers.wire.journal import JournalBuffer
 from gridpeers.wire.keys import check_name
 from gridpeers.wire.links import Links, arrived
-from gridpeers.wire.messages import PLANT, Journal, LinkReport, PlantEvent, State, Stop, Telemetry
-from gridpeers.wire.node import Node
+from gridpeers.wire.messages import PLANT, Journal, LinkReport, Nameplate, PlantEvent, State, Stop, Telemetry
+from gridpeers.wire.post import Post
 from gridpeers.wire.timing import ticks_until, time_of
 from gridpeers.wire.wording import printable
 
@@ -54,9 +54,14 @@ STAYS = "its inverter stays on primary droop at its last set-points"  # state of
 IDLE = "; its agent is idle, its inverter stays on primary droop"  # end of the event of a law that failed
 
 
-class PlantNode(Node):
+class PlantNode:
     def __init__(self, config: PlantConfig, plant: PlantLike, links: Links | None) -> None:
-        super().__init__(PLANT, config.run)
+        post = self.post = Post(PLANT, config.run, config.epoch)
+        post.on_nameplate = self._on_nameplate
+        self.keys, self.members, self.admission, self.rejects = post.keys, post.members, post.admission, post.rejects
+        self.name, self.routes, self.watched = PLANT, post.routes, post.keys.any_alive
+        self.take_actions, self.take_rejects = post.take_actions, post.take_rejects
+        self.is_known, self.lost = post.is_known, post.lost
         for name in config.agents:
             check_name("agents", name)
             if name not in plant.inverters:
@@ -74,8 +79,8 @@ class PlantNode(Node):
         self._schedule = agent_schedule(config, plant.inverters)
         self._reporter = Reporter(config.epoch, plant)
         if config.record != "physics":
-            self.journal = JournalBuffer()
-        self._awaits_journals = self.journal is not None and config.clock == "wall"
+            post.journal = JournalBuffer()
+        self._awaits_journals = post.journal is not None and config.clock == "wall"
         """Whether agents send the end of their journals when they close."""
         self._last_due = False  # whether the run has ended and the last telemetry is still to be sent
         self._failed_laws: dict[str, str] = {}  # by agent, why its law failed
@@ -83,6 +88,18 @@ class PlantNode(Node):
     @property
     def token(self) -> str:
         return self.keys.alive_plant(self.config.epoch)
+
+    @property
+    def tokens(self) -> tuple[str, ...]:
+        return (self.token,)
+
+    @property
+    def finished(self) -> bool:
+        raise NotImplementedError
+
+    def received(self, key: str, payload: bytes, now: float) -> None:
+        if not self.finished:
+            self.post.received(key, payload, now)
 
     def use_links(self, links: Links) -> None:
         self._links = links
@@ -95,8 +112,7 @@ class PlantNode(Node):
 
     def appeared(self, key: str, now: float) -> None:
         """Note that a token appeared; of two processes of one name the first takes part."""
-        self._note_token(key, now, appeared=True)
-        match self.keys.parts(key):
+        match self.post.token(key, now, appeared=True):
             case ("alive", "recorder", name) if self._has_room(name):
                 self._tokens.add(key)
                 self._recorders.add(name)
@@ -107,19 +123,28 @@ class PlantNode(Node):
                 refusal = self._refusal(name, instance)
                 if refusal:
                     self._refuse(name, instance, refusal, now)
-                elif self._process_came(name, instance):
+                elif self.post.process_came(name, instance):
                     self._tokens.add(key)
 
     def vanished(self, key: str, now: float) -> None:
         self._tokens.discard(key)
-        self._note_token(key, now, appeared=False)
-        match self.keys.parts(key):
+        match self.post.token(key, now, appeared=False):
             case ("alive", "recorder", name):
                 self._recorders.discard(name)
                 self._recorder_gone(name)
-            case ("alive", "agent", name, instance) if self._forget_process(name, instance):
+            case ("alive", "agent", name, instance) if self.post.process_gone(name, instance):
                 self._agent_gone(name, now)
         self._close_if_alone()
+
+    def _on_nameplate(self, instance: str, nameplate: Nameplate, first: bool, now: float) -> None:
+        if first:
+            self._met(nameplate, now)
+
+    def _met(self, nameplate: Nameplate, now: float) -> None:
+        raise NotImplementedError
+
+    def _publish(self, key: str, payload: bytes) -> None:
+        self.post.publish(key, payload)
 
     def _has_room(self, recorder: str) -> bool:
         """Whether a recorder is needed, noted already, or one of few."""
@@ -210,10 +235,12 @@ class PlantNode(Node):
         self._publish(self.keys.telemetry, payload)
 
     def _report_journal(self, *, last: bool = False) -> None:
-        self._publish_journal(self.keys.telemetry, self.config.epoch, self.t)
+        for part in self.post.take_journal(self.t):
+            self._publish(self.keys.telemetry, encode(part))
 
     def _report_links(self, *, last: bool = False) -> None:
-        self._publish_link_reports(self.keys.telemetry, self._links, self.config.epoch, t=self.t, last=last)
+        for part in self.post.take_link_reports(self._links, t=self.t, last=last):
+            self._publish(self.keys.telemetry, encode(part))
 
     def _report(self, *, final: bool, missing_agents: tuple[str, ...] = ()) -> None:
         """Send telemetry, with the names of agents to start."""

@@ -82,7 +82,7 @@ def run_plant(
         except ImportError as error:
             return f"plant: cannot start: {not_importable(error)}"
         if config.credentials is not None:
-            node.vouches = session.vouches
+            node.post.vouches = session.vouches
         for key in node.publications:
             session.prepare(key)
         for name, agent_config in config.agent_configs.items():

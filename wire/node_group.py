@@ -150,7 +150,7 @@ class NodeGroup:
         return any(node.is_known(key, payload) for node in tuple(self._listeners.get(key, ())))
 
     def lost(self, loss: Loss, now: float) -> None:
-        """As `Node.lost`; who waits for a lost answer asks again."""
+        """As `Post.lost`; who waits for a lost answer asks again."""
         query = self._open.pop(loss.key, None)
         if query is not None:
             self._queries.pop(loss.key.partition("#")[0], None)

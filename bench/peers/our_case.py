@@ -15,16 +15,15 @@ from unittest.mock import patch
 
 import gridpeers as gp
 from bench.harness import DEADLINE, GRIDPEERS, checked, processor_time
-from gridpeers.agents.lockstep_agent import LockstepAgent
 from gridpeers.bridges.gridlabd import gridlabd_plant
 from gridpeers.bridges.gridlabd.gridlabd_plant import GridlabdPlant
 from gridpeers.plant.build import build_plant
-from gridpeers.plant.lockstep_plant import LockstepPlant
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.drivers.process_driver import run_processes
 from gridpeers.scenarios.results.record import PARTIAL, Recorder
 from gridpeers.scenarios.schema.configs import configs
 from gridpeers.wire.node import Publish
+from gridpeers.wire.post import Post
 
 CASE = "IV"
 
@@ -160,8 +159,7 @@ class OurCase:
             return call
 
         with ExitStack() as stack:
-            for owner in (LockstepPlant, LockstepAgent):
-                stack.enter_context(patch.object(owner, "take_actions", noted(owner.take_actions)))
+            stack.enter_context(patch.object(Post, "take_actions", noted(Post.take_actions)))
             _check(run_inprocess(self.plant, self.agents, lambda telemetry: None, messages=True).broke)
         measurement, state = (sorted(found)[len(found) // 2] for found in sizes.values())
         return measurement, state

@@ -206,7 +206,7 @@ class ReplayedProcess:
         self.node, self.links = node, links
         self._root = node.keys.prefix
         self._sent = _Outbox(len(self._root))  # type: ignore[abstract]  # methods of the protocol do nothing
-        node.traffic = self._sent
+        node.post.traffic = self._sent
 
     def use_links(self, links: Links) -> None:
         self.links = links

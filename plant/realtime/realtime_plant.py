@@ -44,7 +44,8 @@ from gridpeers.wire.messages import (
     State,
     Waiting,
 )
-from gridpeers.wire.node import ANYBODY, CLOCK_ALONE, Route
+from gridpeers.wire.node import CLOCK_ALONE
+from gridpeers.wire.post import ANYBODY, Route
 from gridpeers.wire.timing import RateLimit, Timer
 
 Phase = Literal["gathering", "running", "closing", "over"]
@@ -71,12 +72,12 @@ class RealtimePlant(PlantNode):
         if not config.speed > 0.0:
             raise ValueError(f"speed: must be positive, got {config.speed:g} s/s; 1 is real time")
         super().__init__(config, plant, links)
-        keys, recorded = self.keys, self.journal is not None
+        keys, recorded = self.keys, self.post.journal is not None
         self.phase: Phase = "gathering"
         self.plant = plant
         self.pacer = RealTimePacer(config.T_c / config.speed, 0.0)
         self.link_commands = LinkCommandSender(config.epoch, keys, links, self._publish)
-        publish = partial(super()._publish, keys.telemetry)
+        publish = partial(self.post.publish, keys.telemetry)
         self.recorder_feed = RecorderFeed(config.recorders, publish, KEPT_BYTES_RECORDED if recorded else KEPT_BYTES)
         self._telemetry_ticks = max(1, round(TELEMETRY / self.pacer.period))
         self._report_ticks = max(1, round(LINKS / self.pacer.period)) if recorded else REPORT_TICKS
@@ -93,9 +94,9 @@ class RealtimePlant(PlantNode):
         self._command_limit = RateLimit(burst=COMMANDS, interval=COMMAND_INTERVAL)
         self._stays = False  # whether the end is kept back only for recorders
         self.timed: TimedTraffic | None = None  # notes the plant's messages and tokens; None if nobody records them
-        if self.journal is not None:
+        if self.post.journal is not None:
             arrivals = config.record == "all"
-            self.timed = self.traffic = TimedTraffic(keys, self.journal, arrivals=arrivals, whole=True)
+            self.timed = self.post.traffic = TimedTraffic(keys, self.post.journal, arrivals=arrivals, whole=True)
         for name in plant.inverters:
             self.routes[keys.state(name)] = self.routes[keys.set_points(name)] = Route(name, (State,), self._on_state)
             self.routes[keys.status(name)] = Route(name, (AgentStatus,), self._on_status, early=True)
@@ -137,7 +138,7 @@ class RealtimePlant(PlantNode):
         self._waiting_timer, self._ask_timer = Timer(WAITING, now), Timer(AGAIN, now + AGAIN)
         self._reporter.collect()
         names = ", ".join(self.config.agents) or "nobody"
-        self._say(f"run {self.config.run}: waits up to {self.config.wait_for_agents:g} s for {names}")
+        self.post.say(f"run {self.config.run}: waits up to {self.config.wait_for_agents:g} s for {names}")
         self._gather(now)
 
     def expire(self, now: float) -> None:
@@ -186,7 +187,7 @@ class RealtimePlant(PlantNode):
     def close(self, reason: str, now: float) -> None:
         for line in self._warnings.left_out():
             self._tell_warning(line)
-        self._say(f"ends: {reason}. {self.pacer}")
+        self.post.say(f"ends: {reason}. {self.pacer}")
         self._tell_the_end(reason)
         self.phase = "closing"
         self.recorder_feed.end()
@@ -227,7 +228,7 @@ class RealtimePlant(PlantNode):
             return
         self._refusals += 1
         if self._refusals <= REFUSALS:
-            self._say(f"refused {reason}" + ("; further refusals are not logged" * (self._refusals == REFUSALS)))
+            self.post.say(f"refused {reason}" + ("; further refusals are not logged" * (self._refusals == REFUSALS)))
         super()._refuse(name, instance, reason, now)
 
     def _may_tell(self, name: str, instance: str, now: float) -> bool:
@@ -241,17 +242,16 @@ class RealtimePlant(PlantNode):
     def _ask_again(self, now: float) -> None:
         if now >= self._ask_timer.due:
             self._ask_timer.take(now)
-            for name, instance in self.members.next_unmet():
-                self._ask(name, instance)
+            self.post.ask_again()
 
     def _recorder_came(self, name: str, now: float) -> None:
         if news := self.recorder_feed.came(name):
-            self._say(news)
+            self.post.say(news)
         self._gather(now)
 
     def _recorder_gone(self, name: str) -> None:
         if self.phase == "running" and (news := self.recorder_feed.gone(name)):
-            self._say(news)
+            self.post.say(news)
 
     def _met(self, nameplate: Nameplate, now: float) -> None:
         name = nameplate.sender
@@ -292,9 +292,9 @@ class RealtimePlant(PlantNode):
             if instance := self.members.instance(name):
                 reason = f"{name} leaves at t = {self.t:.2f} s, as the scenario says"
                 self.stop(self.keys.stop_request(name, instance), reason)
-                self._say(reason)
+                self.post.say(reason)
         if join:
-            self._say(f"{', '.join(join)} may join from t = {self.t:.2f} s on, as the scenario says")
+            self.post.say(f"{', '.join(join)} may join from t = {self.t:.2f} s on, as the scenario says")
             self._report(final=False, missing_agents=join)
 
     # ---------------------------------------------------------------- messages
@@ -319,7 +319,7 @@ class RealtimePlant(PlantNode):
         name = leave.sender
         instance = self.members.instance(name)
         self.stop(self.keys.stop_request(name, instance), f"{name} has left")
-        self._forget_process(name, instance)
+        self.post.process_gone(name, instance)
         self._forget(name)
         if self.phase in ("gathering", "running"):
             self._connect(name, False, now)
@@ -349,7 +349,7 @@ class RealtimePlant(PlantNode):
         if absent := self.absent:
             text = f"started without the agents of {', '.join(absent)}, which stay on primary droop until they come"
             self._note(absent[0], text)
-        self._say(f"t = 0; speed {self.config.speed:g}")
+        self.post.say(f"t = 0; speed {self.config.speed:g}")
 
     def _keep_pace(self, now: float) -> None:
         slipped = self.pacer.note(now)
@@ -415,7 +415,7 @@ class RealtimePlant(PlantNode):
 
     def _note(self, subject: str, text: str) -> None:
         self._note_event("roster", subject, f"{text}, at t = {self.t:.2f} s")
-        self._say(f"{text}, at t = {self.t:.2f} s")
+        self.post.say(f"{text}, at t = {self.t:.2f} s")
 
     def _warn(self, text: str, now: float) -> None:
         line = self._warnings.admit(text, now)
@@ -424,7 +424,7 @@ class RealtimePlant(PlantNode):
 
     def _tell_warning(self, text: str) -> None:
         self._note_event("warning", PLANT, text)
-        self._say(text)
+        self.post.say(text)
 
     def _publish(self, key: str, payload: bytes) -> None:
         if key == self.keys.telemetry:

@@ -217,8 +217,9 @@ def run_inprocess(
             side = _run_direct(plant_config, tuple(known.values()), laws, plant, note, on_other)
     failed = tuple(agent.failed for agent in agents if agent.failed)
     rejects = (*side.rejects.take_lines(), *(line for agent in agents for line in agent.rejects.take_lines()))
-    for node in (side, *agents):
-        node.routes.clear()  # methods of the node: in a cycle all that the run had would stay
+    nodes: tuple[_Node, ...] = side, *agents
+    for node in nodes:
+        node.post.release()
     return Outcome(
         broke=side.outcome,
         reproducible=side.reproducible,

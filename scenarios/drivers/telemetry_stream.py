@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from gridpeers.wire.codec import RejectedError, encode
 from gridpeers.wire.keys import epoch_of
-from gridpeers.wire.messages import PLANT, Answer, AnyMessage, Command, Journal, LinkReport, LinkRequest, Telemetry
-from gridpeers.wire.node import PlantFollower, Route
+from gridpeers.wire.messages import PLANT, Answer, Command, Journal, LinkReport, LinkRequest, Telemetry
+from gridpeers.wire.post import FollowedPlant, Post, Route
 
 QUIET = 1.5
 """Time (s) without a message of a running plant after which it is asked; it reports five times a second."""
@@ -100,42 +100,35 @@ class TelemetryStream:
         return True
 
 
-class TelemetryEndpoint(PlantFollower):
+class TelemetryEndpoint:
     """Accept the messages of one plant for recorders, from the first to the last."""
 
     def __init__(self, name: str, run: str, stream: TelemetryStream) -> None:
-        super().__init__(name, run)
-        self._name, self._stream = name, stream
+        post = self.post = Post(name, run, 1)
+        self._plant, self._stream = FollowedPlant(post), stream
         self._questions = 0
         self._recordable: list[Recordable] = []
-        self.routes[self.keys.telemetry] = Route(
-            PLANT, (Telemetry, LinkReport, Journal, LinkRequest), self._on_recordable
-        )
-        self.routes[self.keys.answer(name)] = Route(PLANT, (Answer,), self._on_answer)
-
-    @property
-    def finished(self) -> bool:
-        """False: messages before the end of the session are recorded too."""
-        return False
-
-    @property
-    def subscriptions(self) -> tuple[str, ...]:
-        return tuple(self.routes)
+        self._telemetry = post.keys.telemetry
+        recordable = Telemetry, LinkReport, Journal, LinkRequest
+        post.routes[self._telemetry] = Route(PLANT, recordable, self._on_recordable, relayed=(LinkReport, Journal))
+        post.routes[post.keys.answer(name)] = Route(PLANT, (Answer,), self._on_answer)
+        self.keys, self.rejects, self.subscriptions = post.keys, post.rejects, tuple(post.routes)
+        self.received, self.lost, self.take_rejects = post.received, post.lost, post.take_rejects
 
     def appeared(self, key: str) -> None:
         match self.keys.parts(key):
             case ("alive", "plant", part):
-                self._plant_appeared(part)
+                self._plant.appeared(part)
 
     def vanished(self, key: str) -> None:
         """Note that a token is gone, but for the followed plant's: a broken link takes it from a plant that goes on."""
         match self.keys.parts(key):
-            case ("alive", "plant", part) if epoch_of(part) != self.admission.epochs.get(PLANT):
-                self._plant_vanished(part)
+            case ("alive", "plant", part) if epoch_of(part) != self.post.admission.epochs.get(PLANT):
+                self._plant.vanished(part)
 
     def is_known(self, key: str, payload: bytes) -> bool:
         """Return True for what looks like a message of the plant; in simulated time that is all for recorders."""
-        return (self._stream.acknowledges and key == self.keys.telemetry) or super().is_known(key, payload)
+        return (self._stream.acknowledges and key == self._telemetry) or self.post.is_known(key, payload)
 
     def take(self) -> list[Recordable]:
         messages, self._recordable = self._recordable, []
@@ -147,12 +140,8 @@ class TelemetryEndpoint(PlantFollower):
         if number is None:
             return None
         self._questions += 1
-        name, seq = self._name, self._questions
+        name, seq = self.post.name, self._questions
         return encode(Command(sender=name, epoch=1, seq=seq, t=0.0, verb="telemetry", argument=number, reply_to=name))
-
-    def _admit(self, route: Route, message: AnyMessage, now: float) -> None:
-        if not isinstance(message, LinkReport | Journal):  # the plant has checked them
-            super()._admit(route, message, now)
 
     def _on_recordable(self, message: Recordable, payload: bytes, now: float) -> None:
         self._recordable += self._stream.take(message, now)

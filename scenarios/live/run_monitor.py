@@ -18,7 +18,7 @@ from gridpeers.scenarios.short_texts import in_order, short
 from gridpeers.wire.keys import Keys, epoch_of, run_of_plant
 from gridpeers.wire.membership import MOST_PROCESSES
 from gridpeers.wire.messages import MOST_INVERTERS, AgentStatus, Pacing, PlantEvent, Telemetry
-from gridpeers.wire.node import MOST_PLANTS
+from gridpeers.wire.post import MOST_PLANTS
 
 
 class RunTokens:

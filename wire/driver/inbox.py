@@ -8,7 +8,7 @@ Should the owner fall behind, or somebody send faster than it reads, then
 - tokens always wait: Zenoh keeps each in every process anyway.
 
 A known sender is recognised by its name and epoch in the first bytes; whoever copies these has the room of that one
-sender, and no more. All checks of `gridpeers.wire.node` follow.
+sender, and no more. All checks of `gridpeers.wire.post` follow.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ from tests.unit.agents.realtime_lab import T_C, Lab
 def test_a_neighbour_whose_certificate_no_link_has_is_not_used() -> None:
     """Its nameplate is an impostor's: it gets no epoch, so that none of its messages counts; both are reported."""
     lab = Lab()
-    lab.side.vouches = {"plant", "inv2"}.__contains__
+    lab.side.post.vouches = {"plant", "inv2"}.__contains__
     lab.token("plant")
     lab.meet("inv2", "inv3")
     for k in range(1, 20):
@@ -26,7 +26,7 @@ def test_a_neighbour_whose_certificate_no_link_has_is_not_used() -> None:
 def test_a_plant_whose_certificate_no_link_has_commands_nobody() -> None:
     """Its measurements are counted and dropped; the agent goes on waiting for a plant."""
     lab = Lab()
-    lab.side.vouches = {"inv2"}.__contains__
+    lab.side.post.vouches = {"inv2"}.__contains__
     lab.token("plant")
     lab.meet("inv2")
     for k in range(1, 10):

@@ -8,7 +8,7 @@ from gridpeers.scenarios.drivers.telemetry_stream import QUIET, TelemetryEndpoin
 from gridpeers.wire.codec import encode
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import Answer, LinkReport, LinkRequest, Telemetry
-from gridpeers.wire.node import MOST_PLANTS
+from gridpeers.wire.post import MOST_PLANTS
 
 KEYS = Keys("demo")
 

@@ -23,7 +23,7 @@ from gridpeers.wire.driver.inbox import Inbox
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.membership import MOST_PROCESSES
 from gridpeers.wire.messages import MOST_INVERTERS, AgentStatus, LinkReport, LinkRequest, Message, Telemetry
-from gridpeers.wire.node import MOST_PLANTS
+from gridpeers.wire.post import MOST_PLANTS
 from tests.hostile.cases import Truth, hostile
 from tests.toy.toy_configs import agent_config
 from tests.toy.toy_runs import by_link
