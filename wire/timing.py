@@ -148,13 +148,17 @@ class SessionDeadline:
         return next((name for name, since in self._since.items() if now - since >= self._patience + silent[name]), "")
 
 
+MOST_KINDS = 200
+"""Kinds of lines that a limit tells apart at once."""
+
 _NUMBER = re.compile(r"[0-9]+(?:\.[0-9]+)?")
 
 
 class RateLimit:
     """Pass the first lines of a kind, then one at each interval (s) with the number of omitted ones.
 
-    Lines that differ only in numbers are of one kind, and so are all lines beyond 200 kinds.
+    Lines that differ only in numbers are of one kind. All lines beyond 200 kinds are of one kind, too; a kind counts
+    until it may pass its whole burst again.
     """
 
     def __init__(self, burst: int = 20, interval: float = 10.0) -> None:
@@ -166,8 +170,9 @@ class RateLimit:
     def admit(self, text: str, now: float) -> str | None:
         """Return a line as it is, or with the number of omitted ones before it, or None to omit it."""
         kind = _NUMBER.sub("0", text)
-        if kind not in self._allowed and len(self._allowed) >= 200:
-            kind = ""
+        if kind not in self._allowed and len(self._allowed) >= MOST_KINDS:
+            self._forget(now)
+            kind = kind if len(self._allowed) < MOST_KINDS else ""
         allowed, since = self._allowed.get(kind, (float(self._burst), now))
         allowed = min(float(self._burst), allowed + (now - since) / self._interval)
         left, _ = self._left.pop(kind, (0, ""))
@@ -177,6 +182,14 @@ class RateLimit:
             return None
         self._allowed[kind] = allowed - 1.0, now
         return f"{text} ({left} more of this kind left out)" if left else text
+
+    def _forget(self, now: float) -> None:
+        """Forget the kinds that may pass their whole burst again, and of which no line was left out."""
+        self._allowed = {
+            kind: (allowed, since)
+            for kind, (allowed, since) in self._allowed.items()
+            if kind in self._left or allowed + (now - since) / self._interval < self._burst
+        }
 
     def left_out(self) -> list[str]:
         """Take out one line per kind on its omitted lines, e.g. at the end."""
