@@ -23,11 +23,6 @@ if TYPE_CHECKING:
     from gridpeers.plant.tables import FeederError
     from gridpeers.scenarios.schema import ScenarioError, ScenarioModel
 
-Dask = Annotated[
-    str,
-    typer.Option("--dask", metavar="ADDRESS", help="Dask scheduler to use instead, e.g. tcp://10.0.0.1:8786."),
-]
-
 ScenarioName = Annotated[
     str, typer.Argument(metavar="SCENARIO", help="A name that `gridpeers list` shows, or the path of a file.")
 ]

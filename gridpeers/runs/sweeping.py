@@ -38,7 +38,6 @@ def sweep(
     metrics: str | Iterable[Any] | None = None,
     histories: bool = False,
     jobs: int | None = None,
-    dask: str = "",
     progress: Callable[[int, int], None] | None = None,
 ) -> pd.DataFrame:
     """Run a scenario over values of its keys, and return a row per run.
@@ -46,7 +45,7 @@ def sweep(
     Its columns are case, seed, the varied keys, `status` ("ran", "broke" or "law failed") and `why`, the metrics as
     "WINDOW.METRIC" (nan where there is no value), and without `metrics` also `history_sha256` and the like. Units are
     in its `attrs`. ScenarioError has everything that is wrong with the values, before anything is run; WorkersError
-    if the scheduler does not answer, or a worker has gone.
+    if a worker has gone.
 
     Parameters
     ----------
@@ -63,19 +62,17 @@ def sweep(
         Give each row its history, in a column of that name, as `Result.history`.
     jobs : int, optional
         Processes; one per core when left out. More than one needs joblib, of the extra `sweep`.
-    dask : str, optional
-        Address of a Dask scheduler to use instead, e.g. "tcp://10.0.0.1:8786" (docs/sweeps.md).
     progress : Callable[[int, int], None], optional
         Takes the number of runs that are done, and of all runs.
     """
     known = as_scenario(scenario)
-    _check_words(metrics, jobs, dask, progress)
+    _check_words(metrics, jobs, progress)
     checked, chosen = _with_metrics(known, metrics)
     plan = _plan(checked, grid or {}, zip or {}, (cases,) if isinstance(cases, str) else cases or (), seeds)
     done: dict[int, SweepRow] = {}
     kept: dict[int, pd.DataFrame | None] = {}
     calls = [(number, run.scenario, run.case) for number, run in enumerate(plan.runs)]
-    results = on_workers(calls, _jobs(plan, jobs, dask), run_with_history if histories else _run, dask)
+    results = on_workers(calls, _jobs(plan, jobs), run_with_history if histories else _run)
     with closing(results):
         for row, history in results:
             done[row.number] = row
@@ -93,14 +90,12 @@ def sweep(
     return frame
 
 
-def _check_words(metrics: Any, jobs: Any, dask: Any, progress: Any) -> None:
+def _check_words(metrics: Any, jobs: Any, progress: Any) -> None:
     wrong = []
     if metrics is not None and not isinstance(metrics, Iterable) and not callable(metrics):
         wrong.append(f"metrics: needs a list of names, or None for all, got {metrics!r:.60}")
     if jobs is not None and (isinstance(jobs, bool) or not isinstance(jobs, int) or jobs < 1):
         wrong.append(f"jobs: must be a whole number, 1 or more, or None for one per core; got {jobs!r:.60}")
-    if not isinstance(dask, str):
-        wrong.append(f'dask: must be the address of a scheduler, as "tcp://10.0.0.1:8786", got {dask!r:.60}')
     if progress is not None and not callable(progress):
         wrong.append(f"progress: must be a function of two whole numbers, got {progress!r:.60}")
     if wrong:
@@ -149,15 +144,11 @@ def _plan(scenario: Scenario, grid: Any, zipped: Any, cases: Any, seeds: Any) ->
     return plan_of(request, BaseScenario(scenario.tables, scenario.path, scenario.spec, scenario.feeder))
 
 
-def _jobs(plan: Plan, jobs: int | None, dask: str) -> int:
+def _jobs(plan: Plan, jobs: int | None) -> int:
     """Return how many processes share the runs; definitions of a notebook are known to its own process alone."""
     lacking = find_spec("joblib") is None
-    unknown = [text for run in plan.runs for text in check_portable(run.scenario, measures=True)]
-    if dask and (lacking or find_spec("distributed") is None):
-        raise ScenarioError(["dask: needs joblib and distributed: pip install 'gridpeers[sweep]'"])
-    if dask and unknown:
-        raise ScenarioError(list(dict.fromkeys(unknown)))
-    if unknown or dask or (lacking and jobs is None):
+    unknown = any(check_portable(run.scenario, measures=True) for run in plan.runs)
+    if unknown or (lacking and jobs is None):
         return 1
     count = min(cores() if jobs is None else jobs, len(plan.runs))
     if lacking and count > 1:

@@ -84,8 +84,6 @@ class Campaign:
     runs: int
     driver: Driver = "inprocess"
     jobs: int = 1
-    dask: str = ""
-    """Address of a Dask scheduler to use instead; its workers have their own folders for temporary files."""
     path: Path | None = None
     command: str = ""
     rows: dict[int, ChaosRow] = field(default_factory=dict)
@@ -99,10 +97,9 @@ class Campaign:
         """
         try:
             with closing(TransientFolder("gridpeers-chaos-")) as temporary:  # workers that are ended leave theirs in it
-                within = None if self.dask else temporary.path
-                self._do_runs(stage, within)
+                self._do_runs(stage, temporary.path)
                 self._add_failures()
-                self._shrink_all(stage, within)
+                self._shrink_all(stage, temporary.path)
             self._conclude()
             set_complete(self._file())
         except BaseException as error:
@@ -114,11 +111,11 @@ class Campaign:
                 self._conclude()
             raise
 
-    def _do_runs(self, stage: Stage, within: Path | None) -> None:
+    def _do_runs(self, stage: Stage, within: Path) -> None:
         text, driver = self.base.text, self.driver
         calls = ((text, self.seed, number, schedule, driver, within) for number, schedule in self._missing())
         jobs = 1 if driver == "processes" else self.jobs
-        with stage(self.runs) as tell, closing(on_workers(calls, jobs, run_number, self.dask)) as results:
+        with stage(self.runs) as tell, closing(on_workers(calls, jobs, run_number)) as results:
             progress = f"{self.base.scenario.name}, {{}} of {self.runs} runs"
             tell(progress.format(len(self.rows)), len(self.rows))
             for row in results:
@@ -142,7 +139,7 @@ class Campaign:
             row = next(row for row in rows if violated in row.violated)
             self.failures[violated] = Failure(row, row, self.write_failure(violated, row, row))
 
-    def _shrink_all(self, stage: Stage, within: Path | None) -> None:
+    def _shrink_all(self, stage: Stage, within: Path) -> None:
         if not self.failures:
             return
         kinds = counted(len(self.failures), "kind of failure", "kinds of failure")
@@ -150,7 +147,7 @@ class Campaign:
         for name, it in self.failures.items():  # processes only for a failure that one process cannot show
             driver = self.driver if name in (SAME_IN_PROCESSES, REPEATS) else "inprocess"
             calls.append((self.base.text, self.seed, it.row.number, name, driver, within))
-        workers = on_workers(calls, min(self.jobs, len(calls)), shrink_number, self.dask)
+        workers = on_workers(calls, min(self.jobs, len(calls)), shrink_number)
         with stage(len(calls)) as tell, closing(workers) as simpler:
             tell(f"shrinking, 0 of {kinds}", 0)
             for done, (violated, simplest) in enumerate(simpler, start=1):

@@ -16,7 +16,6 @@ from gridpeers.cli.usage import (
     BROKEN,
     CLAIM_FAILED,
     PASSED,
-    Dask,
     ScenarioName,
     chosen,
     fail,
@@ -54,7 +53,6 @@ def chaos(
         str | None, typer.Option(metavar="NAME", help="Case to disturb; the last one of the file when left out.")
     ] = None,
     jobs: Annotated[int | None, typer.Option(min=1, metavar="N", help="Processes; one per core when left out.")] = None,
-    dask: Dask = "",
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Folder for the results, new or empty; runs/SCENARIO-chaos/TIME if left out."),
@@ -86,12 +84,7 @@ def chaos(
         fail([f'{scenario}: plant.simulator = "{simulator}" lets nobody leave or join; use "gridpeers"'], BAD_INPUT)
     if spec.security == "mtls" and driver == "processes":
         fail([f'{scenario}: security = "mtls" needs certificates, which chaos does not take; leave it out'], BAD_INPUT)
-    if dask and driver == "processes":
-        fail(["--dask: its workers run each run in one process; leave --driver processes out"], BAD_INPUT)
-    require(
-        _PACKAGES | ({"distributed": "--dask"} if dask else {}),
-        "install what chaos needs: pip install 'gridpeers[chaos]'",
-    )
+    require(_PACKAGES, "install what chaos needs: pip install 'gridpeers[chaos]'")
     from datetime import datetime
 
     from gridpeers.cli.progress import remaining
@@ -124,7 +117,6 @@ def chaos(
             runs=runs or first_runs,
             driver=driver,
             jobs=jobs or cores(),
-            dask=dask,
             path=resume,
         )
         words = ["chaos", scenario, "--case", campaign.base.case]
@@ -170,8 +162,7 @@ def _try_undisturbed(console: Console, campaign: Campaign) -> None:
         advice = f"choose another case (--case), or switch these checks off in the scenario{entry} (docs/checks.md)"
         lines = [f"{name}: violated without any disturbance: {text}" for text in row.violated.values()]
         fail([*lines, advice], BAD_INPUT)
-    by = "each with processes and again in one" if campaign.driver == "processes" else f"{campaign.jobs} at a time"
-    how = f"by the workers of {campaign.dask}" if campaign.dask else by
+    how = "each with processes and again in one" if campaign.driver == "processes" else f"{campaign.jobs} at a time"
     typer.echo(f"{name}: it violates nothing; next {counted(campaign.runs, 'run')} with disturbances, {how} ...")
 
 

@@ -15,7 +15,6 @@ from gridpeers.cli.usage import (
     BAD_INPUT,
     BROKEN,
     CLAIM_FAILED,
-    Dask,
     check_choice,
     ended_by_signals,
     fail,
@@ -39,7 +38,6 @@ def experiment(
     jobs: Annotated[
         int | None, typer.Option(min=1, metavar="N", help="Processes of a sweep; one per core when left out.")
     ] = None,
-    dask: Dask = "",
 ) -> None:
     """Run an experiment on late, lossy or broken links.
 
@@ -60,12 +58,7 @@ def experiment(
     check_choice("", "experiment", name, tuple(EXPERIMENTS))
     source, folder = EXPERIMENTS[name], RUNS / "experiments" / name if out is None else out
     again = ["experiment", name, *(["--out", str(out)] if out else [])]
-    if source.sweep:
-        result = _from_sweep(source, folder, jobs, dask, again)
-    elif dask:
-        fail([f"--dask: goes with the experiments that are sweeps; {name} is one run"], BAD_INPUT)
-    else:
-        result = _from_scenario(source, folder)
+    result = _from_sweep(source, folder, jobs, again) if source.sweep else _from_scenario(source, folder)
     try:
         files = result.write(folder)
     except OSError as error:
@@ -74,16 +67,14 @@ def experiment(
         typer.echo(shown(path))
 
 
-def _from_sweep(
-    source: Experiment, folder: Path, jobs: int | None, dask: str, again: Sequence[str]
-) -> ExperimentResult:
+def _from_sweep(source: Experiment, folder: Path, jobs: int | None, again: Sequence[str]) -> ExperimentResult:
     """Do the runs of the sweep that are not done yet, and draw."""
     import pandas as pd
 
     from gridpeers.papers.singhal2022.experiments.experiment_data import SweepData
 
-    plan = read(source.sweep, dask)
-    summary = finish(source.sweep, plan, folder, jobs, dask, again)
+    plan = read(source.sweep)
+    summary = finish(source.sweep, plan, folder, jobs, again)
     if summary.law_failed:
         fail(failure_lines(summary), CLAIM_FAILED)
     if summary.broke:

@@ -141,14 +141,14 @@ class Summary:
     plots: tuple[Path, ...]
 
 
-def study(plan: Plan, folder: SweepFolder, tell: Callable[[int], None], *, jobs: int, dask: str = "") -> Summary:
+def study(plan: Plan, folder: SweepFolder, tell: Callable[[int], None], *, jobs: int) -> Summary:
     """Do the runs of a sweep that are not done yet, and write its results; `tell` hears how many are done by now."""
     before = len(folder.done)
     tell(before)
     left = [(i, run.scenario, run.case) for i, run in enumerate(plan.runs) if i not in folder.done]
     try:
         if left:
-            with closing(on_workers(left, min(jobs, len(left)), run_one, dask)) as results:
+            with closing(on_workers(left, min(jobs, len(left)), run_one)) as results:
                 for row in results:
                     folder.add(row)
                     tell(len(folder.done))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import math
-import threading
 from dataclasses import asdict
 from functools import lru_cache
 from typing import Any, Literal
@@ -31,8 +30,8 @@ from gridpeers.wire.wording import utf8
 
 KEPT_PLANTS = 4  # Plants at t = 0 that a worker keeps; one is about 1 MB
 
-_kept = threading.local()
-"""Plants of this thread, by their configuration: a worker of Dask may be a thread among others."""
+_plants: dict[bytes, Plant] = {}
+"""Plants at t = 0 of this process, by their configuration."""
 
 _feeder = lru_cache(maxsize=8)(read_feeder)
 
@@ -143,10 +142,9 @@ def flat(label: str, values: dict[str, Any]) -> dict[str, float | None]:
 
 
 def plant_at_start(config: PlantConfig) -> Plant:
-    """Return a plant at t = 0, copied from one that this thread has built before: that saves a fifth of a run."""
-    plants: dict[bytes, Plant] = _kept.__dict__.setdefault("plants", {})
+    """Return a plant at t = 0, copied from one that this process has built before: that saves a fifth of a run."""
     key = msgspec.json.encode((config.settings, config.T_c, config.record_step))  # tables in it have no hash
-    plants[key] = plants.pop(key) if key in plants else build_plant(config)  # the latest is the last
-    if len(plants) > KEPT_PLANTS:
-        del plants[next(iter(plants))]
-    return copy.deepcopy(plants[key])
+    _plants[key] = _plants.pop(key) if key in _plants else build_plant(config)  # the latest is the last
+    if len(_plants) > KEPT_PLANTS:
+        del _plants[next(iter(_plants))]
+    return copy.deepcopy(_plants[key])

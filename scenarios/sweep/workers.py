@@ -1,4 +1,4 @@
-"""Many runs, such as a sweep's: in this process, over all cores of this machine, or over a Dask cluster by joblib.
+"""Many runs, such as a sweep's: in this process, or over all cores of this machine by joblib.
 
 Ctrl-C is for the command alone: workers are started with SIGINT blocked, and ended when the command leaves. They write
 nothing to the terminal: a run's error comes as its result.
@@ -23,11 +23,10 @@ Calls = Iterable[tuple[Any, ...]]
 """Arguments of the task for each run, such as its number, its scenario and its case; taken as workers become free."""
 
 _WARNINGS = "PYTHONWARNINGS"
-DASK_PATIENCE = 10.0  # Longest wait for a scheduler, and for its first worker (s)
 
 
 class WorkersError(RuntimeError):
-    """No worker is to be had, or one has gone."""
+    """A worker has gone."""
 
 
 def cores() -> int:
@@ -36,27 +35,13 @@ def cores() -> int:
     return int(cpu_count())
 
 
-def on_workers(runs: Calls, jobs: int, task: Task[T], dask: str = "") -> Generator[T, None, None]:
-    """Do the runs on the Dask cluster of a scheduler, if its address is given, else in `jobs` processes here.
-
-    Results come in whatever order; close the generator to end the workers early. Workers of Dask need the same
-    gridpeers and the feeders' folders.
-    """
-    if not dask and jobs == 1:
+def on_workers(runs: Calls, jobs: int, task: Task[T]) -> Generator[T, None, None]:
+    """Do the runs in `jobs` processes; results come in any order, and closing the generator ends the workers early."""
+    if jobs == 1:
         for call in runs:
             yield task(*call)
         return
     from joblib import parallel_config
-
-    if dask:
-        client = _client(dask)
-        with client, parallel_config(backend="dask", client=client, wait_for_workers_timeout=DASK_PATIENCE):
-            try:
-                yield from _parallel(runs, task)
-            except TimeoutError:
-                text = f"--dask {dask}: the scheduler has no worker; start some by `dask worker`"
-                raise WorkersError(text) from None
-        return
     from joblib.externals.loky import get_reusable_executor
 
     with parallel_config(backend="loky", n_jobs=jobs, initializer=_prepare, initargs=(os.getpid(),)):
@@ -64,19 +49,6 @@ def on_workers(runs: Calls, jobs: int, task: Task[T], dask: str = "") -> Generat
             yield from _parallel(runs, task)
         finally:
             get_reusable_executor(reuse=True).shutdown(wait=True, kill_workers=True)
-
-
-def _client(address: str) -> Any:
-    import distributed
-
-    connect: Any = distributed.Client  # it has no types
-    try:
-        return connect(address, timeout=DASK_PATIENCE, set_as_default=False)
-    except (OSError, ValueError) as error:
-        raise WorkersError(
-            f"--dask {address}: no Dask scheduler answers there ({type(error).__name__}); start one by `dask "
-            "scheduler`, workers by `dask worker ADDRESS`, and give its address, e.g. tcp://127.0.0.1:8786"
-        ) from None
 
 
 def _parallel(runs: Calls, task: Task[T]) -> Generator[T, None, None]:

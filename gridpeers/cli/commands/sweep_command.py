@@ -14,7 +14,6 @@ from gridpeers.cli.usage import (
     BROKEN,
     CLAIM_FAILED,
     PASSED,
-    Dask,
     exit_code,
     fail,
     interruptible,
@@ -39,7 +38,6 @@ def sweep(
         typer.Option(metavar="DIR", help="Folder, new or this sweep's from before; runs/sweeps/NAME when left out."),
     ] = None,
     jobs: Annotated[int | None, typer.Option(min=1, metavar="N", help="Processes; one per core when left out.")] = None,
-    dask: Dask = "",
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Check everything, tell the size, and run nothing.")
     ] = False,
@@ -53,14 +51,14 @@ def sweep(
 
     Example:  gridpeers sweep topology --jobs 2
     """
-    plan = read(file, dask)
+    plan = read(file)
     if dry_run:
         typer.echo(_size(file, plan))
         return
     from gridpeers.scenarios.sweep.study import folder_of
 
     again = ["sweep", file, *(["--out", str(out)] if out else [])]
-    summary = finish(file, plan, folder_of(out, plan.name), jobs, dask, again)
+    summary = finish(file, plan, folder_of(out, plan.name), jobs, again)
     for line in failure_lines(summary):
         typer.secho(line, fg="red", bold=True)
     broke = sum(summary.broke.values())
@@ -78,20 +76,18 @@ def sweep(
     raise typer.Exit(CLAIM_FAILED if summary.law_failed else PASSED)
 
 
-def read(file: str, dask: str) -> Plan:
+def read(file: str) -> Plan:
     """Return the plan of a sweep; or end with every problem in it, or with what to install."""
     try:
         plan = read_sweep(file)
     except ScenarioError as error:
         refuse(error)
     modules = {"joblib": "the runs over all cores", "pyarrow": "the table"}
-    if dask:
-        modules["distributed"] = "--dask"
     require(modules, "install what sweeps need: pip install 'gridpeers[sweep]'")
     return plan
 
 
-def finish(file: str, plan: Plan, path: Path, jobs: int | None, dask: str, again: Sequence[str]) -> Summary:
+def finish(file: str, plan: Plan, path: Path, jobs: int | None, again: Sequence[str]) -> Summary:
     """Do what is left of a sweep, showing how far it is; whatever ends it early ends the command.
 
     `again` has the words of the command that goes on with what was interrupted.
@@ -109,7 +105,6 @@ def finish(file: str, plan: Plan, path: Path, jobs: int | None, dask: str, again
                         folder,
                         lambda done: tell(f"{plan.name}, {done} of {size} runs", done),
                         jobs=jobs or cores(),
-                        dask=dask,
                     )
             except (KeyboardInterrupt, OSError, WorkersError) as error:
                 onward = command_line(*again)

@@ -15,13 +15,11 @@ from gridpeers.cli.usage import (
     BROKEN,
     CLAIM_FAILED,
     PASSED,
-    Dask,
     check_choice,
     exit_code,
     fail,
     interruptible,
     refuse,
-    require,
     terminal,
 )
 from gridpeers.output_folders import FolderError, OutputLostError, new_folder, refusal, set_broken, shown
@@ -44,7 +42,6 @@ def reproduce(
     jobs: Annotated[
         int | None, typer.Option(min=1, metavar="N", help="Random graphs at a time; one per core when left out.")
     ] = None,
-    dask: Dask = "",
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Folder for the report, new or empty; runs/reproduce/TIME when left out."),
@@ -65,14 +62,12 @@ def reproduce(
 
     if only is not None:
         check_choice("--only: ", "part", only, CHOICES)
-    if dask:
-        require({"joblib": "--dask", "distributed": "--dask"})
     now, console = datetime.now().astimezone(), terminal()
     try:
         folder = new_folder(out, "reproduce", now)
     except FolderError as error:
         fail([str(error)], BAD_INPUT)
-    work = Work(chosen(only), driver, folder, seed, jobs, dask)
+    work = Work(chosen(only), driver, folder, seed, jobs)
     left = f"what came until then is in {shown(folder)}/"
     try:
         with interruptible():

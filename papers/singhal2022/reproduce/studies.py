@@ -59,8 +59,8 @@ def graphs(inverters: int, seed: int) -> Iterator[gp.random_graphs.Edges]:
         yield from gp.random_graphs.connected_graphs(inverters, links, PER_COUNT, seed)
 
 
-def topology_study(seed: int, tell: Tell, *, jobs: int | None, dask: str = "") -> GraphFindings:
-    """Run the islanding of case IV on every graph, in one process each; `jobs` and `dask` as of `gridpeers.sweep`."""
+def topology_study(seed: int, tell: Tell, *, jobs: int | None) -> GraphFindings:
+    """Run the islanding of case IV on every graph, in one process each; `jobs` as of `gridpeers.sweep`."""
     scenario = gp.load("islanding")
     names = scenario.inverters
     drawn = list(graphs(len(names), seed))
@@ -69,7 +69,7 @@ def topology_study(seed: int, tell: Tell, *, jobs: int | None, dask: str = "") -
     base = scenario.replace({**first, "event": scenario.tables["event"][:1]})
     progress = _counted(tell, "graphs")
     progress(0, len(drawn))
-    rows = gp.sweep(base, {"case.IV.links": links}, cases=["IV"], jobs=jobs, dask=dask, progress=progress)
+    rows = gp.sweep(base, {"case.IV.links": links}, cases=["IV"], jobs=jobs, progress=progress)
     for edges, (_, row) in zip(drawn, rows.iterrows(), strict=True):
         if row["status"] != "ran":
             raise RuntimeError(f"topology, a graph with {len(edges)} links: {row['why']}")
@@ -104,12 +104,10 @@ BANKS: dict[str, dict[str, int]] = {
 """Variants: kvar a phase, by bus."""
 
 
-def bank_study(
-    base: gp.Scenario, folder: Path, tell: Tell, *, jobs: int | None, dask: str = ""
-) -> dict[str, EventValues]:
+def bank_study(base: gp.Scenario, folder: Path, tell: Tell, *, jobs: int | None) -> dict[str, EventValues]:
     """Run all cases of the islanding over all variants, and return their MQSI by variant, case and event.
 
-    The folder takes the variants' feeders; `jobs` and `dask` as of `gridpeers.sweep`.
+    The folder takes the variants' feeders; `jobs` as of `gridpeers.sweep`.
     """
     standard = feeder_folder(base.spec.plant.feeder)
     feeders = {
@@ -119,7 +117,7 @@ def bank_study(
     progress = _counted(tell, "runs")
     progress(0, len(BANKS) * len(CASES))
     varied = {"plant.feeder": list(feeders)}
-    rows = gp.sweep(base.replace({"paper": None}), varied, cases=CASES, jobs=jobs, dask=dask, progress=progress)
+    rows = gp.sweep(base.replace({"paper": None}), varied, cases=CASES, jobs=jobs, progress=progress)
     found: dict[str, dict[tuple[str, str], float]] = {variant: {} for variant in BANKS}
     for row in rows.fillna(dict.fromkeys((f"{event}.MQSI" for event in EVENTS), 0.0)).to_dict("records"):
         variant = feeders[row["plant.feeder"]]

@@ -110,8 +110,7 @@ class PartResult:
 class Work:
     """The runs of some parts, each in `runs/PART` of a folder; the topologies are always run without processes.
 
-    `seed` is in place of the scenarios' own; `jobs` and `dask` are for the studies of many runs, as of
-    `gridpeers.sweep`.
+    `seed` is in place of the scenarios' own; `jobs` is for the studies of many runs, as of `gridpeers.sweep`.
     """
 
     def __init__(
@@ -121,9 +120,8 @@ class Work:
         folder: Path,
         seed: int | None,
         jobs: int | None,
-        dask: str = "",
     ) -> None:
-        self.parts, self.driver, self.folder, self.jobs, self.dask = parts, driver, folder, jobs, dask
+        self.parts, self.driver, self.folder, self.jobs = parts, driver, folder, jobs
         changes = {} if seed is None else {"seed": seed}
         self._loaded = {
             part.name: gp.load("islanding" if part.name in _STUDIES else part.name).replace(changes) for part in parts
@@ -198,11 +196,11 @@ class Work:
         return run.findings, run.sha256, run.numbers, run.plot
 
     def _topology(self, part: Part, folder: Path, tell: Tell) -> _PartOutput:
-        found = topology_study(self.seed, tell, jobs=self.jobs, dask=self.dask)
+        found = topology_study(self.seed, tell, jobs=self.jobs)
         return found, {}, None, lambda _: topologies(found.graphs)
 
     def _banks(self, part: Part, folder: Path, tell: Tell) -> _PartOutput:
-        ours = bank_study(self._loaded[part.name], folder, tell, jobs=self.jobs, dask=self.dask)
+        ours = bank_study(self._loaded[part.name], folder, tell, jobs=self.jobs)
         metrics = [
             {"variant": variant, "case": case, "MQSI": {event: values[case, event] for event in EVENTS}}
             for variant, values in ours.items()

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from gridpeers.scenarios.sweep import workers
 from tests import command_line
 from tests.unit.scenarios.sweep.conftest import Write
 
@@ -57,18 +56,6 @@ def test_what_is_missing_is_told_with_what_to_install(monkeypatch: pytest.Monkey
         "gridpeers: install what sweeps need: pip install 'gridpeers[sweep]'\n",
     )
     assert invoke("topologi")[1].startswith('gridpeers: no sweep "topologi"; '), "nothing to install for a wrong name"
-
-
-def test_no_scheduler_at_the_address_is_told(sweep_file: Write, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Exit code 3, the address, and how to start a cluster; what is done is kept."""
-    monkeypatch.setattr(workers, "DASK_PATIENCE", 0.2)
-    sweep_file(GRID)
-
-    code, text = invoke("mine.toml", "--dask", "tcp://127.0.0.1:1")
-
-    assert code == 3
-    assert "--dask tcp://127.0.0.1:1: no Dask scheduler answers there" in text
-    assert "0 of 2 runs are kept in runs/sweeps/mine/; go on with: gridpeers sweep mine.toml\n" in text
 
 
 def test_a_full_disk_ends_a_sweep_that_can_go_on(sweep_file: Write, tmp_path: Path) -> None:
