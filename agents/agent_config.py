@@ -10,7 +10,7 @@ from gridpeers.wire.codec import RejectedError, decode, encode
 from gridpeers.wire.journal import RecordLevel
 from gridpeers.wire.messages import Nameplate
 from gridpeers.wire.plugins.plugin import Plugin
-from gridpeers.wire.schema.table_schema import NO_KEY, Below, Example, Label, Plausible, Range, Unit
+from gridpeers.wire.schema.table_schema import NO_KEY, Below, Example, Plausible, Range, Unit
 from gridpeers.wire.trust.credentials import Credentials
 
 MAX_AGE = 0.25
@@ -20,19 +20,15 @@ MAX_AGE = 0.25
 class Gains(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Gains and limits of the secondary law (12)-(15), per unit of own rating, w in pu."""
 
-    k_p: Annotated[
-        float, Unit("s", in_key=False), Label("gain of P_set, k_p"), Plausible("gain k_p", 1e-7, 1e3, above_zero=True)
-    ] = 0.0007
+    k_p: Annotated[float, Unit("s", in_key=False), Plausible("gain k_p", 1e-7, 1e3, above_zero=True)] = 0.0007
     """P_set gain (s; pu frequency per (pu power / s)). kappa = m_p / k_p is the rate, 1/s."""
-    k_q: Annotated[
-        float, Unit("s", in_key=False), Label("gain of V_set, k_q"), Plausible("gain k_q", 1e-5, 1e5, above_zero=True)
-    ] = 0.25
+    k_q: Annotated[float, Unit("s", in_key=False), Plausible("gain k_q", 1e-5, 1e5, above_zero=True)] = 0.25
     """V_set gain (s; pu reactive droop per (pu voltage / s))."""
-    alpha: Annotated[float, Label("weight of the voltage error, alpha"), Plausible("gain alpha", 0.0, 1e4)] = 1.0
+    alpha: Annotated[float, Plausible("gain alpha", 0.0, 1e4)] = 1.0
     """Weight of the voltage error in (15), GFM only."""
-    beta_GFM: Annotated[float, Label("weight of var sharing, GFM, beta"), Plausible("gain beta_GFM", 0.0, 1e4)] = 1.0
+    beta_GFM: Annotated[float, Plausible("gain beta_GFM", 0.0, 1e4)] = 1.0
     """Weight of the var-sharing sum in (15)."""
-    beta_GFL: Annotated[float, Label("weight of var sharing, GFL, beta"), Plausible("gain beta_GFL", 0.0, 1e4)] = 1.0
+    beta_GFL: Annotated[float, Plausible("gain beta_GFL", 0.0, 1e4)] = 1.0
     """Weight of the var-sharing sum of a GFL, (14). The paper has 1."""
     alpha_min: Annotated[float, Below("alpha", only_with="V_full"), Plausible("gain alpha_min", 0.0, 1e4)] = 0.0
     """Least weight of a small voltage error, for V_full; below alpha."""

@@ -22,7 +22,6 @@ from gridpeers.wire.schema.table_reading import shown
 from gridpeers.wire.schema.table_schema import (
     After,
     Example,
-    Label,
     OtherKeys,
     Plausible,
     Problem,
@@ -154,23 +153,23 @@ def _written_own(plugin: Plugin) -> tuple[str, dict[str, Any]]:
 class Fault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
     """Faults of some links for a time. A message is judged by the entries that hold at the time it was sent."""
 
-    on: Annotated[str, Label("which links"), Example('"inv4 <-> inv7"')]
+    on: Annotated[str, Example('"inv4 <-> inv7"')]
     """Which links, e.g. "inv4 <-> inv7"; see `gridpeers.netem.schema.pattern`."""
-    from_s: Annotated[RunTime, Label("faults begin at")] = 0.0
+    from_s: RunTime = 0.0
     """From when (s of run time)."""
-    to_s: Annotated[EndTime, Label("faults end at")] = None
+    to_s: EndTime = None
     """Until when (s); without it, to the end of the run."""
     profile: str = ""
     """Name of a profile; keys given beside it take the place of the profile's."""
-    delay: Annotated[AnyDelay | float | None, Label("delay of the links"), Shorthand(Constant, "delay_s")] = None
+    delay: Annotated[AnyDelay | float | None, Shorthand(Constant, "delay_s")] = None
     """Delay; a number is a constant one (s)."""
-    loss: Annotated[AnyLoss | float | None, Label("probability of loss"), Shorthand(Bernoulli, "p")] = None
+    loss: Annotated[AnyLoss | float | None, Shorthand(Bernoulli, "p")] = None
     """Loss; a number is an independent probability."""
-    duplicate: Annotated[Duplicate | float | None, Label("probability of duplicates"), Shorthand(Duplicate, "p")] = None
+    duplicate: Annotated[Duplicate | float | None, Shorthand(Duplicate, "p")] = None
     """Duplicates; a number is their probability."""
-    corrupt: Annotated[Corrupt | float | None, Label("probability of flipped bits"), Shorthand(Corrupt, "p")] = None
+    corrupt: Annotated[Corrupt | float | None, Shorthand(Corrupt, "p")] = None
     """Flipped bits; a number is their probability."""
-    rate: Annotated[Rate | float | None, Label("rate of the links"), Shorthand(Rate, "bytes_per_s")] = None
+    rate: Annotated[Rate | float | None, Shorthand(Rate, "bytes_per_s")] = None
     """Finite rate; a number is bytes per second."""
     slots: Slots | None = None
     """Time slots."""

@@ -22,7 +22,6 @@ from gridpeers.wire.schema.table_schema import (
     INLINE,
     Divides,
     Example,
-    Label,
     MultipleOf,
     NamedTables,
     Plausible,
@@ -50,19 +49,15 @@ class Time(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         float,
         Unit("s"),
         MultipleOf("T_c_s"),
-        Label("end of the run"),
         Plausible("the duration of a run", 0.001, LONGEST_RUN, above_zero=True),
     ]
     """Duration of the run (s), a multiple of T_c_s."""
-    T_c_s: Annotated[
-        float, Unit("s"), Label("control period, T_c"), Plausible("a control period", 0.0005, 2.0, above_zero=True)
-    ] = 0.02
+    T_c_s: Annotated[float, Unit("s"), Plausible("a control period", 0.0005, 2.0, above_zero=True)] = 0.02
     """Control period (s): each agent decides once in it."""
     h_s: Annotated[
         float,
         Unit("s"),
         Divides("T_c_s"),
-        Label("integration step, h"),
         Plausible("an integration step", 1e-5, 0.02, above_zero=True),
     ] = 0.002
     """Integration step of the plant (s); divides T_c_s."""
@@ -107,13 +102,11 @@ class PlantTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     federate of a HELICS co-simulation (helics.md)."""
     feeder: str = "microgrid123"
     """Name of a feeder that comes with gridpeers, or a path to a folder of the same layout, seen from this file."""
-    load_set: Annotated[str, Label("load set")] = "main"
+    load_set: str = "main"
     """Which load table of the feeder: "main" or "event2"."""
-    P_set0_pu: Annotated[float, Unit("pu"), Label("first P_set"), Plausible("a power set-point", 0.0, 1.2)] = 0.647
+    P_set0_pu: Annotated[float, Unit("pu"), Plausible("a power set-point", 0.0, 1.2)] = 0.647
     """First P_set of every inverter (pu of its rating)."""
-    V_set0_pu: Annotated[
-        float, Unit("pu"), Label("first V_set"), Plausible("a voltage set-point", 0.8, 1.2, above_zero=True)
-    ] = 1.0
+    V_set0_pu: Annotated[float, Unit("pu"), Plausible("a voltage set-point", 0.8, 1.2, above_zero=True)] = 1.0
     """First V_set of every inverter (pu of its nominal voltage)."""
     f_nom_Hz: Annotated[float | None, Unit("Hz"), Plausible("a nominal frequency", 16.0, 400.0)] = None
     """Nominal frequency (Hz); without it the feeder's. At another one than the feeder's its equipment stays, and its
@@ -257,7 +250,7 @@ class ScenarioModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     """Table `[plant]`."""
     protection: Protection = Protection()
     """Table `[protection]`: when inverters trip, and when they come back."""
-    law: Annotated[LawKey, Label("control law")] = "consensus"
+    law: LawKey = "consensus"
     """Control law that the agents run: a name that `gridpeers doc laws` lists, "mine:Mine" for the class Mine of
     mine.py beside this file, or a table `[law]` with one of use, command = ["./mylaw"] (any program), fmu = "law.fmu",
     and with the law's parameters; time_limit_s is the longest time of one step."""

@@ -1,4 +1,4 @@
-"""The table of a sweep, and units and words for its columns."""
+"""The table of a sweep, and the units of its columns."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import re
 import typing
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import msgspec
 import pandas as pd
@@ -17,41 +17,14 @@ from gridpeers.scenarios.schema.scenario_writing import to_toml
 from gridpeers.scenarios.sweep.sweep_case import FATE, SweepRow
 from gridpeers.scenarios.sweep.sweep_reading import Plan
 from gridpeers.scenarios.versions import versions
-from gridpeers.wire.schema.table_schema import INLINE, Field, Label, fields_of
+from gridpeers.wire.schema.table_schema import INLINE, Field, fields_of
 
 _SUFFIXES = ("s", "Hz", "pu", "W", "var", "V")
 
 
-class IndexAxis(NamedTuple):
-    label: str
-    least: float
-    """Least length, in the index's unit: smaller differences are rounding, or too small to see."""
-
-
-INDEXES = {
-    "f_error_Hz": IndexAxis("settled abs(f - f_nom) (Hz)", 0.01),
-    "MPSI": IndexAxis("settled power sharing index, MPSI", 0.01),
-    "V_error": IndexAxis("settled mean abs(V - 1) (pu)", 0.001),
-    "MQSI": IndexAxis("settled var sharing index, MQSI", 0.01),
-    "t_restore_s": IndexAxis("time to restore f and sharing (s)", 0.02),
-    "t_load_s": IndexAxis("time to take over the load (s)", 0.02),
-    "t_f_s": IndexAxis("time to restore f (s)", 0.02),
-    "t_share_s": IndexAxis("time to share power (s)", 0.02),
-    "f_swing_Hz": IndexAxis("swing of f at the end (Hz)", 0.001),
-    "V_swing_pu": IndexAxis("swing of V at the end (pu)", 0.0001),
-    "f_off_Hz": IndexAxis("largest abs(f - f_nom) at the end (Hz)", 0.01),
-    "S_max_pu": IndexAxis("largest apparent power at the end (pu)", 0.01),
-    "V_min_pu": IndexAxis("least voltage at the end (pu)", 0.001),
-    "V_max_pu": IndexAxis("largest voltage at the end (pu)", 0.001),
-    "steady": IndexAxis("steady at the end (1: yes, 0: no)", 1.0),
-}
-
-GRAPH_WORDS = {"graph.links": "links of the graph", "graph.lambda_2": "algebraic connectivity, lambda_2"}
-
-
 def unit_of(name: str) -> str:
     """Return the unit of a column: of a key of the scenario its own, of an index the end of its name."""
-    field = _field_at(_apart(name)[0])
+    field = _field_at(re.sub(r"^case\.[^.]+\.|\[\d+\]", "", name))
     if field is not None and field.unit:
         return field.unit
     parts = name.split(".")
@@ -59,24 +32,6 @@ def unit_of(name: str) -> str:
         return "pu"
     suffix = parts[-1].rpartition("_")[2]
     return suffix if suffix in _SUFFIXES and suffix != parts[-1] else ""
-
-
-def label_of(name: str) -> str:
-    """Return words for an axis, with the unit: those of the field's `Label`, or the key's last part and its table."""
-    if (index := name.rpartition(".")[2]) in INDEXES:
-        return INDEXES[index].label
-    key, case = _apart(name)
-    field, unit = _field_at(key), unit_of(key)
-    label = field.mark(Label) if field else None
-    table, _, last = key.rpartition(".")
-    words = last.removesuffix("_" + unit) + (f" of [{table}]" if table else "")
-    words = label.text if label else GRAPH_WORDS.get(key, words)
-    return words + (f" ({unit})" if unit else "") + (f", case {case}" if case else "")
-
-
-def _apart(name: str) -> tuple[str, str]:
-    case = re.match(r"case\.([^.]+)\.", name)
-    return re.sub(r"\[\d+\]", "", name[case.end() :] if case else name), case[1] if case else ""
 
 
 def _field_at(key: str) -> Field | None:
