@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping
 from functools import cached_property
-from heapq import heappop, heappush
-from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import msgspec
 
 from gridpeers.netem.models import INSTANT
-from gridpeers.netem.models.medium import Cut
 from gridpeers.netem.schema.fault import Fault, Span
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.netem.schema.pattern import Link, links_among, parse
-from gridpeers.wire.plugins.plugin import Plugin
 
 CUTS = ("cut", "partition")
 """Kinds that let nothing pass as long as they hold."""
@@ -96,29 +92,6 @@ class FaultSchedule:
             for span in self.spans
         )
 
-    def flat(self) -> tuple[Span, ...]:
-        """Return the same without precedence: spans that do not overlap within a kind, by kind and time."""
-        spans: list[Span] = []
-        for kind in sorted({span.kind for span in self.spans}):
-            own = [span for span in self.spans if span.kind == kind]
-            bounds = sorted({bound for span in own for bound in (span.from_s, span.to_s)})
-            coming = sorted(range(len(own)), key=lambda place: own[place].from_s, reverse=True)
-            begun: list[int] = []  # negative places, as a heap: the latest, which takes precedence, is on top
-            for start, end in pairwise(bounds):
-                while coming and own[coming[-1]].from_s <= start:
-                    heappush(begun, -coming.pop())
-                while begun and own[-begun[0]].to_s <= start:
-                    heappop(begun)
-                if not begun:
-                    continue
-                model, last = own[-begun[0]].model, spans[-1] if spans else None
-                # A flap counts from its own beginning, so pieces of one can be joined but never moved.
-                if last and last.kind == kind and last.to_s == start and last.model == model:
-                    spans[-1] = last._replace(to_s=end)
-                else:
-                    spans.append(Span(kind, start, end, model))
-        return tuple(spans)
-
 
 class Heal(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
     """Faults end on some links: those that hold at `from_s`; what a scenario has for later still comes."""
@@ -184,45 +157,3 @@ class LinkSchedules:
     def of(self, link: Link) -> FaultSchedule:
         """Return the schedule of a link after all changes so far."""
         return self._schedules[link]
-
-
-def replayed(netem: Netem, changes: Sequence[Change], microgrids: Mapping[str, str]) -> Iterator[Fault]:
-    """Yield entries that do without changes what a scenario did with its changes, those of one receiver after another.
-
-    Links of one receiver that fared alike share an entry. A partition becomes a cut; one by islands is left out, as its
-    links are not known here. The faults of one receiver are in memory at a time: of a long run there are thousands.
-    """
-    links = links_among(microgrids)
-    for dst in dict.fromkeys(link.dst for link in links):
-        alike: dict[tuple[Span, ...], list[str]] = {}
-        for link in links:
-            if link.dst == dst:
-                spans = schedule_of(link, netem, _about(link, changes, microgrids), microgrids).flat()
-                alike.setdefault(spans, []).append(link.src)
-        for spans, sources in alike.items():
-            on = f"{sources[0]} -> {dst}" if len(sources) == 1 else f"{{{', '.join(sources)}}} -> {dst}"
-            for span in _cuts_joined(spans):
-                to_s = None if math.isinf(span.to_s) else span.to_s
-                yield Fault(on=on, from_s=span.from_s, to_s=to_s, **_entry(span))
-
-
-def _about(link: Link, changes: Sequence[Change], microgrids: Mapping[str, str]) -> list[Change]:
-    """Return the changes that are about a link: thousands of them have few different patterns, each matched once."""
-    matches = {on: parse(on).matches(*link, microgrids) for on in {change.on for change in changes}}
-    return [change for change in changes if matches[change.on]]
-
-
-def _entry(span: Span) -> dict[str, Any]:
-    if isinstance(span.model, Plugin):
-        return {"own": (span.model,)}
-    return {"cut" if span.kind == "partition" else span.kind: span.model}
-
-
-def _cuts_joined(spans: Iterable[Span]) -> list[Span]:
-    """Return the spans with cuts and partitions as one kind, so that no two entries of a link overlap."""
-    both = [span for span in spans if span.kind in CUTS]
-    rest = [span for span in spans if span.kind not in CUTS]
-    # where a cut that keeps meets one that loses, messages are lost: the latter comes last, and so takes precedence
-    both.sort(key=lambda span: not span.model.hold)
-    joined = FaultSchedule(Span("cut", span.from_s, span.to_s, Cut(hold=span.model.hold)) for span in both).flat()
-    return [*rest, *joined]

@@ -1,11 +1,9 @@
-"""Files of a live run: its folder, with the scenario as long as the run was, and its link commands as a scenario."""
+"""Files of a live run: its folder, with the scenario as long as the run was."""
 
 from __future__ import annotations
 
-import os
-import platform
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
@@ -13,21 +11,15 @@ from typing import NamedTuple
 
 from msgspec.structs import replace
 
-from gridpeers.agents.agent_config import MAX_AGE, AgentConfig
-from gridpeers.netem.fault_schedule import Change, replayed
+from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.netem.schema.netem import Netem
-from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.plant_config import PlantConfig
-from gridpeers.scenarios.emulation.link_data import LinkCommand
-from gridpeers.scenarios.live.run_address import UsageError
 from gridpeers.scenarios.record.record_info import LIVE, RecordInfo
-from gridpeers.scenarios.results.run_files import FolderError, new_folder, refusal, set_broken, shown, write_whole
-from gridpeers.scenarios.schema.participants import LISTS, inverters_of, netem_of
+from gridpeers.scenarios.results.run_files import FolderError, new_folder, refusal, set_broken, write_whole
+from gridpeers.scenarios.schema.participants import LISTS
 from gridpeers.scenarios.schema.scenario_model import LONGEST_RUN, ScenarioModel
 from gridpeers.scenarios.schema.scenario_writing import to_toml
 from gridpeers.scenarios.versions import versions
-from gridpeers.wire.driver.command_line import command_line
-from gridpeers.wire.messages import LinkRequest
 from gridpeers.wire.timing import rounded_up
 
 
@@ -112,84 +104,3 @@ def live_record(
         agents=agents,
         started=datetime.now().astimezone().isoformat(timespec="milliseconds"),
     )
-
-
-class LinkLog:
-    """Keep the link commands of a run of one case, and write the scenario that replays them.
-
-    The file `replay` is written at the end in any case, and now and then before; `replay_if_changed` only once there is
-    a link command.
-    """
-
-    def __init__(
-        self, *, scenario: ScenarioModel, feeder: Feeder, replay: Path | None, replay_if_changed: Path | None
-    ) -> None:
-        self._scenario, self._feeder = scenario, feeder
-        self._replay, self._replay_if_changed = replay, replay_if_changed
-        self._commands: dict[int, Change] = {}
-        self._due = 1
-        """Number of commands with which the file is next written: to write it takes as long as there are commands."""
-
-    @property
-    def changes(self) -> tuple[Change, ...]:
-        return tuple(change for _, change in sorted(self._commands.items()))
-
-    def __call__(self, message: LinkRequest) -> None:
-        self._commands[message.seq] = LinkCommand.of_tree(message.link_command).at(message.t)
-        count = len(self._commands)
-        if count >= self._due:
-            self._due = count + max(1, count // 10)
-            self._write(message.t)
-
-    def close(self, t: float) -> list[str]:
-        files = self._write(t)
-        return [f"the links as they were: {command_line('run', shown(files[0]))}"] if files else []
-
-    def _write(self, t: float) -> list[Path]:
-        files = list(filter(None, [self._replay, self._replay_if_changed if self._commands else None]))
-        for file in files:
-            write_whole(file, replay_toml(self._scenario, self._feeder, self.changes, t))
-        return files
-
-
-def replay_toml(scenario: ScenarioModel, feeder: Feeder, changes: Sequence[Change], t: float) -> str:
-    """Return the scenario whose links change by schedule as they did by command until t (s).
-
-    It leaves out agents that the scenario lacks. An age that the live run had by default is written out, as there is no
-    such default in simulated time.
-    """
-    ((name, case),) = scenario.cases.items()
-    microgrids = {row.name: row.microgrid for row in inverters_of(scenario, feeder)}
-    ages = case.degraded_communication
-    ages = replace(ages, max_age=ages.max_age or MAX_AGE)
-    T_c = scenario.time.T_c_s
-    needed = max([t, *(change.from_s + T_c for change in changes)])
-    end = max(scenario.time.end_s, rounded_up(needed, T_c))
-    netem = netem_of(scenario, name)
-    by_island = tuple(part for part in netem.partitions if part.by == "island")
-    replay = replace(
-        scenario,
-        name="",
-        paper="",
-        time=replace(scenario.time, end_s=end),
-        netem=replace(netem, links=(), partitions=by_island),
-        cases={name: replace(case, netem=Netem(), degraded_communication=ages)},
-    )
-    as_run = {"driver": LIVE, "python": platform.python_version()}
-    links_alone = (
-        "A live run's links, which people changed: agents, switches and loads that they changed are not in it "
-        "(events.csv)."
-    )
-    return to_toml(replay, as_run, [links_alone], links=replayed(netem, changes, microgrids))
-
-
-def check_new(file: Path | None) -> None:
-    if file is None:
-        return
-    folder = file.absolute().parent
-    if file.exists():
-        raise UsageError(f"--record {file}: already exists; move it, or give another name")
-    if not folder.is_dir():
-        raise UsageError(f"--record {file}: there is no folder {file.parent}; make it first")
-    if not os.access(folder, os.W_OK):
-        raise UsageError(f"--record {file}: cannot be written: {file.parent} is not yours; give another name")

@@ -25,7 +25,6 @@ from gridpeers.scenarios.drivers.supervisor import Supervisor
 from gridpeers.scenarios.drivers.telemetry_client import RECORDER, TelemetryClient, with_recorder
 from gridpeers.scenarios.drivers.telemetry_stream import Recordable
 from gridpeers.scenarios.emulation.emulated_links import links_of
-from gridpeers.scenarios.live.live_files import LinkLog
 from gridpeers.scenarios.live.run_address import RunAddress, UsageError, far_hosts, loopback_of, return_path
 from gridpeers.scenarios.live.run_client import RunClient
 from gridpeers.scenarios.live.run_monitor import line_of
@@ -36,7 +35,7 @@ from gridpeers.scenarios.short_texts import short
 from gridpeers.wire.driver.drive import StoppedError
 from gridpeers.wire.driver.ending import StopSignal, stop_at_signals
 from gridpeers.wire.driver.machine import keep_out_of_the_heap
-from gridpeers.wire.messages import PLANT, LinkRequest, Pacing, PlantEvent, Telemetry
+from gridpeers.wire.messages import PLANT, Pacing, PlantEvent, Telemetry
 from gridpeers.wire.timing import RateLimit
 from gridpeers.wire.wording import printable
 
@@ -85,13 +84,11 @@ class LiveRecorder:
         self,
         config: PlantConfig,
         folder: Path | None,
-        link_log: LinkLog,
         record: RecordInfo,
         *,
         silent: Collection[str] = (),
     ) -> None:
         self._config, self._silent = config, silent
-        self._link_log: LinkLog | None = link_log
         self._recorder = None if folder is None else Recorder(folder, gaps=True, record=record)
         self.recorded: Recorded | None = None
         self.failure = ""
@@ -113,8 +110,6 @@ class LiveRecorder:
         self._thread.join()
         self.client.close()
         _say_all((*self._limit.left_out(), *self.client.rejects.take_lines()))
-        if (link_log := self._link_log) is not None:
-            self._tried("the link commands cannot be written", lambda: _say_all(link_log.close(self.client.t)))
         if (recorder := self._recorder) is not None:
             self._tried("the record cannot be written", lambda: self._finish(recorder))
             recorder.close()
@@ -156,11 +151,7 @@ class LiveRecorder:
     def _take(self, message: Recordable) -> None:
         """Say and record one message; an error in it must not end the recording of the others."""
         try:
-            link_log, recorder = self._link_log, self._recorder
-            if isinstance(message, LinkRequest) and link_log is not None:
-                what = f"the link commands end at {self.client.t:.2f} s"
-                if not self._tried(what, lambda: link_log(message), GOES_ON):
-                    self._link_log = None
+            recorder = self._recorder
             if isinstance(message, Telemetry):
                 self._say_events(message)
             if recorder is None:
@@ -198,7 +189,7 @@ def meaning(word: str, config: PlantConfig) -> str:
     return f"a link was refused: {printable(refused[1])}" if refused else ""
 
 
-def plant_here(config: PlantConfig, folder: Path | None, link_log: LinkLog, record: RecordInfo) -> ProcessOutcome:
+def plant_here(config: PlantConfig, folder: Path | None, record: RecordInfo) -> ProcessOutcome:
     requests = stop_at_signals(StoppedError)
     _log()
     config = with_recorder(config, waits=folder is not None)
@@ -207,7 +198,7 @@ def plant_here(config: PlantConfig, folder: Path | None, link_log: LinkLog, reco
         if word == COMPILING:  # the plant's log reports the rest
             say(meaning(word, config))
 
-    recorder = LiveRecorder(config, folder, link_log, record, silent=LOGGED)
+    recorder = LiveRecorder(config, folder, record, silent=LOGGED)
     outcome = _followed(recorder, lambda: run_plant(config, make_links=links_of, on_word=on_word), requests)
     if outcome.interrupted:  # else the plant has said it
         _say_end(recorder, config)
@@ -219,7 +210,6 @@ def all_here(
     agents: tuple[AgentConfig, ...],
     logs: Path,
     folder: Path | None,
-    link_log: LinkLog,
     record: RecordInfo,
 ) -> ProcessOutcome:
     """Run the plant and its agents, but for spare ones, as processes of their own, until the run ends."""
@@ -261,7 +251,7 @@ def all_here(
 
     configs = [replace(agent, connect=(endpoint,), listen=listen) for agent in agents]
     supervisor = Supervisor(config, configs, logs, on_exit, on_word)
-    recorder = LiveRecorder(config, folder, link_log, record)
+    recorder = LiveRecorder(config, folder, record)
     outcome = _followed(recorder, run, requests)
     _say_end(recorder, config)
     return outcome

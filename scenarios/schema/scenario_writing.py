@@ -9,7 +9,6 @@ from typing import Any
 
 import msgspec
 
-from gridpeers.netem.schema.fault import Fault
 from gridpeers.scenarios.schema.scenario_model import AS_RUN, ScenarioModel
 from gridpeers.wire.schema.table_schema import INHERITED, INLINE, NO_KEY, NamedTables, OtherKeys, fields_of
 
@@ -20,12 +19,10 @@ def to_toml(
     remarks: Iterable[str] = (),
     *,
     terse: bool = False,
-    links: Iterable[Fault] = (),
 ) -> str:
     """Return every key of a scenario, defaults included, and the table `[as_run]`; if `terse`, what is no default.
 
-    Defaults are written out because they may differ in a later version. The remarks become comments at the head, the
-    `links` further entries `[[link]]`.
+    Defaults are written out because they may differ in a later version. The remarks become comments at the head.
     """
     keys, tables = _lines(scenario, "", scenario, terse=terse)
     if terse:
@@ -34,7 +31,7 @@ def to_toml(
         first = "# The scenario as run, every default spelled out. `gridpeers run` takes this file as it is."
         head = [first, *(f"# {remark}" for remark in remarks)]
         foot = ["", f"[{AS_RUN}]", *(f"{key} = {_value(value)}" for key, value in as_run.items())]
-    lines = chain(head, keys, tables, _entries(links, "link", scenario, terse=terse), foot)
+    lines = chain(head, keys, tables, foot)
     return "".join(f"{line}\n" for line in lines)
 
 

@@ -66,12 +66,6 @@ class Start:
         Path | None,
         typer.Option(metavar="DIR", help="Record the run in a new folder, and measure it at its end."),
     ] = None
-    record: Annotated[
-        Path | None,
-        typer.Option(
-            "--record", metavar="FILE", help="Write a scenario that replays what gridpeers link did, for run."
-        ),
-    ] = None
     keys: Keys = None
     insecure: Insecure = False
 
@@ -90,7 +84,7 @@ def _start(start: Start, *, agents: bool) -> None:
     endpoint = endpoint_for_run(listen, credentials, access)
     check_alone(run, beyond, credentials, access)
 
-    from gridpeers.scenarios.live.live_files import LinkLog, check_new, folders, live_record
+    from gridpeers.scenarios.live.live_files import folders, live_record
     from gridpeers.scenarios.live.live_processes import all_here, plant_here, say
     from gridpeers.scenarios.live.live_report import conclude
     from gridpeers.scenarios.record.record_info import LIVE
@@ -101,7 +95,6 @@ def _start(start: Start, *, agents: bool) -> None:
     from gridpeers.scenarios.schema.plugin_keys import judges_laws
 
     spec, feeder = load(start.scenario)
-    check_new(start.record)
     spec = chosen(spec, chosen_case(spec, start.case), None)
     config, everyone = configure(
         spec,
@@ -127,8 +120,6 @@ def _start(start: Start, *, agents: bool) -> None:
     sizes = file_sizes(spec, feeder, HOUR if start.duration is None else start.duration, "wall")
     if start.out is not None and start.duration is not None:
         require_room(start.out, sizes, "--out")
-    replay = None if start.out is None else start.out / "replay.toml"
-    link_log = LinkLog(scenario=spec, feeder=feeder, replay=start.record, replay_if_changed=replay)
     with folders(start.out, spec) as kept:
         say(f"run {run}: {spec.name}, case {', '.join(spec.cases)}; the plant listens on {endpoint}")
         if kept.whole is not None and sizes.sentence:
@@ -138,9 +129,9 @@ def _start(start: Start, *, agents: bool) -> None:
             found_by = RunAddress(run=run, connect=(endpoint,), access=access).words
             watch, down = command_line("watch", *found_by), command_line("down", *found_by)
             say(f"{watch}, in another terminal, shows it; Ctrl-C here, or {down} there, ends it")
-            outcome = all_here(config, everyone, kept.logs, kept.record, link_log, info)
+            outcome = all_here(config, everyone, kept.logs, kept.record, info)
         else:
-            outcome = plant_here(config, kept.record, link_log, info)
+            outcome = plant_here(config, kept.record, info)
         if kept.whole is not None:
             metrics = RunMetrics(
                 scenario=spec, feeder=feeder, driver=LIVE, folder=kept.whole, clock="wall", speed=start.speed

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from gridpeers.netem.channel import Channel
-from gridpeers.netem.fault_schedule import FaultSchedule
 from gridpeers.netem.models.delay import Constant
 from gridpeers.netem.models.medium import Cut, Duplicate, Flap, Rate, Slots
 from gridpeers.netem.schema.fault import Span
@@ -109,19 +106,3 @@ def test_everything_at_once_adds_up_in_the_order_told() -> None:
     )
 
     assert judge.judge(0, 0.5, 100).deliveries == ((1.25, None), (1.375, None))
-
-
-@steady
-@given(st.lists(st.tuples(st.sampled_from(["cut", "loss", "delay"]), time, time, st.integers(0, 3)), max_size=6), time)
-def test_a_flat_schedule_says_at_every_time_what_the_layered_one_says(
-    layers: list[tuple[str, float, float, int]], t: float
-) -> None:
-    """Taking precedence away changes nothing that holds, and leaves no two entries of a kind that overlap."""
-    schedule = FaultSchedule(Span(kind, start, end, model) for kind, start, end, model in layers)
-    flat = schedule.flat()
-
-    def holding(spans: FaultSchedule) -> dict[str, object]:
-        return {kind: span.model for kind, span in spans.at(t).active.items()}
-
-    assert holding(FaultSchedule(flat)) == holding(schedule)
-    assert all(one.kind != other.kind or one.to_s <= other.from_s for one, other in pairwise(flat))

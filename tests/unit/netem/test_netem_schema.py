@@ -1,4 +1,4 @@
-"""Entries of a scenario: read, checked with all problems at once, and replayed."""
+"""Entries of a scenario: read, checked with all problems at once."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gridpeers.netem.fault_schedule import Change, Heal, replayed, schedule_of
 from gridpeers.netem.models.delay import AnyDelay, Lognormal, Normal, Trace
 from gridpeers.netem.models.lie import AnyLie
 from gridpeers.netem.models.loss import AnyLoss, Bernoulli, GilbertElliott
@@ -207,42 +206,6 @@ def test_a_partition_by_island_follows_the_switches() -> None:
 
     assert [(s.from_s, s.to_s) for s in netem.spans(Link("inv1", "inv4"), MICROGRIDS)] == [(2.0, 4.0)]
     assert netem.spans(Link("inv1", "inv2"), MICROGRIDS) == ()
-
-
-changes = st.lists(
-    st.one_of(
-        st.builds(
-            lambda on, t, length, kind: Fault(on=on, from_s=t, to_s=t + length, **kind),
-            st.sampled_from(["inv1 -> inv2", "* <-> inv2", "MG1 <-> MG2", "plant -> *"]),
-            st.integers(0, 9).map(float),
-            st.integers(1, 5),
-            st.sampled_from([{"delay": 0.1}, {"delay": 0.2}, {"loss": 0.1}, {"cut": True}, {"cut": Cut(hold=True)}]),
-        ),
-        st.builds(Heal, on=st.sampled_from(["* -> inv2", "MG1 <-> MG2"]), from_s=st.integers(0, 9).map(float)),
-    ),
-    max_size=5,
-)
-
-
-@steady
-@given(changes, st.integers(0, 19))
-def test_a_run_with_live_changes_can_be_replayed_from_a_schedule(done: list[Change], tick: int) -> None:
-    """The schedule without changes has on every link, at every time, what the changed one had, and is consistent."""
-    netem = Netem(
-        links=(Fault(on="* -> inv2", delay=0.5, from_s=3.0),),
-        partitions=(Partition(by="halves", from_s=2.0, to_s=6.0),),
-    )
-    again = Netem(links=tuple(replayed(netem, done, MICROGRIDS)))
-
-    assert not again.problems(NAMES, MICROGRIDS, 20.0)
-    for link in links_among(["inv1", "inv2", "inv4", "inv9"]):
-        was, now = schedule_of(link, netem, done, MICROGRIDS), schedule_of(link, again, (), MICROGRIDS)
-        for schedule, other in ((was, now), (now, was)):
-            for kind, span in schedule.at(tick / 2).active.items():
-                assert kind not in ("delay", "loss") or span.model == other.at(tick / 2).active[kind].model
-        (ready, reason), (again_ready, again_reason) = was.passes(tick / 2), now.passes(tick / 2)
-        assert bool(reason) == bool(again_reason)
-        assert reason or ready == again_ready
 
 
 @pytest.mark.parametrize("name", PROFILES)

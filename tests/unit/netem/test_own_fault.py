@@ -8,7 +8,6 @@ import msgspec
 import pytest
 
 from gridpeers.netem.channel import Channel
-from gridpeers.netem.fault_schedule import replayed
 from gridpeers.netem.receiver import Receiver
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
@@ -114,14 +113,6 @@ def test_one_that_fails_does_nothing_from_then_on_and_is_told_once(folder: str, 
     assert sorted(arrived) == ([0.0, 0.0, 0.0, 0.1, 0.1, 0.1] if name == "Late" else [0.0] * 6)
     assert said in told
     assert receiver.take_failures() == ()
-
-
-def test_a_run_with_one_can_be_replayed(folder: str) -> None:
-    """The file of a live run names it again, with its parameters and its folder."""
-    entry = fault(folder, "Jam", parameters=(("share", 0.5),), from_s=1.0)
-    (again,) = replayed(Netem(links=(entry,)), (), {"inv1": "MG1", "inv2": "MG1"})
-
-    assert (again.on, again.own, again.from_s) == (entry.on, entry.own, 1.0)
 
 
 def test_nobody_can_have_a_running_run_import_a_module(folder: str) -> None:

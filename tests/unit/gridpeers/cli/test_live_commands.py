@@ -34,8 +34,6 @@ pytestmark = pytest.mark.usefixtures("elsewhere")
         (["up", "islanding", "--for", "0"], "--for: must be a time of more than 0 s and at most 1e+09 s, got 0 s"),
         (["watch", "--for", "-1"], "--for: must be a time of more than 0 s and at most 1e+09 s, got -1 s"),
         (["up", "islanding", "--out", "full"], "--out full: the folder is not empty"),
-        (["up", "islanding", "--record", "nowhere/it.toml"], "there is no folder nowhere; make it first"),
-        (["up", "islanding", "--record", "full"], "--record full: already exists"),
         (["agent"], "INVERTER is missing"),
         (["agent", "inv 2"], 'INVERTER: "inv 2" cannot be part of a Zenoh key'),
         (["agent", "inv2", "--connect", "lab"], '--connect: "lab" is no endpoint; write PROTOCOL/HOST:PORT'),
