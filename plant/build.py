@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from msgspec.structs import replace
-
 from gridpeers.plant.dynamics.kernel.compiled import is_compiled
 from gridpeers.plant.dynamics.kernel.step import run_steps
 from gridpeers.plant.equipment import Feeder
@@ -21,9 +19,6 @@ def start_plant(config: PlantConfig) -> LivePlant:
 
     FeederError for bad tables; RuntimeError if it cannot start: it says why, and what to do.
     """
-    if config.bridged:
-        alone = replace(config, bridged=False)
-        return SIMULATORS.resolve(str(config.bridged)).offer(lambda: start_plant(alone), config)
     if config.settings.simulator == OURS:
         return build_plant(config)
     return SIMULATORS.resolve(config.settings.simulator).start(config, _feeder(config))

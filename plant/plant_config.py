@@ -137,8 +137,7 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     """Processes that carry these agents, each with one link to the plant; unset, as in a record: one each."""
     schedule: tuple[ScheduledAction, ...] = ()  # an agent that joins need not be among `agents`
     bridged: str | bool = False
-    """Simulator, e.g. "helics", by which inverters without an agent follow set-points of programs outside; False: none.
-    Older records have True."""
+    """Of older records: programs outside gave set-points to inverters without an agent."""
     T_c: float  # control period (s), a multiple of h
     end: float | None  # duration of the run (s), a multiple of T_c; None, in wall-clock time: until a person ends it
     record_step: float  # distance of the recorded rows (s): a multiple of h that divides T_c

@@ -1,8 +1,7 @@
-"""The port to simulators of others, which take the place of our plant or take part in its run: found by name."""
+"""The port to simulators of others, which take the place of our plant: found by name."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import msgspec
@@ -30,10 +29,6 @@ class Simulator:
     def start(self, config: PlantConfig, feeder: Feeder) -> LivePlant:
         """Start the plant on a feeder with the scenario's changes; RuntimeError says why it cannot start."""
         raise NotImplementedError
-
-    def offer(self, build: Callable[[], LivePlant], config: PlantConfig) -> LivePlant:
-        """Build a plant at t = 0 whose sensors programs outside read, and to which they give set-points."""
-        raise RuntimeError(f"{self.words} takes no plant of others")
 
     def check(self, scenario: Any, feeder: Feeder, problems: Any) -> None:
         """Note what a scenario asks for beyond this simulator.

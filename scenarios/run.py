@@ -249,10 +249,6 @@ def _configs(request: Request, case: str) -> tuple[PlantConfig, tuple[AgentConfi
     plant, agents = configs(request.scenario, request.feeder, case, listen, real_nodes=real)
     plant = replace(plant, record=request.scenario.record)
     agents = tuple(replace(agent, record=request.scenario.record) for agent in agents)
-    if request.bridge:
-        own = tuple(name for name in plant.agents if name not in request.outside)
-        plant = replace(plant, bridged=request.bridge, agents=own)
-        agents = tuple(agent for agent in agents if agent.name not in request.outside)
     if request.keys is not None:
         inverters = tuple(row.name for row in inverters_of(request.scenario, request.feeder))
         started = {agent.name for agent in agents}

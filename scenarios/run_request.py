@@ -61,9 +61,5 @@ class Request(RunMetrics):
     """Number of processes that agents share; 0 gives each agent its own. It decides no number."""
     strict: bool = False
     """Wall-clock: the run breaks when the plant cannot keep pace."""
-    bridge: str = ""
-    """Simulator by which programs outside control inverters, e.g. "helics"; "" for none."""
-    outside: tuple[str, ...] = ()
-    """Inverters that they control instead of our agents."""
     lasting: bool = True
     """The folder stays; one that goes with the results of a notebook has no figures, and is not named."""

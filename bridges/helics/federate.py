@@ -103,30 +103,26 @@ class HelicsFederate:
         late = f"{settings.broker} did not answer as a HELICS broker of core type ZMQ within {deadline:g} s"
         self._ask(request | {"wait": 0.9 * deadline}, late, deadline + LATER)
 
-    def begin(
-        self, publications: Sequence[Topic], subscriptions: Sequence[Topic], publish: Mapping[str, Value]
-    ) -> dict[str, list[str]]:
-        """Register topics, publish what holds at t = 0, and wait until all federates are at t = 0.
+    def begin(self, publications: Sequence[Topic], subscriptions: Sequence[Topic]) -> dict[str, list[str]]:
+        """Register topics, and wait until all federates are at t = 0.
 
         Return the names of the `others`, and the keys of the subscriptions that nobody publishes (`missing`).
         """
         settings = self._settings
         wanted = f"the broker waits for {settings.federates} federates" if settings.federates else "are all started?"
         late = f"the federation at {settings.broker} did not begin within {settings.wait:g} s ({wanted})"
-        request = {"do": "begin", "publications": publications, "subscriptions": subscriptions, "publish": publish}
+        request = {"do": "begin", "publications": publications, "subscriptions": subscriptions}
         federation = self._ask(request, late, settings.wait)
         self._others = " or ".join(federation["others"]) or "the broker"
         return federation
 
-    def step(
-        self, publish: Mapping[str, Value], t: float, after: float = 0.0, *, needed: bool = True
-    ) -> dict[str, Value]:
-        """Publish, go to a time (s), or a little after, and return the values that came since the last step, by key.
+    def step(self, publish: Mapping[str, Value], t: float) -> dict[str, Value]:
+        """Publish, go to `ACT` after a time (s), and return the values that came since the last step, by key.
 
-        If they are `needed`, a publisher of which none came must not have left.
+        A publisher of which none came must not have left.
         """
         late = f"{self._others} did not let time go on to {t:g} s within {self._deadline:g} s"
-        request = {"do": "step", "publish": publish, "time": t + after, "needed": needed}
+        request = {"do": "step", "publish": publish, "time": t + ACT}
         answer = self._ask(request, late, self._deadline)
         if answer["gone"]:
             raise HelicsError(
@@ -137,10 +133,10 @@ class HelicsFederate:
         values: dict[str, Value] = answer["values"]
         return values
 
-    def end(self, publish: Mapping[str, Value]) -> None:
-        """Publish the last values and leave the federation, which goes on without this federate."""
+    def end(self) -> None:
+        """Leave the federation, which goes on without this federate."""
         try:
-            self._ask({"do": "end", "publish": publish}, "the federate did not leave", self._deadline)
+            self._ask({"do": "end"}, "the federate did not leave", self._deadline)
         except HelicsError:
             pass  # the run has its end already
         finally:
@@ -188,7 +184,7 @@ class HelicsFederate:
     def _explained(self, error: str, doing: str) -> str:
         broker = self._settings.broker
         if error.startswith("no broker"):
-            return f"{error}; start one: helics_broker -f 2, or --start-broker of gridpeers bridge helics"
+            return f"{error}; start one: helics_broker -f 2"
         if "lost connection with broker" in error:
             return f"the broker at {broker} has ended, or cannot be reached any more"
         if "lost comms" in error:

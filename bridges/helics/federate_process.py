@@ -6,9 +6,9 @@ imports nothing of ours. Each line of standard input is a JSON object with a req
 answer; what HELICS prints goes to standard error.
 
     {"do": "join", "name", "host", "port", "federates", "wait"}
-    {"do": "begin", "publications": [[key, type, unit]], "subscriptions": [...], "publish": {key: value}}
-    {"do": "step", "publish": {key: value}, "time", "needed"}  publish, go to a time (s), return the values that came
-    {"do": "end", "publish": {key: value}}              publish, leave the federation, end
+    {"do": "begin", "publications": [[key, type, unit]], "subscriptions": [...]}
+    {"do": "step", "publish": {key: value}, "time"}     publish, go to a time (s), return the values that came
+    {"do": "end"}                                       leave the federation, end
     {"do": "times"}                                     times of the others; also in the middle of a wait
     {"do": "abort", "reason": text}                     end the federation at once; also in the middle of a wait
 """
@@ -86,7 +86,6 @@ class Federate:
         for key, kind, unit in request["subscriptions"]:
             self.subscriptions[key] = helics.helicsFederateRegisterSubscription(self.fed, key, unit), kind
         helics.helicsFederateEnterInitializingMode(self.fed)
-        self._publish(request["publish"])
         helics.helicsFederateEnterExecutingMode(self.fed)
         others = [name for name in self._names("root", "federates") if name != self.name]
         for name in others:
@@ -112,15 +111,12 @@ class Federate:
             for key, (topic, kind) in self.subscriptions.items()
             if helics.helicsInputIsUpdated(topic)
         }
-        gone = []
-        if request["needed"]:
-            silent = [name for name, keys in self.publishers.items() if not keys & values.keys()]
-            gone = [name for name in silent if self._query(name, "state") in GONE]
+        silent = [name for name, keys in self.publishers.items() if not keys & values.keys()]
+        gone = [name for name in silent if self._query(name, "state") in GONE]
         return {"values": values, "gone": gone}
 
-    def end(self, request: dict[str, Any]) -> dict[str, Any]:
+    def end(self, _request: dict[str, Any]) -> dict[str, Any]:
         """Leave the federation; an own broker stays until the others have left, or for a while."""
-        self._publish(request["publish"])
         self.helics.helicsFederateDisconnect(self.fed)
         if self.broker is not None:
             self.helics.helicsBrokerWaitForDisconnect(self.broker, BROKER_LEAVES)

@@ -1,9 +1,8 @@
-"""HELICS as the plant of a run, or as the way of other programs to ours: table `[plant.helics]`, and the start."""
+"""HELICS as the plant of a run: table `[plant.helics]`, and the start."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from typing import Annotated
 
 import msgspec
@@ -59,7 +58,7 @@ def settings_of(settings: PlantSettings) -> HelicsSettings:
 
 
 class HelicsSimulator(Simulator):
-    """A HELICS federation, which has the plant, or takes part in ours."""
+    """A HELICS federation, which has the plant."""
 
     package = "helics"
     words = "a HELICS federate"
@@ -70,11 +69,6 @@ class HelicsSimulator(Simulator):
         from gridpeers.bridges.helics.helics_plant import HelicsPlant  # scenarios are checked without it
 
         return HelicsPlant(config, feeder)
-
-    def offer(self, build: Callable[[], LivePlant], config: PlantConfig) -> LivePlant:
-        from gridpeers.bridges.helics.helics_plant import BridgedPlant
-
-        return BridgedPlant(build, config)
 
     def starting(self, table: HelicsSettings | None) -> str:
         return f"still starting: waiting for the HELICS federation at {table.broker if table else BROKER} ..."

@@ -46,8 +46,7 @@ _OWN = (
     ("link", "link:link", "Hurt and heal links while a run goes on."),
     ("keys", "keys_command:app", "Make, issue and revoke the certificates of a site."),
     ("feeder", "feeder_commands:app", "Import, check, solve, draw and export feeders."),
-    ("bridge", "", "Offer our plant to simulators of others."),
-    ("trace", "", "Write a run's messages as a Perfetto trace, or draw them."),
+    ("trace", "", "Write a run's messages as a Perfetto trace."),
     ("why", "", "Explain why an agent decided as it did."),
     ("view", "", "Show a run in the browser: feeder, links, strips and agents."),
 )

@@ -33,8 +33,6 @@ OPTIONS = {
     "plant.simulator": "--plant",
     "plant.load_set": "--load-set",
     "plant.helics.broker": "--broker",
-    "plant.helics.federates": "--federates",
-    "plant.helics.name": "--name",
 }
 """Options that change a key of the scenario, by this key."""
 

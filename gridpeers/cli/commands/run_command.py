@@ -101,10 +101,10 @@ def run(
         fail(["--port: goes with a page; add --view"], BAD_INPUT)
     pace: Pace = {"clock": clock, "speed": speed, "strict": strict, "processes": processes, "keys": keys}
     page = ROOMS.resolve("page_socket")(port) if view else None
-    carry_out(chosen(spec, case, seed), feeder, driver, out, pace, require_checks=require_checks, page=page)
+    _carry_out(chosen(spec, case, seed), feeder, driver, out, pace, require_checks=require_checks, page=page)
 
 
-def carry_out(
+def _carry_out(
     spec: ScenarioModel,
     feeder: Feeder,
     driver: Driver,
@@ -112,8 +112,6 @@ def carry_out(
     pace: Pace,
     *,
     require_checks: bool = False,
-    bridge: str = "",
-    outside: tuple[str, ...] = (),
     page: socket.socket | None = None,
 ) -> NoReturn:
     """Run a checked scenario into a folder, show its report, and end with its exit code.
@@ -135,10 +133,9 @@ def carry_out(
         refuse(error)
     if pace.get("keys") is not None:
         _check_keys(Path(pace["keys"] or ""), spec, feeder)
-    simulators = {name: SIMULATORS.resolve(name) for name in (spec.plant.simulator, bridge) if name}
-    for simulator in simulators.values():
-        if simulator.package:
-            require_loadable(simulator.package, simulator.words)
+    simulator = SIMULATORS.resolve(spec.plant.simulator)
+    if simulator.package:
+        require_loadable(simulator.package, simulator.words)
     with usage_errors():
         if driver == "processes":
             free_endpoint(local_endpoint(spec.processes.port), option="processes.port")
@@ -147,14 +144,11 @@ def carry_out(
         folder = new_folder(out, spec.name, datetime.now().astimezone())
     if sizes.sentence:
         typer.echo(f"{spec.name}: {sizes.sentence}")
-    own = [simulator.starting(spec.plant.simulators.get(name)) for name, simulator in simulators.items()]
-    request = Request(
-        scenario=spec, feeder=feeder, driver=driver, folder=folder, bridge=bridge, outside=outside, **pace
-    )
+    request = Request(scenario=spec, feeder=feeder, driver=driver, folder=folder, **pace)
     console, left = terminal(), f"what came until then is in {shown(folder)}/"
     with ROOMS.resolve("page_beside")(folder, page, spec.name) if page else nullcontext():
         try:
-            said = next(filter(None, own), COMPILING)
+            said = simulator.starting(spec.plant.simulators.get(spec.plant.simulator)) or COMPILING
             with ended_by_signals(left), progress(console, tuple(spec.cases), said) as tell:
                 report = run_scenario(request, tell)
         except BrokenRunError as error:
