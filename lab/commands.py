@@ -77,10 +77,6 @@ def why(
     agent: Annotated[str, typer.Argument(metavar="AGENT", help="Name of the inverter, e.g. inv4.")],
     t: Annotated[float, typer.Argument(metavar="TIME", help="Run time (s): the decision in force then is explained.")],
     case: CaseOfRun = "",
-    follow: Annotated[
-        bool, typer.Option("--follow", help="Follow both set-points back over neighbours, by the largest terms.")
-    ] = False,
-    hops: Annotated[int, typer.Option(metavar="N", min=1, max=1000, help="Most decisions to follow back.")] = 8,
 ) -> None:
     """Explain why an agent decided as it did.
 
@@ -93,7 +89,7 @@ def why(
     """
     require({"mcap": "the record of a run"})
 
-    from gridpeers.lab.explanation.explanation import explain, trail
+    from gridpeers.lab.explanation.explanation import explain
     from gridpeers.lab.explanation.explanation_text import show
     from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
 
@@ -102,10 +98,9 @@ def why(
     try:
         record = RunRecord.open(run, case)
         explanation = explain(record, agent, t)
-        trails = [(name, trail(record, explanation.decision, name, hops)) for name in ("P_set", "V_set") if follow]
     except RecordFileError as error:
         fail([str(error)], BAD_INPUT)
-    show(explanation, terminal(), trails)  # type: ignore[arg-type]  # the names are those of a trail
+    show(explanation, terminal())
 
 
 def _tell_notes(notes: Iterable[str]) -> None:

@@ -8,7 +8,7 @@ from rich.console import Console, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from gridpeers.lab.explanation.explanation import Explanation, NeighbourAccount, Quantity, TrailStep
+from gridpeers.lab.explanation.explanation import Explanation, NeighbourAccount
 from gridpeers.lab.explanation.law_step import QuantityStep
 from gridpeers.scenarios.console import text_of as printed_text
 
@@ -17,25 +17,19 @@ SHOWN = 12
 _SIDES = {1: "cannot deliver more", -1: "cannot deliver less"}
 
 
-Trails = Sequence[tuple[Quantity, tuple[TrailStep, ...]]]
+def text_of(explanation: Explanation) -> str:
+    return printed_text(lambda console: print_explanation(explanation, console)).rstrip("\n")
 
 
-def text_of(explanation: Explanation, trails: Trails = ()) -> str:
-    return printed_text(lambda console: print_explanation(explanation, console, trails)).rstrip("\n")
-
-
-def show(explanation: Explanation, console: Console, trails: Trails = ()) -> None:
+def show(explanation: Explanation, console: Console) -> None:
     if console.is_terminal:
-        print_explanation(explanation, console, trails)
+        print_explanation(explanation, console)
     else:
-        console.print(text_of(explanation, trails), soft_wrap=True)
+        console.print(text_of(explanation), soft_wrap=True)
 
 
-def print_explanation(explanation: Explanation, console: Console, trails: Trails) -> None:
-    blocks = (
-        *(_head(explanation), _neighbours(explanation), *_steps(explanation), _events(explanation)),
-        *(_trail(quantity, steps) for quantity, steps in trails),
-    )
+def print_explanation(explanation: Explanation, console: Console) -> None:
+    blocks = _head(explanation), _neighbours(explanation), *_steps(explanation), _events(explanation)
     for number, lines in enumerate(filter(None, map(list, blocks))):
         if number:
             console.print()
@@ -146,18 +140,6 @@ def _events(it: Explanation) -> Iterator[RenderableType]:
         yield Text("events of the second before", style="bold")
         yield from (Text(f"{event.t:8.2f} s  {event.text}") for event in it.events)
     yield from (Text.assemble(("NOTE", "yellow"), f"  {text}") for text in it.damage)
-
-
-def _trail(quantity: Quantity, steps: Sequence[TrailStep]) -> Iterator[RenderableType]:
-    yield Text(f"{quantity} followed back, by the largest term of each step", style="bold")
-    rows = []
-    for each in steps:
-        of = None if each.step is None else getattr(each.step, quantity)
-        ends = ("-", "-") if of is None else (f"{of.after:.6f}", _signed(of.step))
-        largest = "-" if each.largest is None else f"{each.largest.name} {_signed(each.largest.value)}"
-        source = "" if each.largest is None else f"from {each.largest.neighbour}"
-        rows.append((f"{each.decision.t:.2f}", each.decision.agent, *ends, largest, each.end or source))
-    yield _table(("t s", "agent", f"{quantity} pu", "step pu", "largest term pu", ""), tuple(rows), left=(1, 4, 5))
 
 
 def _table(

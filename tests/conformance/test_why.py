@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import itertools
 from pathlib import Path
 
 import pytest
 
-from gridpeers.lab.explanation.explanation import Explanation, NeighbourAccount, explain, trail
+from gridpeers.lab.explanation.explanation import Explanation, NeighbourAccount, explain
 from gridpeers.lab.explanation.law_step import LawStep
 from gridpeers.scenarios.record.record_reader import RunRecord
 from tests.command_line import invoke
@@ -192,28 +191,12 @@ def islanded(tmp_path_factory: pytest.TempPathFactory) -> RunRecord:
     return run(tmp_path_factory.mktemp("why"))
 
 
-def test_a_trail_goes_back_over_neighbours(islanded: RunRecord) -> None:
-    """Each decision is that of the state behind the largest term before it, one period earlier."""
-    steps = trail(islanded, islanded.decision("inv2", 0.7), "P_set", 5)
-
-    assert next(step.decision.agent for step in steps) == "inv2"
-    for step, before in itertools.pairwise(steps):
-        assert step.largest is not None
-        assert step.largest.neighbour == before.decision.agent
-        heard = next(each for each in step.decision.neighbours if each.name == before.decision.agent)
-        assert heard.state == before.decision.state
-    assert len(steps) > 1
-    assert steps[-1].end
-    assert {step.end for step in steps[:-1]} == {""}
-
-
 def test_the_command(islanded: RunRecord) -> None:
-    """It prints the explanation, and the trails below it; no colours in a pipe."""
-    code, printed = invoke("why", str(islanded.path), "inv4", "0.7", "--follow")
+    """It prints the explanation; no colours in a pipe."""
+    code, printed = invoke("why", str(islanded.path), "inv4", "0.7")
 
     assert code == 0
     assert printed.startswith(str(explain(islanded, "inv4", 0.7)))
-    assert "P_set followed back" in printed
     assert "\x1b" not in printed
 
 

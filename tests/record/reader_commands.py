@@ -20,7 +20,7 @@ def assert_commands_read(record: RunRecord, agent: str = "inv4") -> None:
     file, folder, t = str(record.path), record.path.parent, f"{record.t_end:.3f}"
     commands = {
         "metrics": (file,),
-        "why": (file, agent, t, "--follow"),
+        "why": (file, agent, t),
         "trace": (file, "--out", str(folder / "trace.pftrace")),
         "replay": (file,),
     }
