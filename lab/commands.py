@@ -149,7 +149,7 @@ def trace(
 # -------------------------------------------------------------------- gridpeers replay
 
 
-CHANGES = "--without, --without-loss, --without-link-commands, --law or --set"
+CHANGES = "--without, --law or --set"
 
 
 def replay(
@@ -159,10 +159,6 @@ def replay(
         list[str] | None,
         typer.Option(metavar="LINKS", help='Cut links: "inv4 -> inv7", "inv4 <-> inv7"; can be repeated.'),
     ] = None,
-    without_loss: Annotated[bool, typer.Option("--without-loss", help="Lose no message by chance.")] = False,
-    without_link_commands: Annotated[
-        bool, typer.Option("--without-link-commands", help="Leave out what people commanded the emulated links.")
-    ] = False,
     law: Annotated[str, typer.Option(metavar="KEY", help="Another law: a name, or module:Class.")] = "",
     values: Annotated[
         list[str] | None,
@@ -202,8 +198,6 @@ def replay(
             record = RunRecord.open(run, case)
             changes = Changes(
                 without=tuple(without or ()),
-                without_loss=without_loss,
-                without_link_commands=without_link_commands,
                 law=law,
                 keys=dict(map(_key_and_value, values or ())),
                 since=since,

@@ -1,4 +1,4 @@
-"""What a counterfactual changes: links, losses, the law, and other keys of agents and links, from a time on."""
+"""What a counterfactual changes: links, the law, and other keys of agents and links, from a time on."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import Control
 from gridpeers.lab.replay.recorded_process import ReplayError, require_arrivals
-from gridpeers.netem.schema.fault import KINDS, Fault
+from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.netem.schema.partition import Partition
 from gridpeers.netem.schema.pattern import objections
@@ -41,18 +41,15 @@ Entry = TypeVar("Entry", Fault, Partition)
 @dataclass(frozen=True, kw_only=True)
 class Changes:
     without: tuple[str, ...] = ()
-    without_loss: bool = False
-    without_link_commands: bool = False
     law: str = ""
     keys: Mapping[str, Any] = field(default_factory=dict)
     since: float = 0.0
 
     def __bool__(self) -> bool:
-        return bool(self.without or self.without_loss or self.without_link_commands or self.law or self.keys)
+        return bool(self.without or self.law or self.keys)
 
     def __str__(self) -> str:
         parts = [f"without {pattern}" for pattern in self.without]
-        parts += ["without loss"] * self.without_loss + ["without link commands"] * self.without_link_commands
         parts += [f"law {self.law}"] * bool(self.law)
         parts += [f"{key} = {value}" for key, value in self.keys.items()]
         if not parts:
@@ -110,8 +107,6 @@ def changed_rule(record: RunRecord, changes: Changes) -> ChangedRule:
     netem_before, netem_after = (
         setup_of(netem_of(scenario, case), scenario, feeder, real_nodes=True).netem for scenario in (before, after)
     )
-    if changes.without_loss:
-        netem_after = without_loss(netem_after)
     netem = spliced(netem_before, netem_after, since)
     if changes.without:
         cuts = (Fault(on=pattern, cut=True, from_s=since) for pattern in changes.without)
@@ -192,21 +187,6 @@ def _put(tables: Tree, case: str, path: str, value: Any, *, whole: bool) -> str:
 
 
 # -------------------------------------------------------------------- links
-
-
-def lossless(fault: Fault) -> Fault | None:
-    models = fault.models()
-    if "loss" not in models:
-        return fault
-    left = {kind: model for kind, model in models.items() if kind in KINDS and kind != "loss"}
-    if not (left or fault.own):
-        return None
-    return Fault(on=fault.on, from_s=fault.from_s, to_s=fault.to_s, own=fault.own, **left)
-
-
-def without_loss(netem: Netem) -> Netem:
-    links = (lossless(fault) for fault in netem.links)
-    return replace(netem, links=tuple(fault for fault in links if fault is not None))
 
 
 def spliced(before: Netem, after: Netem, since: float) -> Netem:

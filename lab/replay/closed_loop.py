@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterator
 from heapq import heappop, heappush
 from itertools import count
 from math import inf
-from statistics import median
 from typing import Any
 
 from msgspec.structs import replace
@@ -41,11 +40,10 @@ from gridpeers.lab.replay.recorded_process import (
     start_plant_of,
     tick_message,
 )
-from gridpeers.netem.fault_schedule import Heal
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.plant.realtime.realtime_plant import RealtimePlant
 from gridpeers.scenarios.emulation.emulated_links import links_of
-from gridpeers.scenarios.emulation.link_data import EVERYTHING, LinkCommand
+from gridpeers.scenarios.emulation.link_data import LinkCommand
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.wire.codec import decode
 from gridpeers.wire.journal import (
@@ -62,7 +60,7 @@ from gridpeers.wire.journal import (
     stream_of,
 )
 from gridpeers.wire.links import Links
-from gridpeers.wire.messages import PLANT, Command, LinkReport, LinkRequest, Measurement, State, Telemetry
+from gridpeers.wire.messages import PLANT, LinkReport, Measurement, State, Telemetry
 
 MOST_SENT = 100_000
 
@@ -130,7 +128,6 @@ class ClosedLoop:
         self._delays = LinkDelays()
         self._statuses: dict[str, deque[Message]] = {}
         self._listens = _listeners(record)
-        self._lost = frozenset(_lost(record)) if self._changes.without_loss else frozenset()
         self._number = -1
         self._t = 0.0
         self.notes: list[str] = []
@@ -248,19 +245,10 @@ class ClosedLoop:
                 links = links_of(process.name, self._netem)
                 assert links is not None
                 again.use_links(links)
-            if self._changes.without_loss and again.links is not None:  # losses that people commanded
-                heal = LinkCommand(heal=Heal(on=EVERYTHING, from_s=0.0, kinds=("loss",)))
-                again.links.command(heal.to_tree(), self._changes.since)
             if self._control is not None and process.config is not None and process.agent is not None:
                 config = replace(agent_as_run(process.config, process.recorded.epoch), control=self._control)
                 self._laws.append(law_again(config))
                 process.agent.change(config, self._laws[-1])
-
-    def _command(self, message: Message) -> Message | None:
-        if not (self._changed and self._changes.without_link_commands):
-            return message
-        decoded = decode(message.payload)
-        return None if isinstance(decoded, LinkRequest | Command) and decoded.link_command else message
 
     # ---------------------------------------------------------------- messages
 
@@ -276,7 +264,7 @@ class ClosedLoop:
             if kind == "status":
                 sent = self._statuses.get(message.key)  # without a change, the status of the record is among them
                 return message if not sent or message in sent else sent[-1]
-            return self._command(message) if kind in TO_LINKS else message
+            return message
         named = _named(step)
         if named is None:  # no sound message
             return recorded(step)
@@ -330,15 +318,10 @@ class ClosedLoop:
         for other in self._processes.values():
             if other is process or not other.hears(message.key):
                 continue
-            link = process.name, other.name
             listened = kind == "measurement" or name in self._listens.get(other.name, frozenset())
-            if (*link, decoded.epoch, decoded.seq) in self._lost and self._changed:
-                delay = self._delays.typical(*link)
-            elif not (any_state if other.name == PLANT else existed and listened):
-                delay = self._delays.draw(*link)
-            else:
-                continue
-            heappush(self._due, (due + delay, _ARRIVAL, next(self._order), other, message))
+            if not (any_state if other.name == PLANT else existed and listened):
+                at = due + self._delays.draw(process.name, other.name)
+                heappush(self._due, (at, _ARRIVAL, next(self._order), other, message))
 
 
 def _listeners(record: RunRecord) -> dict[str, frozenset[str]]:
@@ -360,18 +343,6 @@ def _named(step: RecordedStep) -> tuple[str, str, int, int] | None:
     return None if named is None else (sender_of(entry.key), stream_of(entry.key), named.epoch, named.seq)
 
 
-def _lost(record: RunRecord) -> Iterator[tuple[str, str, int, int]]:
-    """Yield sender, receiver, epoch and number of messages that a receiver missed on the wire between two others."""
-    for process in processes_of(record):
-        last: dict[tuple[str, int], int] = {}
-        for step in process.steps():
-            if (named := _named(step)) is not None:
-                src, of, epoch, number = named
-                before = last.get((of, epoch), number)
-                yield from ((src, process.name, epoch, missed) for missed in range(before + 1, number))
-                last[of, epoch] = max(before, number)
-
-
 class LinkDelays:
     """Delays of messages (s of wall time) by sender and receiver, as they are met, for messages that the record lacks.
 
@@ -389,9 +360,6 @@ class LinkDelays:
         known = self._known(src, dst)
         number = self._drawn[src, dst] = self._drawn.get((src, dst), -1) + 1
         return known[number % len(known)]
-
-    def typical(self, src: str, dst: str) -> float:
-        return median(self._known(src, dst))
 
     def _known(self, src: str, dst: str) -> list[float]:
         of_others = (delay for (_, to), known in self._delays.items() if to == dst for delay in known)

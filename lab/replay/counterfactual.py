@@ -18,7 +18,7 @@ from gridpeers.lab.replay.recorded_process import ReplayError
 from gridpeers.lab.replay.replay import ComparedRows, record_of, run_again
 from gridpeers.plant.build import start_plant
 from gridpeers.runs.comparison import Comparison
-from gridpeers.runs.result import Result, shown_in_notebooks
+from gridpeers.runs.result import Result
 from gridpeers.runs.run_folder import RunFolder, new_home
 from gridpeers.runs.running import read, warn_of_laws
 from gridpeers.scenario import plain
@@ -49,8 +49,6 @@ def counterfactual(
     run: Result | RunRecord | str | Path,
     *,
     without: str | Iterable[str] = (),
-    without_loss: bool = False,
-    without_link_commands: bool = False,
     law: Any = "",
     replace: Mapping[str, Any] | None = None,
     since: float = 0.0,
@@ -58,10 +56,9 @@ def counterfactual(
 ) -> Counterfactual:
     """Run a recorded run again, closed on our plant, with something changed from a run time (s) on.
 
-    `without` names links to cut, as in scenarios: "inv4 -> inv7", "inv4 <-> inv7", "* -> inv2". `without_loss` loses no
-    message by chance; `without_link_commands` leaves out the commands that people gave to emulated links. A `law` is a
-    name, `module:Class`, or a class. `replace` has values of keys of agents and links, by their paths:
-    `{"gains.k_p": 0.001}`. The folder is new or empty; without one the files live as long as the result.
+    `without` names links to cut, as in scenarios: "inv4 -> inv7", "inv4 <-> inv7", "* -> inv2". A `law` is a name,
+    `module:Class`, or a class. `replace` has values of keys of agents and links, by path: `{"gains.k_p": 0.001}`.
+    The folder is new or empty; without one the files live as long as the result.
 
     Raise RecordFileError and ReplayError as `replay`, also if a link, a law, a key or a value is wrong, or the time is
     outside of the record; FolderError if there is something in the folder, or it cannot be written.
@@ -70,8 +67,6 @@ def counterfactual(
     try:
         changes = Changes(
             without=(without,) if isinstance(without, str) else tuple(without),
-            without_loss=without_loss,
-            without_link_commands=without_link_commands,
             law=law if isinstance(law, str) else plain(law),
             keys={key: plain(value) for key, value in (replace or {}).items()},
             since=float(since),
@@ -146,11 +141,7 @@ class Counterfactual:
         return Comparison({"": (self.was, self.would_be)}, ("was", "would be"))
 
     def plot(self) -> Figure:
-        from gridpeers.lab.replay.counterfactual_figure import counterfactual_figure
-
-        shown_in_notebooks()
-        since = self.changes.since if self.changes else 0.0
-        return counterfactual_figure(self.was.drawing(), self.would_be.drawing(), str(self.changes), since)
+        return self._comparison.plot()
 
     def __str__(self) -> str:
         text: str = self.table.to_string(float_format=lambda value: f"{value:.5g}", na_rep="-")

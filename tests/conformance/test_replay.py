@@ -192,7 +192,7 @@ def with_more_power(messages: list[Telemetry], t: float) -> Iterator[Telemetry]:
 
 def test_the_file_of_what_would_have_been_gives_it_again(run: Result, tmp_path: Path) -> None:
     """Cuts, losses and their times are in its scenario: run in simulated time, it is the same to the byte."""
-    done = gp.counterfactual(run, without_loss=True, without="inv4 <-> inv7", since=0.5, folder=tmp_path / "would")
+    done = gp.counterfactual(run, without="inv4 <-> inv7", since=0.5, folder=tmp_path / "would")
 
     again = gp.load(tmp_path / "would" / "scenario.toml").run("IV")
 

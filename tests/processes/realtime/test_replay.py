@@ -67,8 +67,8 @@ def test_a_loop_without_a_change_gives_the_run_back(run: Result) -> None:
 
 
 def test_changes_hold_from_their_time_on(run: Result) -> None:
-    """Up to then all is as it was, to the bit, lost messages too; from then on none is lost, and gains are others."""
-    done = gp.counterfactual(run, without_loss=True, replace={"gains.k_p": 0.01}, since=1.5)
+    """Up to then all is as it was, to the bit, lost messages too; then links lose none, and gains are others."""
+    done = gp.counterfactual(run, replace={"link[0].loss": 0.0, "gains.k_p": 0.01}, since=1.5)
 
     assert done.difference is None
     was, would_be = run.record, done.would_be.record

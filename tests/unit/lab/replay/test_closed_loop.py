@@ -5,7 +5,6 @@ The runs are of the toy plant on a fake clock, where every message takes a milli
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any, cast
 
@@ -21,7 +20,7 @@ from gridpeers.netem.schema.netem import Netem
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.wire.messages import LinkReport, PlantEvent, Telemetry
-from tests.record.fake_clock import FakeClockRun, at_once, fake_clock_record
+from tests.record.fake_clock import FakeClockRun, fake_clock_record
 from tests.toy.toy_configs import ALL_FULL
 from tests.toy.toy_plant import ToyPlant
 
@@ -113,27 +112,6 @@ def test_another_gain_gives_the_run_with_that_gain(plain: RunRecord, tmp_path: P
     assert other[0] != told(list(plain.telemetry()))[0]
 
 
-def test_without_loss_gives_the_run_without_it(tmp_path: Path) -> None:
-    """What the wire lost from then on comes after the median delay; up to then the same messages stay lost."""
-
-    def lossy(until: float) -> Callable[[str, str, str, int], float | None]:
-        def delay(src: str, dst: str, key: str, number: int) -> float | None:
-            between = key.startswith("state/") and "plant" not in (src, dst)
-            late = number * 0.02 > until
-            lost = between and number % 3 == 1 and not late
-            return None if lost else 0.025 if between else at_once(src, dst, key, number)  # more than a period
-
-        return delay
-
-    lost = fake_clock_record(tmp_path / "lost" / "case", delay=lossy(9.0))
-    half = fake_clock_record(tmp_path / "half" / "case", delay=lossy(0.5))
-
-    found = again(lost, Changes(without_loss=True, since=0.51))
-
-    assert found == told(list(half.telemetry()))
-    assert found[0] != told(list(lost.telemetry()))[0]
-
-
 def test_messages_that_the_record_lacks_come_as_those_of_their_link(tmp_path: Path) -> None:
     """A law that saved messages is replaced: the states that it did not send are sent, and take the link's delays."""
     saves = Control(secondary="all", graph="full", law=LawChoice(use="event-triggered"))
@@ -148,18 +126,13 @@ def test_messages_that_the_record_lacks_come_as_those_of_their_link(tmp_path: Pa
     assert told(list(saving.telemetry()))[0] != told(list(talking.telemetry()))[0]
 
 
-def test_link_commands_stay_or_are_left_out(tmp_path: Path) -> None:
-    """Without them the run is that in which nobody commanded the links."""
-    nobody = fake_clock_record(tmp_path / "nobody" / "case", netem=Netem())
+def test_link_commands_happen_again(tmp_path: Path) -> None:
+    """A link that somebody cut by hand is cut in the replay too."""
     tree = {"fault": {"on": "inv1 -> inv2", "cut": True}}
     record = fake_clock_record(
-        tmp_path / "somebody" / "case",
+        tmp_path / "case",
         netem=Netem(),
         happens=lambda run: run.at(0.4, lambda: run.command("link", link_command=tree)),
     )
 
-    rows, events = again(record, Changes(without_link_commands=True))
-
-    assert (rows, events) == told(list(nobody.telemetry()))
-    assert rows != told(list(record.telemetry()))[0]
-    assert again(record, Changes(without_link_commands=True, since=0.6)) == told(list(record.telemetry()))
+    assert again(record) == told(list(record.telemetry()))

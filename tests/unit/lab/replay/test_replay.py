@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from gridpeers.lab.replay.changes import lossless, spliced, without_loss
+from gridpeers.lab.replay.changes import spliced
 from gridpeers.lab.replay.recorded_process import (
     JournalParts,
     RecordedProcess,
@@ -25,7 +25,6 @@ from gridpeers.netem.schema.partition import Partition
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.wire.journal import ReceivedMessage, RejectedCount
 from gridpeers.wire.messages import State, Telemetry
-from gridpeers.wire.plugins.plugin import plugin_of
 from tests.record.fake_clock import FakeClockRun, fake_clock_record
 from tests.toy.toy_plant import ISLANDING, ToyPlant
 
@@ -231,18 +230,3 @@ def test_each_time_has_the_faults_of_its_configuration(since: float) -> None:
             assert entry.to_s is None or entry.from_s < entry.to_s
         for t in (0.0, 0.2, 0.6, 0.8, 1.2, 1.8, 2.2, 2.9, 3.2, 3.8, 4.5, 5.2, 5.8, 7.0, 9.0):
             assert in_force(both, t) == in_force(before if t < since else after, t), t
-
-
-def test_without_loss_all_else_of_a_fault_is_left() -> None:
-    """A fault that was loss alone is gone; its times and its other models stay."""
-    lossy = Fault(on="* -> inv1", loss=0.2, delay=0.1, from_s=1.0, to_s=2.0)
-
-    left = lossless(lossy)
-
-    assert left is not None
-    assert (left.on, left.from_s, left.to_s) == ("* -> inv1", 1.0, 2.0)
-    assert left.models() == Fault(on="* -> inv1", delay=0.1).models()
-    assert lossless(EARLY) is EARLY
-    own = replace(lossy, delay=None, own=(plugin_of({"use": "mine:Burst"}),))
-    assert getattr(lossless(own), "own", None) == own.own
-    assert without_loss(Netem(links=(Fault(on="* -> inv2", loss=0.2), lossy, EARLY))).links == (left, EARLY)
