@@ -131,39 +131,7 @@ def most_rated(V_nom: float) -> float:
 GROUP = 3
 """Inverters of a group, a microgrid of its own: one leader and its followers. A section has one group or several."""
 GROUP_LOAD = 2e6  # load (W) beyond which a section has more groups: one leader does not hold the ends of a long feeder
-MOST_GROUPS = 12  # groups that are proposed without being told how many inverters, those of most load first
-
-
-def group_sizes(loads: Sequence[float], places: Sequence[int], count: int | None) -> list[list[int]]:
-    """Return the sizes of the groups of the first sections; with `count` there are so many inverters, if they fit."""
-    whole = ceil(count / GROUP) if count else MOST_GROUPS
-    number = [1 for _ in loads[:whole]]
-
-    def most_loaded(room: Sequence[int]) -> int | None:
-        return max(
-            (k for k, most in enumerate(room) if number[k] < most), key=lambda k: loads[k] / number[k], default=None
-        )
-
-    while sum(number) < whole:  # the next group goes where a group has most load
-        k = most_loaded([many // GROUP for many in places[: len(number)]])
-        if k is None or (count is None and loads[k] / number[k] <= GROUP_LOAD):
-            break
-        number[k] += 1
-    while count and sum(min(many, GROUP * groups) for many, groups in zip(places, number, strict=False)) < count:
-        k = most_loaded([ceil(many / GROUP) for many in places[: len(number)]])  # others have too few buses
-        if k is not None:
-            number[k] += 1
-        elif len(number) < len(loads):
-            number.append(1)
-        else:
-            break
-    sizes = [[0] * many for many in number]
-    for _ in range(count or GROUP * sum(number)):
-        open_ = [group for group, many in zip(sizes, places, strict=False) if sum(group) < many and min(group) < GROUP]
-        if open_:
-            smallest = min(open_, key=min)
-            smallest[smallest.index(min(smallest))] += 1
-    return [[size for size in group if size] for group in sizes]
+MOST_GROUPS = 12  # groups that are proposed for all sections together, about
 
 
 def phase_powers(feeder: Feeder, switch: str, head: str) -> NDArray[np.complex128]:
@@ -270,31 +238,14 @@ class Proposal(NamedTuple):
     heaviest: float  # load of the heaviest phase in relation to the mean of the phases
 
 
-def propose(feeder: Feeder, count: int | None = None) -> Proposal:
+def propose(feeder: Feeder) -> Proposal:
     """Return where to island a feeder, and inverters that can then carry its load; its own are not considered.
 
     The switch is the one that cuts off most load. Each section between switches beyond it has a leader and followers,
     rated by its load and that of the heaviest phase, or by what its cables deliver, and spread over it in equal parts
-    of the load. Without a count each section has one group; sections of more load have more groups, and all have more
-    where an inverter would be larger than its voltage allows.
+    of the load. Sections of more load have more such groups, and so do those where a leader would be larger than its
+    voltage allows.
     """
-    needed = 0
-    while True:
-        proposal = _propose(feeder, count or needed or None)
-        large = max(proposal.inverters, key=lambda row: row.P_rated / most_rated(row.V_nom))
-        most, number, before = most_rated(large.V_nom), len(proposal.inverters), needed
-        if large.P_rated <= most:
-            return proposal
-        needed = ceil(number * large.P_rated / most)
-        if count is not None or needed <= before:  # there are no buses for more
-            raise NoProposalError(
-                f"{number} inverters for the load of {proposal.load / 1e3:.0f} kW need one of "
-                f"{large.P_rated / 1e3:.0f} kW at bus {large.bus}, where {most / 1e3:.0f} kW are plausible; give more "
-                "--inverters, if there are buses for them, or another --switch"
-            )
-
-
-def _propose(feeder: Feeder, count: int | None) -> Proposal:
     switch, head, beyond = islanding_switch(feeder)
     everywhere = feeder.load_by_bus()
     load = {bus: everywhere.get(bus, 0.0) for bus in beyond}
@@ -316,37 +267,55 @@ def _propose(feeder: Feeder, count: int | None) -> Proposal:
     chosen = [section for section in sections if section[0] >= SMALLEST][:MOST_GROUPS] or sections[:1]
     if not chosen:
         raise NoProposalError(f'beyond switch "{switch}" no bus has phases A, B and C, which an inverter needs')
-    there = [len(possible_places(feeder, known, buses, 0.0, GROUP)) for _, buses in chosen]
-    groups = group_sizes([of_section for of_section, _ in chosen], there, count)
-    chosen = chosen[: len(groups)]
     carried = sum(of_section for of_section, _ in chosen) or 1.0
+    group_load = max(GROUP_LOAD, carried / MOST_GROUPS)
     rows, neutrals = {bus.name: bus for bus in feeder.buses}, neutrals_of(feeder)
     inverters: list[InverterRow] = []
     microgrid = 0
-    for (of_section, section), sizes in zip(chosen, groups, strict=True):
+    for of_section, section in chosen:
         rating = needed * (of_section / carried if carried > 1.0 else 1.0 / len(chosen))
-        places = possible_places(feeder, known, section, LEADER * rating / len(sizes), sum(sizes))
-        places = spread(section, set(places), sum(sizes), load)
-        for size in sizes:
+        for own in _groups(feeder, known, section, load, rating, max(1, ceil(of_section / group_load))):
             microgrid += 1
-            own, places = places[:size], places[size:]
-            middle = size // 2  # a leader at one end of a long line does not hold the other
-            follower = (1.0 - LEADER) / max(size - 1, 1)
-            for k, bus in enumerate(own):
-                share = (LEADER if k == middle else follower) if size > 1 else 1.0
-                inverters.append(
-                    InverterRow(
-                        name=f"inv{len(inverters) + 1}",
-                        kind="GFM" if k == middle else "GFL",
-                        bus=bus,
-                        microgrid=f"MG{microgrid}",
-                        P_rated=max(round(rating / len(sizes) * share, -4), 10e3),
-                        V_nom=rows[bus].V_nom,
-                        m_p=DROOPS[0],
-                        m_q=DROOPS[1],
-                        neutral=neutral_for("", rows[bus], "ABC", neutrals.get(bus, "")),
-                    )
+            middle = len(own) // 2  # a leader at one end of a long line does not hold the other
+            follower = (1.0 - LEADER) / max(len(own) - 1, 1)
+            for k, (bus, of_group) in enumerate(own.items()):
+                share = (LEADER if k == middle else follower) if len(own) > 1 else 1.0
+                row = InverterRow(
+                    name=f"inv{len(inverters) + 1}",
+                    kind="GFM" if k == middle else "GFL",
+                    bus=bus,
+                    microgrid=f"MG{microgrid}",
+                    P_rated=max(round(of_group * share, -4), 10e3),
+                    V_nom=rows[bus].V_nom,
+                    m_p=DROOPS[0],
+                    m_q=DROOPS[1],
+                    neutral=neutral_for("", rows[bus], "ABC", neutrals.get(bus, "")),
                 )
+                if row.P_rated > (most := most_rated(row.V_nom)):
+                    raise NoProposalError(
+                        f"the load of {total / 1e3:.0f} kW needs an inverter of {row.P_rated / 1e3:.0f} kW at bus "
+                        f"{bus}, where {most / 1e3:.0f} kW are plausible; try another --switch"
+                    )
+                inverters.append(row)
     total_rated = sum(row.P_rated for row in inverters)
     P_set0 = (1.0 - IMPORTED) * max(total - generation, 0.0) / total_rated
     return Proposal(switch, tuple(inverters), round(P_set0, 3), total, heaviest)
+
+
+def _groups(
+    feeder: Feeder, known: set[str], section: Sequence[str], load: Mapping[str, float], rating: float, number: int
+) -> list[dict[str, float]]:
+    """Return the buses of each group of a section, each with the rating (W) of its group.
+
+    There are so many groups, or more if a leader were larger than its voltage allows, as far as there are buses.
+    """
+    rows = {bus.name: bus for bus in feeder.buses}
+    while True:
+        places = possible_places(feeder, known, section, LEADER * rating / number, GROUP * number)
+        enough = min(len(places) // GROUP, ceil(LEADER * rating / most_rated(rows[places[0]].V_nom)))
+        if enough <= number:
+            break
+        number = enough
+    number = max(1, min(number, len(places) // GROUP))
+    chosen = spread(section, set(places), GROUP * number, load)
+    return [dict.fromkeys(chosen[k : k + GROUP], rating / number) for k in range(0, len(chosen), GROUP)]

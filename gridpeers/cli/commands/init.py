@@ -35,12 +35,6 @@ def init(
         list[str] | None,
         typer.Option("--leave-out", metavar="ELEMENT", help="With --feeder: do without Class.name; repeat it."),
     ] = None,
-    inverters: Annotated[
-        int | None,
-        typer.Option(
-            min=1, max=1000, metavar="N", help="With --feeder: inverters to propose; 3 a section if left out."
-        ),
-    ] = None,
 ) -> None:
     """Make a project of your own, or an islanding of your feeder.
 
@@ -52,8 +46,8 @@ def init(
     """
     try:
         if feeder is None:
-            if switch or leave_out or inverters:
-                fail(["--switch, --leave-out and --inverters go with --feeder"], BAD_INPUT)
+            if switch or leave_out:
+                fail(["--switch and --leave-out go with --feeder"], BAD_INPUT)
             with whole_folder(folder):
                 shutil.copytree(TEMPLATE, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
             following = command_line("run", "mine.toml", "--driver", "inprocess")
@@ -61,7 +55,7 @@ def init(
                 following += f" && {command_line(program='pytest')}"
         else:
             with whole_folder(folder):
-                ROOMS.resolve("propose_project")(folder, feeder, switch or [], leave_out or [], inverters)
+                ROOMS.resolve("propose_project")(folder, feeder, switch or [], leave_out or [])
             following = command_line("run", "islanding.toml", "--driver", "inprocess")
     except FolderError as error:
         fail([str(error)], BAD_INPUT)

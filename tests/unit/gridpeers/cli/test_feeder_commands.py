@@ -10,8 +10,7 @@ from tempfile import gettempdir
 import pandas as pd
 import pytest
 
-from gridpeers import BrokenRunError, Feeder, Scenario
-from gridpeers.bridges.proposal import feeder_proposal
+from gridpeers import Feeder
 from tests.command_line import invoke
 from tests.unit.bridges.gridlabd.glm_models import HEAD, LOADS
 
@@ -40,37 +39,6 @@ def test_a_script_becomes_an_islanding_that_runs(elsewhere: Path) -> None:
     ]
 
 
-LONG = """New Circuit.long basekv=12.47 pu=1.02 r1=0.1 x1=0.5 r0=0.2 x0=0.9
-New Line.sw bus1=sourcebus bus2=a r1=0.2 x1=0.4 r0=0.5 x0=1.2 c1=0 c0=0 length=1
-New Line.l1 bus1=a bus2=b r1=0.2 x1=0.4 r0=0.5 x0=1.2 c1=0 c0=0 length=8
-New Line.l2 bus1=b bus2=c r1=0.2 x1=0.4 r0=0.5 x0=1.2 c1=0 c0=0 length=8
-New Load.a bus1=a kv=12.47 kw=2000 kvar=500
-New Load.b bus1=b kv=12.47 kw=2000 kvar=500
-New Load.c bus1=c kv=12.47 kw=2000 kvar=500
-Set VoltageBases=[12.47]
-CalcVoltageBases
-"""
-"""A long feeder with a load at each of its three buses."""
-
-
-@pytest.mark.parametrize(
-    ("leader", "note", "slower"),
-    [(0.3, "so [plant.gfl] has a slower volt-var droop", True), (0.2, "more --inverters", False)],
-)
-def test_a_proposal_that_would_oscillate_is_calmed_or_said(
-    elsewhere: Path, monkeypatch: pytest.MonkeyPatch, leader: float, note: str, slower: bool
-) -> None:
-    """A proposal whose leader is too small for its followers gets a slower volt-var droop, and a note."""
-    monkeypatch.setattr(feeder_proposal, "LEADER", leader)
-    Path("long.dss").write_text(LONG)
-
-    code, made = invoke("init", "mine", "--feeder", "long.dss", "--switch", "Line.sw", "--inverters", "3")
-
-    assert code == 0, made
-    assert note in made
-    assert ("T_vf_s = 0.2" in Path("mine/islanding.toml").read_text()) == slower
-
-
 UNEVEN = """New Circuit.uneven basekv=12.47 pu=1.02 r1=0.1 x1=0.5 r0=0.2 x0=0.9
 New Line.sw bus1=sourcebus bus2=a r1=0.02 x1=0.04 r0=0.05 x0=0.12 c1=0 c0=0 length=1
 New Line.l1 bus1=a bus2=b r1=0.2 x1=0.4 r0=0.5 x0=1.2 c1=0 c0=0 length=1
@@ -94,65 +62,6 @@ def test_inverters_are_rated_for_the_heaviest_phase(elsewhere: Path) -> None:
     assert "NOTE" not in made
     rated = pd.read_csv("mine/uneven/inverters.csv")["P_rated_kW"].sum()
     assert rated == pytest.approx(1.3 * 3.0 * 2700.0, rel=0.03)
-
-
-def test_a_phase_that_would_stay_at_its_limit_gets_more_current(
-    elsewhere: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """With inverters for the mean phase, C falls to where loads give way, and A and B rise until all trip."""
-    monkeypatch.setattr(feeder_proposal, "heaviest_phase", lambda *_: 1.0)
-    Path("uneven.dss").write_text(UNEVEN)
-
-    made = invoke("init", "mine", "--feeder", "uneven.dss", "--switch", "Line.sw")[1]
-
-    assert "limits its phase currents to 2 pu" in made
-    assert "tripped: overvoltage" in made
-    assert "so [plant.gfm] allows more current, I_max_pu = 3" in made
-    assert "I_max_pu = 3.0" in Path("mine/islanding.toml").read_text()
-
-
-def string_of_loads(buses: int, km: float, kvar: float) -> str:
-    """A line with equal loads, 6 MW in all, and a capacitor at its end."""
-    rows = ["New Circuit.long basekv=12.47 pu=1.02 r1=0.1 x1=0.5 r0=0.2 x0=0.9"]
-    for k in range(buses):
-        name, start = ("sw", "sourcebus") if k == 0 else (f"l{k}", f"b{k - 1}")
-        rows.append(f"New Line.{name} bus1={start} bus2=b{k} r1=0.2 x1=0.4 r0=0.5 x0=1.2 c1=0 c0=0 length={km}")
-        rows.append(f"New Load.d{k} bus1=b{k} kv=12.47 kw={6000 / buses:g} kvar={1500 / buses:g}")
-    rows += [
-        f"New Capacitor.k bus1=b{buses - 1} kv=12.47 kvar={kvar:g}",
-        "Set VoltageBases=[12.47]",
-        "CalcVoltageBases",
-    ]
-    return "\n".join(rows)
-
-
-def test_gains_are_chosen_with_which_the_agents_share_vars(elsewhere: Path) -> None:
-    """Where two leaders see different voltages and few vars are needed, var sharing weighs more, and a note says so."""
-    Path("long.dss").write_text(string_of_loads(9, 1.0, 1400.0))
-
-    made = invoke("init", "mine", "--feeder", "long.dss", "--switch", "Line.sw", "--inverters", "6")[1]
-    end, ran = invoke("run", "mine/islanding.toml", "--driver", "inprocess", "--case", "ring")
-
-    assert "NOTE  case ring, MQSI, islanding: inv" in made
-    assert "so [gains] weighs var sharing more" in made
-    assert end == 0
-    assert re.search(r"CHECKS  case ring: (\d+) of \1 checks passed", ran)
-
-
-def test_a_case_that_breaks_when_it_is_tried_is_a_note(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The project is there all the same, with the settings that it had before the trial."""
-
-    def run(*_: object) -> None:
-        raise BrokenRunError("case ring: no room")
-
-    monkeypatch.setattr(Scenario, "run", run)
-    Path("uneven.dss").write_text(UNEVEN)
-
-    code, made = invoke("init", "mine", "--feeder", "uneven.dss", "--switch", "Line.sw")
-
-    assert code == 0, made
-    assert "NOTE  case ring was not checked, as a run of it broke: case ring: no room" in made
-    assert Path("mine/islanding.toml").exists()
 
 
 TINY = {
