@@ -32,11 +32,8 @@ from gridpeers.plant.request_process import TransientFolder
 from gridpeers.scenarios.checks.check_registry import RETURNS, chosen_checks
 from gridpeers.scenarios.results.run_files import (
     JOURNAL,
-    FolderError,
     journal_line,
-    open_journal,
     refusal,
-    rows_in,
     set_broken,
     set_complete,
     shown,
@@ -57,8 +54,7 @@ REPEATED = 20
 SEEDS = 1_000_000
 """Seeds of the messages' fates for each seed of a campaign: run n has one of its own."""
 
-SCENARIO, SETTINGS = "scenario.toml", "asked.json"
-"""Files from which a campaign goes on, beside its journal: its scenario; its seed and its number of runs."""
+SCENARIO = "scenario.toml"  # file of the scenario without disturbances
 
 COLUMNS = (
     *("run", "seed", "status", "violated", "why", "disturbances", "schedule"),
@@ -91,7 +87,7 @@ class Campaign:
     """By the check that is violated."""
 
     def run(self, stage: Stage) -> None:
-        """Do the runs that the folder lacks, shrink what fails, and write all of it, also after an interruption.
+        """Do the runs, shrink what fails, and write all of it, also after an interruption.
 
         MachineError if the machine lacks what a run needs: that is no failure of the scenario, and nothing is shrunk.
         """
@@ -113,25 +109,22 @@ class Campaign:
 
     def _do_runs(self, stage: Stage, within: Path) -> None:
         text, driver = self.base.text, self.driver
-        calls = ((text, self.seed, number, schedule, driver, within) for number, schedule in self._missing())
+        calls = ((text, self.seed, number, schedule, driver, within) for number, schedule in self._schedules())
         jobs = 1 if driver == "processes" else self.jobs
         with stage(self.runs) as tell, closing(on_workers(calls, jobs, run_number)) as results:
             progress = f"{self.base.scenario.name}, {{}} of {self.runs} runs"
-            tell(progress.format(len(self.rows)), len(self.rows))
+            tell(progress.format(0), 0)
             for row in results:
                 first = self.rows.get(row.number)
                 self.add(row if first is None else compared(first, row, REPEATS))
                 tell(f"{progress.format(len(self.rows))}, {self.violated} violated", len(self.rows))
 
-    def _missing(self) -> Iterator[tuple[int, Schedule]]:
-        known = dict(self.rows)
+    def _schedules(self) -> Iterator[tuple[int, Schedule]]:
         for batch in range(-(-self.runs // BATCH)):
             numbers = range(batch * BATCH, min((batch + 1) * BATCH, self.runs))
-            once = {number for number in numbers if number not in known}
-            twice = {n for n in numbers if n % REPEATED == 0 and (n in once or REPEATS not in known[n].passed)}
-            if once | twice:
-                schedules = dict(zip(numbers, drawn(self.base, self.seed, batch), strict=False))
-                yield from ((number, schedules[number]) for which in (once, twice) for number in sorted(which))
+            schedules = dict(zip(numbers, drawn(self.base, self.seed, batch), strict=False))
+            yield from schedules.items()
+            yield from ((number, schedule) for number, schedule in schedules.items() if number % REPEATED == 0)
 
     def _add_failures(self) -> None:
         rows = sorted(self.rows.values(), key=lambda row: (len(row.schedule), row.number))
@@ -191,10 +184,7 @@ class Campaign:
         return self.path / name
 
     def begin(self) -> None:
-        """Write what a campaign goes on from."""
         write_whole(self._file(SCENARIO), self.base.text)
-        write_whole(self._file(SETTINGS), json.dumps({"seed": self.seed, "runs": self.runs}) + "\n")
-        open_journal(self._file()).close()
         self.write_table()
 
     def add(self, row: ChaosRow) -> None:
@@ -242,26 +232,6 @@ class Campaign:
         self.write_table()
         write_whole(self._file("report.txt"), "\n".join(self.lines()) + "\n")
 
-    def take_up(self) -> None:
-        """Take the runs that its folder has; those in one process do not count where it has processes.
-
-        FolderError if the folder is of a campaign with another scenario, another seed or more runs, or is damaged.
-        """
-        folder = self._file()
-        where, (seed, _) = f"--resume {folder}", asked_of(folder)
-        try:
-            if (folder / SCENARIO).read_text(encoding="utf-8") != self.base.text:
-                raise FolderError(f"{where}: its {SCENARIO} is not the scenario and case to disturb; take a new folder")
-            rows = rows_in(folder, ChaosRow)
-        except OSError as error:
-            raise FolderError(f"{where}: no folder of a campaign: {error.strerror}") from None
-        if seed != self.seed:
-            raise FolderError(f"{where}: it was begun with --seed {seed}, not {self.seed}; give that one")
-        if rows and (last := max(rows)) >= self.runs:
-            raise FolderError(f"{where}: it has run {last} already; give --runs {last + 1} or more")
-        here = {SAME_IN_PROCESSES} if self.driver == "processes" else set()
-        self.rows = {number: row for number, row in rows.items() if here <= {*row.passed, *row.violated}}
-
 
 def seed_of(seed: int, number: int) -> int:
     return seed * SEEDS + number
@@ -269,18 +239,6 @@ def seed_of(seed: int, number: int) -> int:
 
 def again(file: Path) -> str:
     return command_line("run", shown(file), "--driver", "inprocess", "--require-checks")
-
-
-def asked_of(folder: Path) -> tuple[int, int]:
-    """Return the seed and the number of runs with which a campaign was begun; FolderError if it is no such folder."""
-    try:
-        found = json.loads((folder / SETTINGS).read_text(encoding="utf-8"))
-        return int(found["seed"]), int(found["runs"])
-    except (OSError, ValueError, LookupError, TypeError) as error:
-        why = error.strerror if isinstance(error, OSError) else f"its {SETTINGS} is damaged"
-        raise FolderError(
-            f"--resume {folder}: no folder of a campaign: {why}; name one with {SCENARIO} and {SETTINGS}"
-        ) from None
 
 
 # -------------------------------------------------------------------- on a worker

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -33,22 +32,13 @@ _PACKAGES = {"hypothesis": "the schedules", "joblib": "the runs over all cores"}
 
 
 def chaos(
-    context: typer.Context,
     scenario: ScenarioName,
-    runs: Annotated[
-        int | None,
-        typer.Option(min=1, metavar="N", help="Number of runs, 100 if left out; with --resume as many as at first."),
-    ] = None,
+    runs: Annotated[int, typer.Option(min=1, metavar="N", help="Number of runs.")] = 100,
     driver: Annotated[
         Literal["inprocess", "processes"],
         typer.Option(help="inprocess: each run in one process; processes: one per agent, beside the same in one."),
     ] = "inprocess",
-    seed: Annotated[
-        int | None,
-        typer.Option(
-            min=0, max=10**9, metavar="S", help="Seed of all that is drawn, 1 if left out; with --resume the first one."
-        ),
-    ] = None,
+    seed: Annotated[int, typer.Option(min=0, max=10**9, metavar="S", help="Seed of all that is drawn.")] = 1,
     case: Annotated[
         str | None, typer.Option(metavar="NAME", help="Case to disturb; the last one of the file when left out.")
     ] = None,
@@ -56,10 +46,6 @@ def chaos(
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Folder for the results, new or empty; runs/SCENARIO-chaos/TIME if left out."),
-    ] = None,
-    resume: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Folder of a campaign that was interrupted, or is to be longer: go on there."),
     ] = None,
 ) -> None:
     """Disturb a scenario at random; judge and shrink what fails.
@@ -70,9 +56,6 @@ def chaos(
 
     Exit code: 0 no run violated anything, 1 some did, 2 bad usage or a bad file, 3 the workers went, or the machine
     lacks what a run needs, such as room in TMPDIR, 130 Ctrl-C, 143 SIGTERM: what came until then is written.
-
-    A campaign that was interrupted goes on with --resume, and the same scenario and case; with more --runs it
-    becomes longer.
 
     Example:  gridpeers chaos islanding --runs 200
     """
@@ -88,12 +71,11 @@ def chaos(
     from datetime import datetime
 
     from gridpeers.cli.progress import remaining
-    from gridpeers.lab.chaos.campaign import RUNS, Campaign, asked_of
+    from gridpeers.lab.chaos.campaign import Campaign
     from gridpeers.lab.chaos.disturbed_scenario import ChaosBase
     from gridpeers.scenarios.results.run_files import (
         FolderError,
         broken_if_ended,
-        locked,
         new_folder,
         require_folder,
         set_status,
@@ -102,38 +84,23 @@ def chaos(
     from gridpeers.scenarios.sweep.workers import cores
     from gridpeers.wire.driver.command_line import command_line
 
-    def lock(folder: Path, option: str) -> None:
-        handle = locked(folder, option, "chaos")
-        context.call_on_close(lambda: os.close(handle))
-
-    if out is not None and resume is not None:
-        fail([f"--out {out}: --resume {resume} goes on in that folder; leave one of them out"], BAD_INPUT)
     name, console = f"{spec.name}-chaos", terminal()
     try:
-        first_seed, first_runs = (1, RUNS) if resume is None else asked_of(resume)
         campaign = Campaign(
             base=ChaosBase(spec, feeder),
-            seed=first_seed if seed is None else seed,
-            runs=runs or first_runs,
+            seed=seed,
+            runs=runs,
             driver=driver,
             jobs=jobs or cores(),
-            path=resume,
         )
-        words = ["chaos", scenario, "--case", campaign.base.case]
-        with _told_if_ended(campaign, [*words, "--driver", driver]):
-            if resume is None:
-                require_folder(out, name)
-            else:
-                lock(resume, "--resume")
-                campaign.take_up()
+        words = ["--case", campaign.base.case, "--runs", str(runs), "--seed", str(seed), "--driver", driver]
+        campaign.command = command_line("chaos", scenario, *words)
+        with _told_if_ended(campaign):
+            require_folder(out, name)
             _try_undisturbed(console, campaign)
-            path = resume
-            if path is None:  # the folder is made only once the scenario has passed without disturbances
-                path = campaign.path = new_folder(out, name, datetime.now().astimezone())
-                lock(path, "--out")
+            # the folder is made only once the scenario has passed without disturbances
+            path = campaign.path = new_folder(out, name, datetime.now().astimezone())
             set_status(path, "running")
-            words += ["--runs", str(campaign.runs), "--seed", str(campaign.seed), "--driver", driver]
-            campaign.command = command_line(*words)
             with broken_if_ended(path):
                 campaign.begin()
             campaign.run(partial(remaining, console))
@@ -167,13 +134,12 @@ def _try_undisturbed(console: Console, campaign: Campaign) -> None:
 
 
 @contextmanager
-def _told_if_ended(campaign: Campaign, words: list[str]) -> Iterator[None]:
-    """Say what is kept of a campaign that ends early; the command of these words takes it up with --resume."""
+def _told_if_ended(campaign: Campaign) -> Iterator[None]:
+    """Say what is kept of a campaign that ends early."""
     from gridpeers.cli.usage import exit_code, interruptible
     from gridpeers.lab.chaos.chaos_run import MachineError, machine_error
     from gridpeers.scenarios.results.run_files import refusal, shown
     from gridpeers.scenarios.sweep.workers import WorkersError
-    from gridpeers.wire.driver.command_line import command_line
 
     try:
         with interruptible():
@@ -184,7 +150,7 @@ def _told_if_ended(campaign: Campaign, words: list[str]) -> Iterator[None]:
         if path and not path.is_dir():
             kept, where = 0, f"as {shown(path)}/ is gone"
         elif path:
-            where = f"in {shown(path)}/; go on with: {command_line(*words, '--resume', shown(path))}"
+            where = f"in {shown(path)}/"
         left = f"{kept} of {campaign.runs} runs are kept {where}"
         if isinstance(error, KeyboardInterrupt):
             fail([f"interrupted; {left}"], exit_code(error))
