@@ -255,7 +255,7 @@ class Agent:
                 if not self._law_runs:
                     start_law(self._law, own)
                     self._law_runs = True
-                P_set, V_set, shared, send = decide(self._law, own, around, config.T_c)
+                P_set, V_set, shared, send, _ = decide(self._law, own, around, config.T_c)
             except LawError as error:
                 law = config.control.law
                 self.fault = f"law {law.name}{failed_at(self._law, error, law.folder)}: {error}"

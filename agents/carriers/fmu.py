@@ -262,7 +262,7 @@ def _answer(law: LoadedFmu, asked: dict[str, Any]) -> dict[str, Any]:
         start_law(law, own)
         return {"type": "ready"}
     decision = decide(law, own, [Neighbour(**other) for other in asked["neighbours"]], asked["T"])
-    return decision._asdict() | {"shared": dict(decision.shared)}
+    return decision._asdict() | {"shared": dict(decision.shared), "terms": None}
 
 
 if __name__ == "__main__":

@@ -17,7 +17,7 @@ CARRIERS = ("use", "command", "fmu")
 
 KEYS = (*CARRIERS, "folder", "time_limit_s")
 
-METHODS = ("start", "close", "terms")
+METHODS = ("start", "close")
 """Methods of a law that are called beside `step`; a law may leave them as they are in `Law`."""
 
 

@@ -95,13 +95,9 @@ class TimeLimited(Law):
         with limited(f"start at t = {own.t:.6g} s", self._time_limit, self._limit):
             self.carried.start(own)
 
-    def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
+    def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints | Terms:
         with limited(f"step at t = {own.t:.6g} s", self._time_limit, self._limit):
             return self.carried.step(own, neighbours, T)
-
-    def terms(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> Terms | None:
-        with limited(f"terms at t = {own.t:.6g} s", self._time_limit, self._limit):
-            return self.carried.terms(own, neighbours, T)
 
     def close(self) -> None:
         """End the law; the run is over, so that one that fails in it is but named in the log."""

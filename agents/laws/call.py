@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import Any
 
-from gridpeers.agents.laws.law import NOTHING_SHARED, Law, Neighbour, Own, SetPoints
+from gridpeers.agents.laws.law import NOTHING_SHARED, Law, Neighbour, Own, SetPoints, Terms
 from gridpeers.wire.messages import MOST_SHARED, SHARED_LIMIT
 from gridpeers.wire.plugins.registry import ANYTHING, line_of, named
 from gridpeers.wire.wording import printable
@@ -60,9 +60,11 @@ def failed_at(law: Law, error: LawError, folder: str) -> str:
 
 
 def _within_limits(law: Law, result: Any, own: Own) -> SetPoints:
+    if isinstance(result, Terms):
+        result = _summed(result, own)
     if not isinstance(result, SetPoints):
         raise LawError(f"step at t = {own.t:.6g} s returned {_shown(result)}; return SetPoints(P_set=..., V_set=...)")
-    P_set, V_set, shared, send = result.P_set, result.V_set, result.shared, result.send
+    P_set, V_set, shared, send, terms = result
     if not (type(P_set) is type(V_set) is float and isfinite(P_set) and isfinite(V_set)):
         P_set, V_set = _number("P_set", P_set, own.t), _number("V_set", V_set, own.t)
     elif (
@@ -77,7 +79,16 @@ def _within_limits(law: Law, result: Any, own: Own) -> SetPoints:
         min(max(V_set, law.V_set_min), law.V_set_max),
         NOTHING_SHARED if shared is NOTHING_SHARED else _checked(shared, own.t),
         bool(send),
+        terms,
     )
+
+
+def _summed(terms: Terms, own: Own) -> SetPoints:
+    P_set, V_set = (
+        before + sum(_number(f"term {_shown(term.name)}", term.value, own.t) for term in of)
+        for before, of in ((own.P_set, terms.P_set), (own.V_set, terms.V_set))
+    )
+    return SetPoints(P_set, V_set, terms.shared, terms.send, lambda: terms)
 
 
 def _number(name: str, value: Any, t: float) -> float:

@@ -19,6 +19,7 @@ to droop, and without the centre nothing is restored.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Annotated, Any
 
 from gridpeers.agents.laws.law import Law, Neighbour, Own, SetPoints, Term, Terms
@@ -49,45 +50,49 @@ class Centralised(Law):
 
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
         if own.name == self.centre:
-            error = self._mean_error(own, neighbours)
-            self._omega -= self.k_i * T * own.e
-            self._E += self.k_iE * T * error
-            self._errors = own.e, error
-            omega, E = self._omega - self.k_p * own.e, self._E + self.k_pE * error
-            return SetPoints(omega / own.m_p, 1.0 + E, {"omega": omega, "E": E})
+            return self._centre_step(own, self._mean_error(own, neighbours), T)
         for other in neighbours:
             if other.name == self.centre and "omega" in other.shared:
-                return SetPoints(other.shared["omega"] / own.m_p, 1.0 + other.shared["E"], {"V": own.V})
-        return SetPoints(own.P_set, own.V_set, {"V": own.V})
+                P_set, V_set = other.shared["omega"] / own.m_p, 1.0 + other.shared["E"]
+                terms = partial(_terms_of_correction, own, P_set, V_set, other.name)
+                return SetPoints(P_set, V_set, {"V": own.V}, True, terms)
+        return SetPoints(own.P_set, own.V_set, {"V": own.V}, True, Terms)
 
-    def terms(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> Terms:
-        if own.name == self.centre:
-            error, (e_before, error_before) = self._mean_error(own, neighbours), self._errors
-            # Both are 0 but after a limit: the integrals go on beyond it, while the set-points stay.
-            P_beyond = (self._omega - self.k_p * e_before) / own.m_p - own.P_set
-            V_beyond = 1.0 + self._E + self.k_pE * error_before - own.V_set
-            return Terms(
-                (
-                    Term("integral of frequency error", -self.k_i * T * own.e / own.m_p),
-                    Term("change of frequency error", -self.k_p * (own.e - e_before) / own.m_p),
-                    Term("integral beyond the limit", P_beyond),
-                ),
-                (
-                    Term("integral of voltage error", self.k_iE * T * error),
-                    Term("change of voltage error", self.k_pE * (error - error_before)),
-                    Term("integral beyond the limit", V_beyond),
-                ),
-            )
-        for other in neighbours:
-            if other.name == self.centre and "omega" in other.shared:
-                P, V = other.shared["omega"] / own.m_p, 1.0 + other.shared["E"]
-                return Terms(
-                    (Term("correction of the centre", P - own.P_set, other.name),),
-                    (Term("correction of the centre", V - own.V_set, other.name),),
-                )
-        return Terms()
+    def _centre_step(self, own: Own, V_error: float, T: float) -> SetPoints:
+        f_before, V_before = self._errors
+        omega_before, E_before = self._omega - self.k_p * f_before, self._E + self.k_pE * V_before
+        more_omega, more_E = -self.k_i * T * own.e, self.k_iE * T * V_error
+        self._omega += more_omega
+        self._E += more_E
+        self._errors = own.e, V_error
+        omega, E = self._omega - self.k_p * own.e, self._E + self.k_pE * V_error
+        terms = partial(_terms_of_centre, own, (omega_before, more_omega, omega), (E_before, more_E, E))
+        return SetPoints(omega / own.m_p, 1.0 + E, {"omega": omega, "E": E}, True, terms)
 
     def _mean_error(self, own: Own, neighbours: Sequence[Neighbour]) -> float:
         """Return the error of the mean of the voltages that the centre knows (pu)."""
         voltages = [own.V, *(other.shared["V"] for other in neighbours if "V" in other.shared)]
         return 1.0 - sum(voltages) / len(voltages)
+
+
+def _terms_of_correction(own: Own, P_set: float, V_set: float, centre: str) -> Terms:
+    name = "correction of the centre"
+    return Terms((Term(name, P_set - own.P_set, centre),), (Term(name, V_set - own.V_set, centre),))
+
+
+def _terms_of_centre(own: Own, of_omega: tuple[float, float, float], of_E: tuple[float, float, float]) -> Terms:
+    """Return the terms of a step from each correction before, the change of its integral, and the correction after."""
+    (omega_before, more_omega, omega), (E_before, more_E, E) = of_omega, of_E
+    beyond = "integral beyond the limit"  # 0 but after a limit: the integrals go on, while the set-points stay
+    return Terms(
+        (
+            Term("integral of frequency error", more_omega / own.m_p),
+            Term("change of frequency error", (omega - omega_before - more_omega) / own.m_p),
+            Term(beyond, omega_before / own.m_p - own.P_set),
+        ),
+        (
+            Term("integral of voltage error", more_E),
+            Term("change of voltage error", E - E_before - more_E),
+            Term(beyond, 1.0 + E_before - own.V_set),
+        ),
+    )

@@ -23,18 +23,19 @@ and its stability.
     V_{set} &\leftarrow V_{set} - F \big[ \beta d (z - \bar z) + g \alpha (v - 1) \big], \quad
         F = (1 - e^{-\lambda T/k_q}) / \lambda, \quad \lambda = \max(g \alpha, 2 \beta d)
 
-**Limits.** P_set and V_set are clamped (anti-windup). The paper has no limits and accepts wind-up (its Remark 2).
+**Limits.** The agent limits P_set and V_set (anti-windup). The paper has no limits and accepts wind-up (its Remark 2).
 `gridpeers.agents.degraded_communication` has these and other options, and other weights c_ij than 1.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from math import exp, inf
 from typing import Annotated, Any
 
 from gridpeers.agents.agent_config import Gains
-from gridpeers.agents.laws.law import Law, Neighbour, Own, SetPoints, Term, Terms
+from gridpeers.agents.laws.law import NOTHING_SHARED, Law, Neighbour, Own, SetPoints, Term, Terms
 from gridpeers.wire.schema.table_schema import Range, Unit
 
 
@@ -46,29 +47,16 @@ def towards(rate: float, d: float, T: float) -> float:
     return 0.5 * (1.0 - exp(-2.0 * rate * d * T))
 
 
-def P_set_step(
-    P_set: float,
-    y_bar: float,
-    d: float,
-    e: float,
-    *,
-    leader: bool,
-    m_p: float,
-    gains: Gains,
-    T: float,
-    kappa_c: float | None = None,
-) -> float:
-    """Return P_set (pu of own rating) after one control period T (s), (12) for a follower, (13) for a leader.
+def P_change(
+    y: float, y_bar: float, d: float, e: float, leader: bool, kappa: float, kappa_c: float, T: float
+) -> tuple[float, float]:
+    """Return both terms of the change of y = m_p P_set (pu) in a period T (s), (12) for a follower, (13) for a leader.
 
-    `y_bar` is the weighted mean of the neighbours' m_p P_set (pu), without effect when `d`, the sum of c_ij, is 0; `e`
-    is the own frequency error (pu), and `kappa_c` the gain of each unit of c_ij (1/s), by default kappa = m_p/k_p.
+    The first is that of the neighbours, whose mean y with the weights c_ij is `y_bar`; it is linear in `y_bar`, and 0
+    when `d`, the sum of c_ij, is 0. The second is that of the own frequency error `e` (pu). `kappa_c` is the gain of
+    each unit of c_ij (1/s): that of the paper is kappa = m_p/k_p.
     """
-    kappa = m_p / gains.k_p
-    y = m_p * P_set
-    change = towards(kappa if kappa_c is None else kappa_c, d, T) * (y_bar - y)
-    if leader:
-        change -= (1.0 - exp(-kappa * T)) * e
-    return min(max(P_set + change / m_p, gains.P_set_min), gains.P_set_max)
+    return towards(kappa_c, d, T) * (y_bar - y), -(1.0 - exp(-kappa * T)) * e if leader else 0.0
 
 
 def alpha_in_force(gains: Gains, v: float) -> float:
@@ -105,20 +93,15 @@ def V_factors(alpha: float, beta: float, d: float, *, k_q: float, T: float) -> t
     return a, a * alpha / vars_ if vars_ > 0.0 else 0.0
 
 
-def V_set_step(
-    V_set: float, z: float, z_bar: float, d: float, v: float, *, leader: bool, gains: Gains, T: float
-) -> float:
-    """Return V_set (pu of nominal) after one control period T (s), (14) for a follower, (15) for a leader.
+def V_change(z: float, z_bar: float, d: float, v: float, leader: bool, gains: Gains, T: float) -> tuple[float, float]:
+    """Return both terms of the change of V_set (pu) in a period T (s), (14) for a follower, (15) for a leader.
 
-    `z` is the own m_q q (pu), `z_bar` the weighted mean of the neighbours', without effect when `d`, the sum of c_ij,
-    is 0; `v` is the own terminal voltage (pu).
+    The first is that of the neighbours, whose mean z = m_q q (pu) is `z_bar`; it is linear in `z_bar`, and 0 when `d`,
+    the sum of c_ij, is 0. The second is that of the own terminal voltage `v` (pu).
     """
     alpha, beta = (alpha_in_force(gains, v), gains.beta_GFM) if leader else (0.0, gains.beta_GFL)
     a, b = V_factors(alpha, beta, d, k_q=gains.k_q, T=T)
-    change = -a * (z - z_bar)
-    if leader:
-        change -= b * (v - 1.0)
-    return min(max(V_set + change, gains.V_set_min), gains.V_set_max)
+    return -a * (z - z_bar), -b * (v - 1.0)
 
 
 class Consensus(Law):
@@ -150,56 +133,52 @@ class Consensus(Law):
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
         """Decide the set-points of one control period, (12) and (14) for a follower, (13) and (15) for a leader."""
         y_bar, z_bar, d = self._means(neighbours)
+        P_sharing, P_error = self._P_change(own, y_bar, d, T)
+        V_sharing, V_error = self._V_change(own, z_bar, d, T)
+        V_change = V_sharing + V_error
         # A saturated leader that cannot reduce the frequency error acts as a follower: it does not integrate it.
-        leader = own.leader and -own.e * own.P_saturated <= 0.0
-        P_set = P_set_step(
-            own.P_set,
-            y_bar,
-            d,
-            own.e,
-            leader=leader,
-            m_p=own.m_p,
-            gains=self._gains,
-            T=T,
-            kappa_c=self.kappa_c or None,
+        P_held, V_held = own.e * own.P_saturated < 0.0, V_change * own.V_saturated > 0.0
+        return SetPoints(
+            own.P_set + (P_sharing if P_held else P_sharing + P_error) / own.m_p,
+            own.V_set if V_held else own.V_set + V_change,
+            NOTHING_SHARED,
+            True,
+            partial(self._terms, own, neighbours, d, T, (P_held, V_held)),
         )
-        V_set = V_set_step(own.V_set, own.z, z_bar, d, own.V, leader=own.leader, gains=self._gains, T=T)
-        if (V_set - own.V_set) * own.V_saturated > 0.0:
-            V_set = own.V_set
-        return SetPoints(P_set, V_set)
 
-    def terms(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> Terms:
-        """Return the terms of (12) to (15): each neighbour's, the own errors', and what anti-windup takes back."""
-        gains, m_p = self._gains, own.m_p
-        _, _, d = self._means(neighbours)
-        weights = sum(other.weight for other in neighbours)
-        kappa, y = m_p / gains.k_p, m_p * own.P_set
-        share = towards(self.kappa_c or kappa, d, T) / (m_p * weights) if weights else 0.0
-        P = [Term("power sharing", share * n.weight * (n.m_p * n.P_set - y), n.name) for n in neighbours]
+    def _P_change(self, own: Own, y_bar: float, d: float, T: float) -> tuple[float, float]:
+        kappa = own.m_p / self.k_p
+        return P_change(own.m_p * own.P_set, y_bar, d, own.e, own.leader, kappa, self.kappa_c or kappa, T)
+
+    def _V_change(self, own: Own, z_bar: float, d: float, T: float) -> tuple[float, float]:
+        return V_change(own.z, z_bar, d, own.V, own.leader, self._gains, T)
+
+    def _terms(self, own: Own, neighbours: Sequence[Neighbour], d: float, T: float, held: tuple[bool, bool]) -> Terms:
+        """Split the changes of a step: each neighbour's in place of their mean, and what anti-windup takes back."""
+        weights = sum(n.weight for n in neighbours) or 1.0
+        m_p, (_, P_error), (_, V_error) = own.m_p, self._P_change(own, 0.0, d, T), self._V_change(own, 0.0, d, T)
+        P, V = [], []
+        for n in neighbours:
+            share = n.weight / weights
+            P.append(Term("power sharing", share * self._P_change(own, n.m_p * n.P_set, d, T)[0] / m_p, n.name))
+            V.append(Term("var sharing", share * self._V_change(own, n.m_q * n.Q, d, T)[0], n.name))
         if own.leader:
-            error = Term("frequency error", -(1.0 - exp(-kappa * T)) * own.e / m_p)
-            P.append(error)
-            if own.e * own.P_saturated < 0.0:
-                P.append(Term("anti-windup", -error.value))
-        alpha, beta = (alpha_in_force(gains, own.V), gains.beta_GFM) if own.leader else (0.0, gains.beta_GFL)
-        a, b = V_factors(alpha, beta, d, k_q=gains.k_q, T=T)
-        share = a / weights if weights else 0.0
-        V = [Term("var sharing", -share * n.weight * (own.z - n.m_q * n.Q), n.name) for n in neighbours]
-        if own.leader:
-            V.append(Term("voltage error", -b * (own.V - 1.0)))
-        change = sum(term.value for term in V)
-        limited = min(max(own.V_set + change, gains.V_set_min), gains.V_set_max)
-        if (limited - own.V_set) * own.V_saturated > 0.0:
-            V.append(Term("anti-windup", -change))
-        return Terms(tuple(P), tuple(V))
+            P.append(Term("frequency error", P_error / m_p))
+            V.append(Term("voltage error", V_error))
+        if held[0] and own.leader:
+            P.append(Term("anti-windup", -P_error / m_p))
+        if held[1]:
+            V.append(Term("anti-windup", -sum(term.value for term in V)))
+        return Terms(P, V)
 
     def _means(self, neighbours: Sequence[Neighbour]) -> tuple[float, float, float]:
         """Return the neighbours' mean m_p P_set and m_q q (pu), and the sum d of their weights c_ij."""
         y = z = d = 0.0
         for other in neighbours:
-            y += other.weight * other.m_p * other.P_set
-            z += other.weight * other.m_q * other.Q
-            d += other.weight
+            weight = other.weight
+            y += weight * other.m_p * other.P_set
+            z += weight * other.m_q * other.Q
+            d += weight
         if d == 0.0:
             return 0.0, 0.0, 0.0
         return y / d, z / d, d / len(neighbours) if self.kappa_c else d

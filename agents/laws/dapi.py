@@ -22,9 +22,10 @@ between lies a compromise (2015).
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Annotated
 
-from gridpeers.agents.laws.law import Law, Neighbour, Own, SetPoints, Term, Terms
+from gridpeers.agents.laws.law import NOTHING_SHARED, Law, Neighbour, Own, SetPoints, Term, Terms
 from gridpeers.wire.schema.table_schema import Range, Unit
 
 
@@ -40,27 +41,25 @@ class Dapi(Law):
     b: Annotated[float, Range(0, 1e3), "Weight of each neighbour's vars; 0 regulates voltage exactly."] = 1.0
 
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
-        omega, weight = own.m_p * own.P_set, sum(other.weight for other in neighbours)
-        apart = sum(other.weight * (omega - other.m_p * other.P_set) for other in neighbours)
-        unequal = sum(other.weight * (own.z - other.m_q * other.Q) for other in neighbours)
-        omega -= T / self.k * own.e + _step(T * self.a / self.k, weight) * apart
-        e = own.V_set - 1.0
-        e -= T * self.beta / self.kappa * (own.V - 1.0) + _step(T * self.b / self.kappa, weight) * unequal
-        return SetPoints(omega / own.m_p, 1.0 + e)
+        omega, z, weight = own.m_p * own.P_set, own.z, sum([other.weight for other in neighbours])
+        apart = [other.weight * (omega - other.m_p * other.P_set) for other in neighbours]
+        unequal = [other.weight * (z - other.m_q * other.Q) for other in neighbours]
+        averaging, sharing = _step(T * self.a / self.k, weight), _step(T * self.b / self.kappa, weight)
+        f_error, V_error = T / self.k * own.e, T * self.beta / self.kappa * (own.V - 1.0)
+        omega -= f_error + averaging * sum(apart)
+        e = own.V_set - 1.0 - (V_error + sharing * sum(unequal))
+        of_P, of_V = (averaging / own.m_p, apart, f_error / own.m_p), (sharing, unequal, V_error)
+        return SetPoints(omega / own.m_p, 1.0 + e, NOTHING_SHARED, True, partial(_terms, neighbours, of_P, of_V))
 
-    def terms(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> Terms:
-        omega, weight = own.m_p * own.P_set, sum(other.weight for other in neighbours)
-        P, V = _step(T * self.a / self.k, weight) / own.m_p, _step(T * self.b / self.kappa, weight)
-        return Terms(
-            (
-                *(Term("averaging", -P * n.weight * (omega - n.m_p * n.P_set), n.name) for n in neighbours),
-                Term("frequency error", -T / self.k * own.e / own.m_p),
-            ),
-            (
-                *(Term("var sharing", -V * n.weight * (own.z - n.m_q * n.Q), n.name) for n in neighbours),
-                Term("voltage error", -T * self.beta / self.kappa * (own.V - 1.0)),
-            ),
-        )
+
+_Sums = tuple[float, list[float], float]  # Step of a sum over neighbours, its summands, and the own error
+
+
+def _terms(neighbours: Sequence[Neighbour], of_P: _Sums, of_V: _Sums) -> Terms:
+    (step_P, apart, f_error), (step_V, unequal, V_error) = of_P, of_V
+    P = [Term("averaging", -step_P * d, n.name) for d, n in zip(apart, neighbours, strict=True)]
+    V = [Term("var sharing", -step_V * d, n.name) for d, n in zip(unequal, neighbours, strict=True)]
+    return Terms((*P, Term("frequency error", -f_error)), (*V, Term("voltage error", -V_error)))
 
 
 def _step(gain: float, weight: float) -> float:

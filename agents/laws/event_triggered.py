@@ -49,7 +49,8 @@ class EventTriggered(Consensus):
         """Decide from the last broadcast values, the own ones included, and whether to broadcast new ones."""
         P_hat, z_hat = self._last_broadcast or (own.P_set, own.z)
         seen = super().step(own._replace(P_set=P_hat, z=z_hat), neighbours, T)
-        P_set = min(max(own.P_set + (seen.P_set - P_hat), self.P_set_min), self.P_set_max)
+        P_seen = self._limited(seen.P_set)
+        P_set = self._limited(own.P_set + (P_seen - P_hat))
         wrong = abs(P_hat - P_set) * own.m_p
         send = (
             self._last_broadcast is None
@@ -58,12 +59,14 @@ class EventTriggered(Consensus):
         )
         if send:
             self._last_broadcast = P_set, own.z
-        return SetPoints(P_set, seen.V_set, send=send)
+        return SetPoints(P_set, seen.V_set, send=send, terms=lambda: self._terms_of(seen, P_seen - seen.P_set))
 
-    def terms(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> Terms:
-        P_hat, z_hat = self._last_broadcast or (own.P_set, own.z)
-        P, V = super().terms(own._replace(P_set=P_hat, z=z_hat), neighbours, T)
-        seen = P_hat + sum(term.value for term in P)
-        if not self.P_set_min <= seen <= self.P_set_max:
-            P = (*P, Term("limit of the last broadcast", min(max(seen, self.P_set_min), self.P_set_max) - seen))
-        return Terms(P, V)
+    @staticmethod
+    def _terms_of(seen: SetPoints, beyond: float) -> Terms:
+        """Return the terms of the step from the last broadcasts, and what the limits took there."""
+        assert seen.terms is not None
+        P, V, *_ = seen.terms()
+        return Terms((*P, Term("limit of the last broadcast", beyond)) if beyond else P, V)
+
+    def _limited(self, P_set: float) -> float:
+        return min(max(P_set, self.P_set_min), self.P_set_max)

@@ -23,10 +23,11 @@ With V = 1/2 sum_i (x_i - mean)^2 and unit weights, V' = -c/2 sum_ij |x_j - x_i|
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from math import copysign
 from typing import Annotated
 
-from gridpeers.agents.laws.law import Law, Neighbour, Own, SetPoints, Term, Terms
+from gridpeers.agents.laws.law import NOTHING_SHARED, Law, Neighbour, Own, SetPoints, Term, Terms
 from gridpeers.wire.schema.table_schema import Range, Unit
 
 
@@ -41,29 +42,27 @@ class FiniteTime(Law):
     alpha: Annotated[float, Range(0, 1e3), "Weight of a leader's voltage error beside that of one neighbour."] = 1.0
 
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
-        P_moves, V_moves = self._moves(own, neighbours, T)
-        change, V_change = sum(P_moves), sum(V_moves)
-        if own.leader:
-            change += self._move(-own.e, T * self.c_P, 1.0)
-            V_change += self._move(1.0 - own.V, T * self.c_V * self.alpha, 0.5)
-        return SetPoints((own.m_p * own.P_set + change) / own.m_p, own.V_set + V_change)
-
-    def terms(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> Terms:
-        P_moves, V_moves = self._moves(own, neighbours, T)
-        P = [Term("consensus", move / own.m_p, n.name) for move, n in zip(P_moves, neighbours, strict=True)]
-        V = [Term("var sharing", move, n.name) for move, n in zip(V_moves, neighbours, strict=True)]
-        if own.leader:
-            P.append(Term("frequency error", self._move(-own.e, T * self.c_P, 1.0) / own.m_p))
-            V.append(Term("voltage error", self._move(1.0 - own.V, T * self.c_V * self.alpha, 0.5)))
-        return Terms(tuple(P), tuple(V))
-
-    def _moves(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> tuple[list[float], list[float]]:
-        """Return the moves of m_p P_set and of V_set towards each neighbour (pu)."""
         y, most = own.m_p * own.P_set, 0.5 / max(1, len(neighbours))
         P = [n.weight * self._move(n.m_p * n.P_set - y, T * self.c_P, most) for n in neighbours]
-        return P, [n.weight * self._move(n.m_q * n.Q - own.z, T * self.c_V, most) for n in neighbours]
+        V = [n.weight * self._move(n.m_q * n.Q - own.z, T * self.c_V, most) for n in neighbours]
+        f_error = self._move(-own.e, T * self.c_P, 1.0) if own.leader else 0.0
+        V_error = self._move(1.0 - own.V, T * self.c_V * self.alpha, 0.5) if own.leader else 0.0
+
+        P_set, V_set = (y + (sum(P) + f_error)) / own.m_p, own.V_set + (sum(V) + V_error)
+        return SetPoints(P_set, V_set, NOTHING_SHARED, True, partial(_terms, own, neighbours, P, V, (f_error, V_error)))
 
     def _move(self, difference: float, gain: float, most: float) -> float:
         """Return gain sig(difference)^gamma, at most a part of the difference."""
         size = abs(difference)
         return copysign(min(gain * size**self.gamma, most * size), difference)
+
+
+def _terms(
+    own: Own, neighbours: Sequence[Neighbour], P: list[float], V: list[float], errors: tuple[float, float]
+) -> Terms:
+    of_P = [Term("consensus", move / own.m_p, n.name) for move, n in zip(P, neighbours, strict=True)]
+    of_V = [Term("var sharing", move, n.name) for move, n in zip(V, neighbours, strict=True)]
+    if own.leader:
+        of_P.append(Term("frequency error", errors[0] / own.m_p))
+        of_V.append(Term("voltage error", errors[1]))
+    return Terms(of_P, of_V)

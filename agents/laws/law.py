@@ -1,8 +1,8 @@
 """The contract of a control law: one object per inverter, called once a control period, in per unit. Pure.
 
 A law sees its own inverter (`Own`) and its neighbours' last states (`Neighbour`), and returns the set-points of the
-next period (`SetPoints`). Its only memory is its own attributes. It uses no clock, file, randomness or network: the
-same calls give the same results in one process and in many.
+next period (`SetPoints`), or the terms of their change (`Terms`). Its only memory is its own attributes. It uses no
+clock, file, randomness or network: the same calls give the same results in one process and in many.
 
 The agent of a law decides when to call it: not while the inverter is grid-connected or out of service,
 nor without a fresh measurement. After such a pause it calls `start` first.
@@ -10,7 +10,7 @@ nor without a fresh measurement. After such a pause it calls `start` first.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, NamedTuple
 
@@ -87,17 +87,6 @@ class Neighbour(NamedTuple):
     """Further values that its law shares."""
 
 
-class SetPoints(NamedTuple):
-    P_set: float
-    """Set-point of real power (pu of own rating); the agent limits it to P_set_min, P_set_max."""
-    V_set: float
-    """Set-point of voltage (pu of own nominal); the agent limits it to V_set_min, V_set_max."""
-    shared: Mapping[str, float] = NOTHING_SHARED
-    """Further values for the neighbours, at most 16, each by a name of letters, digits and "_"."""
-    send: bool = True
-    """Whether the neighbours get the state. If not, they keep the last one that they heard."""
-
-
 class Term(NamedTuple):
     name: str
     """A word or two, such as "frequency error"."""
@@ -108,12 +97,29 @@ class Term(NamedTuple):
 
 
 class Terms(NamedTuple):
-    """The terms of one step of a law, before its limits: each tuple adds up to the change of a set-point."""
+    """A decision in terms, before its limits: each tuple adds up to the change of a set-point."""
 
-    P_set: tuple[Term, ...] = ()
+    P_set: Sequence[Term] = ()
     """Terms of the change of P_set (pu of own rating)."""
-    V_set: tuple[Term, ...] = ()
+    V_set: Sequence[Term] = ()
     """Terms of the change of V_set (pu of own nominal)."""
+    shared: Mapping[str, float] = NOTHING_SHARED
+    """As in `SetPoints`."""
+    send: bool = True
+    """As in `SetPoints`."""
+
+
+class SetPoints(NamedTuple):
+    P_set: float
+    """Set-point of real power (pu of own rating); the agent limits it to P_set_min, P_set_max."""
+    V_set: float
+    """Set-point of voltage (pu of own nominal); the agent limits it to V_set_min, V_set_max."""
+    shared: Mapping[str, float] = NOTHING_SHARED
+    """Further values for the neighbours, at most 16, each by a name of letters, digits and "_"."""
+    send: bool = True
+    """Whether the neighbours get the state. If not, they keep the last one that they heard."""
+    terms: Callable[[], Terms] | None = None
+    """Splits this change into its terms, for a law too fast to do so in each period; only `gridpeers why` calls it."""
 
 
 class Law:
@@ -141,20 +147,13 @@ class Law:
     def start(self, own: Own) -> None:
         """Start, or restart, from the set-points that the plant holds, and clear the law's memory."""
 
-    def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
-        """Decide the set-points of one control period T (s).
+    def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints | Terms:
+        """Decide the set-points of one control period T (s), as such or as the terms of their change.
 
-        The neighbours are those whose states count, in the order of the inverters.
+        The neighbours are those whose states count, in the order of the inverters. An agent adds up the terms, and
+        `gridpeers why` shows them; a decision without terms is one term.
         """
         raise NotImplementedError
-
-    def terms(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> Terms | None:
-        """Return the terms of the step that `step` would make now, without making it; None if the law names none.
-
-        `gridpeers why` shows them. They add up to the change before P_set_min, P_set_max, V_set_min and V_set_max act;
-        these are told by themselves. No run calls this.
-        """
-        return None
 
     def close(self) -> None:
         """Release whatever the law has opened."""

@@ -69,23 +69,17 @@ class Resilient(Consensus):
 
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
         believed, self._memory = self._believed(own, neighbours, T)
-        of_P, of_V = self._values(own)
-        P_set = super().step(own, self._trimmed(believed, *of_P), T).P_set
-        return SetPoints(P_set, super().step(own, self._trimmed(believed, *of_V), T).V_set)
+        of_P, of_V = (self._trimmed(believed, *of) for of in self._values(own))
+        P, V = super().step(own, of_P, T), super().step(own, of_V, T)
 
-    def terms(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> Terms:
-        """Return the paper's terms of the neighbours that remain; those left out have a term of 0 that says why."""
-        believed, _ = self._believed(own, neighbours, T)
-        distrusted = [n.name for n in neighbours if n.name not in {other.name for other in believed}]
-        both = []
-        for of in self._values(own):
-            rest = self._trimmed(believed, *of)
-            names = {other.name for other in rest}
-            zeros = [Term("trimmed", 0.0, other.name) for other in believed if other.name not in names]
-            zeros += [Term("implausible", 0.0, name) for name in distrusted]
-            both.append((super().terms(own, rest, T), zeros))
-        (P, no_P), (V, no_V) = both
-        return Terms((*P.P_set, *no_P), (*V.V_set, *no_V))
+        def terms() -> Terms:
+            """Return the paper's terms of those that remain, and for those left out a term of 0 with the reason."""
+            assert P.terms is not None
+            assert V.terms is not None
+            why_P, why_V = (_left_out(neighbours, believed, rest) for rest in (of_P, of_V))
+            return Terms((*P.terms().P_set, *why_P), (*V.terms().V_set, *why_V))
+
+        return SetPoints(P.P_set, V.V_set, terms=terms)
 
     @staticmethod
     def _values(own: Own) -> tuple[tuple[float, Callable[[Neighbour], float]], ...]:
@@ -140,3 +134,10 @@ class Resilient(Consensus):
         low, high = self.P_set_min - self.tolerance, self.P_set_max + self.tolerance
         P = n.P_set - own.e / n.m_p
         return low <= n.P_set <= high and low <= P <= high and abs(n.Q) <= 1.0 + self.tolerance
+
+
+def _left_out(neighbours: Sequence[Neighbour], believed: Sequence[Neighbour], rest: Sequence[Neighbour]) -> list[Term]:
+    """Return a term of 0 for each neighbour that does not count, by the reason."""
+    plausible, counts = {n.name for n in believed}, {n.name for n in rest}
+    trimmed = [Term("trimmed", 0.0, n.name) for n in believed if n.name not in counts]
+    return trimmed + [Term("implausible", 0.0, n.name) for n in neighbours if n.name not in plausible]

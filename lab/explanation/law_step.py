@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from math import isfinite
 
 from gridpeers.agents.carriers.law_registry import make_law
-from gridpeers.agents.laws.law import Law, SetPoints, Term, Terms
+from gridpeers.agents.carriers.time_limit import limited
+from gridpeers.agents.laws.law import Law, Own, SetPoints, Term, Terms
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.record.recorded_decision import RecordedDecision, limits_of
 from gridpeers.wire.plugins.registry import ANYTHING, named
@@ -66,8 +67,7 @@ def law_step(record: RunRecord, decision: RecordedDecision) -> LawStep | None:
                 law.start(decisions[0].own)
                 for each in decisions[:-1]:
                     law.step(each.own, each.neighbours_used, each.T)
-                inputs = decision.own, decision.neighbours_used, decision.T
-                step = _parts(decision, law.terms(*inputs), result=law.step(*inputs))
+                step = _parts(decision, law.step(decision.own, decision.neighbours_used, decision.T))
             except ANYTHING as error:  # the law, and its answer, is anybody's code
                 problem = f"computed again, the law raised {named(error)}"
                 continue
@@ -91,20 +91,16 @@ def _since_start(record: RunRecord, decision: RecordedDecision) -> tuple[Recorde
         back *= 4.0
 
 
-def _parts(
-    decision: RecordedDecision, terms: Terms | None, problem: str = "", result: SetPoints | None = None
-) -> LawStep:
-    """Return the parts of a step: the terms, and the change by the limits of their sum.
+def _parts(decision: RecordedDecision, result: SetPoints | Terms | None, problem: str = "") -> LawStep:
+    """Return the parts of a step: the terms of a `result`, and the change by the limits of their sum.
 
-    Without terms it is one term: the step of a `result`, or the recorded one.
+    Without terms it is one term: the step of the result, or the recorded one.
     """
     own, config = decision.own, decision.config
     after = SetPoints(decision.after[0] / config.P_rated, decision.after[1] / config.V_nom)
-    if terms is None:
-        end = result or after
-        terms = Terms((Term("step", end.P_set - own.P_set),), (Term("step", end.V_set - own.V_set),))
+    terms = _terms_of(result or after, own, config.control.law.time_limit)
     limits, parts = limits_of(config.control), {}
-    for name, of in zip(("P_set", "V_set"), terms, strict=True):
+    for name, of in (("P_set", terms.P_set), ("V_set", terms.V_set)):
         if wrong := [term.value for term in of if not isfinite(term.value)]:
             raise ValueError(f"a term is {wrong[0]}; it must be a finite number (pu)")
         low, high, before = limits[f"{name}_min"], limits[f"{name}_max"], getattr(own, name)
@@ -118,3 +114,12 @@ def _parts(
             high=high,
         )
     return LawStep(**parts, problem=problem)
+
+
+def _terms_of(result: SetPoints | Terms, own: Own, time_limit: float) -> Terms:
+    if isinstance(result, Terms):
+        return result
+    if result.terms is None:
+        return Terms((Term("step", result.P_set - own.P_set),), (Term("step", result.V_set - own.V_set),))
+    with limited("its terms", time_limit, f"time_limit_s = {time_limit:g} s"):  # a law's own function
+        return result.terms()

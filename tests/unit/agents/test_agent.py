@@ -8,10 +8,10 @@ from msgspec.structs import replace
 
 from gridpeers.agents.agent import Agent
 from gridpeers.agents.agent_config import Control, DegradedCommunication
-from gridpeers.agents.laws.consensus import P_set_step, V_set_step
 from gridpeers.agents.laws.law import Law, Neighbour, Own, SetPoints
 from gridpeers.wire.messages import OFF, Measurement, Nameplate, State
 from tests.toy.toy_configs import ALL_FULL, agent_config
+from tests.unit.agents.law_steps import P_set_step, V_set_step
 
 ROSTER = ("inv1", "inv2", "inv3")
 

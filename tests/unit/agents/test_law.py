@@ -11,8 +11,11 @@ from numpy.typing import NDArray
 
 from gridpeers.agents.agent_config import DegradedCommunication, Gains
 from gridpeers.agents.degraded_communication import gains_in_force
-from gridpeers.agents.laws.consensus import Consensus, P_set_step, V_set_step, alpha_in_force, towards
+from gridpeers.agents.laws.call import decide
+from gridpeers.agents.laws.consensus import Consensus, alpha_in_force, towards
+from gridpeers.agents.laws.law import Neighbour, Own
 from gridpeers.wire.schema.table_schema import fields_of
+from tests.unit.agents.law_steps import P_set_step, V_set_step
 
 Matrix = NDArray[np.float64]
 
@@ -298,13 +301,14 @@ def test_many_neighbours_do_not_slow_the_frequency_down() -> None:
 @given(st.floats(-10.0, 10.0), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.booleans())
 def test_set_points_stay_within_their_limits(P_set: float, y_bar: float, e: float, leader: bool) -> None:
     """P_set and V_set do not wind up, for any inputs."""
-    gains = Gains(P_set_min=0.1, P_set_max=0.9, V_set_min=0.95, V_set_max=1.05)
+    law = Consensus(P_set_min=0.1, P_set_max=0.9, V_set_min=0.95, V_set_max=1.05)
+    own = Own("inv1", leader, 1.0, 0.5, 0.0, 1.0 + e, e, 0.0, P_set, P_set, 0.01, 0.05, 6e5, 277.0, 60.0)
+    other = Neighbour("inv2", False, 0.02, 1.0, y_bar / 0.01, 1.0, e, 0.01, 0.05, 3e5)
 
-    P = P_set_step(P_set, y_bar, 3.0, e, leader=leader, m_p=0.01, gains=gains, T=0.02)
-    V = V_set_step(P_set, y_bar, e, 3.0, 1.0 + e, leader=leader, gains=gains, T=0.02)
+    decided = decide(law, own, (other,), 0.02)
 
-    assert 0.1 <= P <= 0.9
-    assert 0.95 <= V <= 1.05
+    assert 0.1 <= decided.P_set <= 0.9
+    assert 0.95 <= decided.V_set <= 1.05
 
 
 def test_the_papers_law_has_the_parameters_and_defaults_of_its_table() -> None:

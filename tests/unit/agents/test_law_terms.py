@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from copy import deepcopy
+from collections.abc import Sequence
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gridpeers.agents.carriers.law_registry import LAWS
-from gridpeers.agents.laws.call import decide
-from gridpeers.agents.laws.law import Neighbour, Own
+from gridpeers.agents.laws.call import LawError, decide
+from gridpeers.agents.laws.law import Law, Neighbour, Own, SetPoints, Term, Terms
 
 NAMES = ("consensus", "dapi", "event-triggered", "finite-time", "centralised", "resilient")
 
@@ -67,11 +67,9 @@ def test_terms_and_limits_add_up_to_the_step(name: str, data: st.DataObject) -> 
     P_set, V_set = steps[0][0].P_set, steps[0][0].V_set
     for own, others, T in steps:
         own = own._replace(P_set=P_set, V_set=V_set)
-        memory = deepcopy(vars(law))
-        terms = law.terms(own, others, T)
-        assert terms is not None
-        assert vars(law) == memory
         result = decide(law, own, others, T)
+        assert result.terms is not None
+        terms = result.terms()
         P = P_set + sum(term.value for term in terms.P_set)
         V = V_set + sum(term.value for term in terms.V_set)
         assert min(max(P, law.P_set_min), law.P_set_max) == pytest.approx(result.P_set, rel=0.0, abs=1e-12)
@@ -85,10 +83,40 @@ def test_the_paper_s_terms() -> None:
     own = Own("inv1", True, 1.0, 0.5, 0.0, 1.0, -0.001, 0.0, 0.5, 1.0, 0.01, 0.05, 6e5, 277.0, 60.0)
     other = Neighbour("inv2", False, 0.02, 1.0, 0.7, 1.0, 0.0, 0.01, 0.05, 3e5)
 
-    terms = LAWS.resolve("consensus", "")().terms(own, (other,), 0.02)
+    decided = LAWS.resolve("consensus", "")().step(own, (other,), 0.02)
 
-    assert terms is not None
-    sharing, error = terms.P_set
+    assert isinstance(decided, SetPoints)
+    assert decided.terms is not None
+    sharing, error = decided.terms().P_set
     assert (sharing.name, sharing.neighbour, error.name) == ("power sharing", "inv2", "frequency error")
     assert sharing.value == pytest.approx(0.5 * (1 - 2.718281828459045 ** (-2 * 0.01 / 0.0007 * 0.02)) * 0.2)
     assert error.value == pytest.approx((1 - 2.718281828459045 ** (-0.01 / 0.0007 * 0.02)) * 0.1)
+
+
+class Summed(Law):
+    """A law that states its step as terms."""
+
+    def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> Terms:
+        return Terms((Term("a", 0.1), Term("b", 0.2, "inv2")), (Term("c", 1),), {"x": 2.0}, send=False)
+
+
+def test_terms_alone_are_a_step() -> None:
+    """The agent adds them up to the set-points before, and limits the sums; so they cannot differ from the step."""
+    own = Own("inv1", True, 1.0, 0.5, 0.0, 1.0, 0.0, 0.0, 0.5, 1.0, 0.01, 0.05, 6e5, 277.0, 60.0)
+
+    decided = decide(Summed(), own, (), 0.02)
+
+    assert decided[:4] == (0.5 + (0.1 + 0.2), 1.1, {"x": 2.0}, False)
+    assert decided.terms is not None
+    assert decided.terms() == Summed().step(own, (), 0.02)
+
+
+def test_a_term_that_is_no_number_is_named() -> None:
+    class Wrong(Summed):
+        def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> Terms:
+            return Terms((Term("pull", float("nan")),))
+
+    own = Own("inv1", True, 1.0, 0.5, 0.0, 1.0, 0.0, 0.0, 0.5, 1.0, 0.01, 0.05, 6e5, 277.0, 60.0)
+
+    with pytest.raises(LawError, match="step at t = 1 s returned term 'pull' = nan; it must be a finite number"):
+        decide(Wrong(), own, (), 0.02)

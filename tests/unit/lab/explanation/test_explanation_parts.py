@@ -134,12 +134,8 @@ class Wrong(Law):
     """A law whose terms are not numbers."""
 
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
-        """Stay."""
-        return SetPoints(own.P_set, own.V_set)
-
-    def terms(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> Terms:
-        """Name what is no number."""
-        return Terms((Term("x", float("nan")),), ())
+        """Stay, by what is no number."""
+        return SetPoints(own.P_set, own.V_set, terms=lambda: Terms((Term("x", float("nan")),), ()))
 
 
 def of_law(law: Law, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from gridpeers.agents.agent_config import Gains
-from gridpeers.agents.laws.consensus import P_set_step
 from gridpeers.lab.predict.inverter_group import InverterGroup
 from gridpeers.lab.predict.linear_model import Loop, Ticks, delay_limit, first_crossing
 from gridpeers.scenarios.results.history import Floats
+from tests.unit.agents.law_steps import P_set_step
 from tests.unit.lab.predict.predicted_graphs import GRAPHS, inverters
 
 UNBOUNDED = Gains(P_set_min=-1e9, P_set_max=1e9)
