@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from gridpeers.plant.tables.read import DATA, feeders
 from gridpeers.scenarios.results.run_files import RUNS as RUNS
 from gridpeers.scenarios.results.run_files import FolderError as FolderError
 from gridpeers.scenarios.results.run_files import empty_folder
@@ -21,7 +20,6 @@ from gridpeers.scenarios.results.run_files import shown as shown
 from gridpeers.scenarios.results.run_files import write_whole as write_whole
 from gridpeers.scenarios.versions import versions as versions
 from gridpeers.wire.driver.ending import OutputLostError as OutputLostError
-from gridpeers.wire.wording import suggestion
 
 
 @contextmanager
@@ -49,14 +47,3 @@ def whole_folder(folder: Path) -> Iterator[None]:
         raise FolderError(refusal(folder, error)) from None
     finally:
         os.close(handle)
-
-
-def feeder_folder(name: str) -> Path:
-    """Return the folder with the tables of a feeder that comes with gridpeers, e.g. to copy and change them.
-
-    >>> (feeder_folder("microgrid123") / "inverters.csv").is_file()
-    True
-    """
-    if name not in feeders():
-        raise ValueError(f'there is no feeder "{name}"; {suggestion(name, feeders(), "feeders")}')
-    return DATA / name

@@ -1,8 +1,8 @@
-"""Figures of no single run: time to share power over random graphs, and MQSI with capacitors at other buses."""
+"""The figure of no single run: time to share power over random graphs."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import matplotlib as mpl
@@ -12,9 +12,6 @@ from matplotlib.figure import Figure
 
 import gridpeers as gp
 from gridpeers.papers.singhal2022.communication_claims import TREE, GraphRun, medians
-from gridpeers.papers.singhal2022.islanding_claims import CASES, EVENTS
-from gridpeers.papers.singhal2022.reproduce.studies import EventValues
-from gridpeers.papers.singhal2022.tables import MQSI_FACTOR, tables_of
 
 LEAST = 1e-6
 """MPSI below this is drawn as this: on an axis of logarithms there is no 0."""
@@ -61,41 +58,3 @@ def _times(panel: Axes, runs: Sequence[GraphRun], marks: dict[str, Any]) -> None
     panel.plot(never, [0.965] * len(never), transform=panel.get_xaxis_transform(), **marks)
     if never:
         panel.annotate("never", (0.005, 0.965), xycoords="axes fraction", va="center", fontsize=7, color="#444444")
-
-
-_COLOURS = ("#0072b2", "#56b4e9", "#009e73", "#e69f00")
-_MARKERS = "os^D"
-
-
-def var_sharing(ours: Mapping[str, EventValues]) -> Figure:
-    """Draw a mark for each variant of ours beside the paper's line, one panel for each event.
-
-    Marks and not bars: on an axis of logarithms, which MQSI needs, bars have no foot.
-    """
-    cells = [cell for table in tables_of("islanding") for cell in table.cells if cell.quantity == "MQSI"]
-    paper = {(cell.case, cell.event): cell.paper for cell in cells}
-    with mpl.rc_context(gp.figures.PAGE):
-        figure = Figure(figsize=(7.4, 3.6), layout="constrained")
-        (panels,) = figure.subplots(1, len(EVENTS), sharey=True, squeeze=False)
-        for panel, event in zip(panels, EVENTS, strict=True):
-            for x, case in enumerate(CASES):
-                number = paper[case, event]
-                ends = np.array([number / MQSI_FACTOR, number * MQSI_FACTOR])
-                panel.fill_between([x - 0.42, x + 0.42], *ends, color="#000000", alpha=0.10, lw=0)
-                panel.hlines(number, x - 0.42, x + 0.42, color="#000000", lw=1.6)
-            for number, (variant, values) in enumerate(ours.items()):
-                at = np.arange(len(CASES)) + (number - 0.5 * (len(ours) - 1)) * 0.18
-                heights = [values[case, event] for case in CASES]
-                marks = {"marker": _MARKERS[number % 4], "color": _COLOURS[number % 4]}
-                panel.plot(at, heights, lw=0, ms=6, mec="#ffffff", mew=0.5, label=variant, **marks)
-            panel.set_yscale("log")
-            panel.set_xticks(range(len(CASES)), [f"case {case}" for case in CASES])
-            panel.set_title(f"Var sharing after {event}", loc="left")
-            panel.yaxis.set_major_formatter("{x:g}")
-            panel.grid(visible=False, axis="x")
-        panels[0].set_ylabel("MQSI")
-        handles, labels = panels[0].get_legend_handles_labels()
-        band, line = panels[0].collections[:2]
-        labels = ["the paper", f"a factor of {MQSI_FACTOR:g} of it", *labels]
-        figure.legend([line, band, *handles], labels, loc="outside lower center", ncols=3)
-    return figure

@@ -14,10 +14,9 @@ import msgspec
 import gridpeers as gp
 from gridpeers import Findings, Verdict, judge
 from gridpeers.cli.progress import TellPart
-from gridpeers.papers.singhal2022.figures import topologies, var_sharing
-from gridpeers.papers.singhal2022.islanding_claims import CASES, EVENTS
+from gridpeers.papers.singhal2022.figures import topologies
 from gridpeers.papers.singhal2022.paper_benchmarks import CLAIMS
-from gridpeers.papers.singhal2022.reproduce.studies import BANKS, END_S, Tell, bank_study, graphs, topology_study
+from gridpeers.papers.singhal2022.reproduce.studies import END_S, Tell, graphs, topology_study
 from gridpeers.papers.singhal2022.tables import PaperTable, tables_of
 from gridpeers.theory import ScenarioModel
 
@@ -78,8 +77,8 @@ def chosen(only: str | None) -> tuple[Part, ...]:
     return tuple(part for part in PARTS if (part.tables if only == "tables" else part.name == only))
 
 
-_STUDIES = ("topology", "var-sharing")
-"""Parts that are many short runs of the islanding, without a folder for each."""
+TOPOLOGY = "topology"
+"""The part that is many short runs of the islanding, without a folder for each."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,7 +123,7 @@ class Work:
         self.parts, self.driver, self.folder, self.jobs = parts, driver, folder, jobs
         changes = {} if seed is None else {"seed": seed}
         self._loaded = {
-            part.name: gp.load("islanding" if part.name in _STUDIES else part.name).replace(changes) for part in parts
+            part.name: gp.load("islanding" if part.name == TOPOLOGY else part.name).replace(changes) for part in parts
         }
 
     @property
@@ -154,7 +153,7 @@ class Work:
     def _part(self, part: Part, before: float, tell: TellPart, figures: bool) -> PartResult:
         wall, cpu = perf_counter(), sum(os.times()[:4])
         length = self._length(part)
-        do = {"topology": self._topology, "var-sharing": self._banks}.get(part.name, self._scenario)
+        do = self._topology if part.name == TOPOLOGY else self._scenario
         found, sha256, metrics, plot = do(
             part,
             self.folder / "runs" / part.name,
@@ -179,11 +178,10 @@ class Work:
 
     def _length(self, part: Part) -> float:
         """Return the seconds that are simulated in all runs of a part."""
-        if part.name == "topology":
+        if part.name == TOPOLOGY:
             return END_S * sum(1 for _ in graphs(9, self.seed))
         scenario = self._loaded[part.name].spec
-        runs = len(BANKS) * len(CASES) if part.name == "var-sharing" else len(scenario.cases)
-        return scenario.time.end_s * runs
+        return scenario.time.end_s * len(scenario.cases)
 
     def _scenario(self, part: Part, folder: Path, tell: Tell) -> _PartOutput:
         scenario = self._loaded[part.name]
@@ -198,15 +196,6 @@ class Work:
     def _topology(self, part: Part, folder: Path, tell: Tell) -> _PartOutput:
         found = topology_study(self.seed, tell, jobs=self.jobs)
         return found, {}, None, lambda _: topologies(found.graphs)
-
-    def _banks(self, part: Part, folder: Path, tell: Tell) -> _PartOutput:
-        ours = bank_study(self._loaded[part.name], folder, tell, jobs=self.jobs)
-        metrics = [
-            {"variant": variant, "case": case, "MQSI": {event: values[case, event] for event in EVENTS}}
-            for variant, values in ours.items()
-            for case in CASES
-        ]
-        return Findings(results={}), {}, metrics, lambda _: var_sharing(ours)
 
 
 _PartOutput = tuple[Findings, dict[str, str], Any, Callable[[str], Any]]
