@@ -12,14 +12,7 @@ from typing import Any
 
 from gridpeers.papers.singhal2022.experiments.experiment_output import ExperimentResult
 from gridpeers.papers.singhal2022.experiments.hostile_experiment import hostile
-from gridpeers.papers.singhal2022.experiments.link_experiments import (
-    communication,
-    degraded_communication,
-    delay,
-    loss,
-    places,
-    topology,
-)
+from gridpeers.papers.singhal2022.experiments.link_experiments import delay, loss, places
 from gridpeers.papers.singhal2022.experiments.outage_experiments import flapping, partition
 
 
@@ -37,11 +30,8 @@ EXPERIMENTS: Mapping[str, Experiment] = {
     "delay": Experiment(delay, sweep="delay"),
     "loss": Experiment(loss, sweep="loss"),
     "places": Experiment(places, sweep="places"),
-    "topology": Experiment(topology, sweep="topology-delay"),
     "flapping": Experiment(flapping, scenario="flapping"),
     "partition": Experiment(partition, scenario="partition"),
-    "degraded-communication": Experiment(degraded_communication, sweep="degraded-communication"),
-    "communication": Experiment(communication, sweep="communication-delay"),
     "hostile": Experiment(hostile, sweep="hostile"),
 }
 """In the order of docs/experiments.md."""

@@ -103,8 +103,6 @@ class ExperimentResult:
     page: Page
     rows: Sequence[Mapping[str, Any]]
     """Of texts and numbers; infinite or None for a time that never came."""
-    digits: int = 3
-    """Significant digits in Markdown; CSV has all."""
     apart: int = 0
     """Number of leading columns that split the table in Markdown: one table for each combination of their values."""
 
@@ -127,20 +125,20 @@ class ExperimentResult:
         head = [f"| {' | '.join(columns)} |", "|" + "---|" * len(columns)]
         parts: dict[tuple[str, ...], list[str]] = {}
         for row in self.rows:
-            texts = [self._text(cell) for cell in row.values()]
+            texts = [_text(cell) for cell in row.values()]
             name = tuple(texts[: self.apart])
             parts.setdefault(name, [f"**{', '.join(name)}**", "", *head] if name else [*head])
             parts[name].append(f"| {' | '.join(texts[self.apart :])} |")
         return "\n".join("\n".join(part) + "\n" for part in parts.values())
 
-    def _text(self, cell: Any) -> str:
-        if _is_never(cell):
-            return "never"
-        return cell if isinstance(cell, str) else f"{cell:.{self.digits}g}"
-
 
 def _is_never(cell: Any) -> bool:
     return cell is None or (isinstance(cell, float) and math.isinf(cell))
+
+
+def _text(cell: Any) -> str:
+    """Return a cell of a Markdown table, with three significant digits; CSV has all."""
+    return "never" if _is_never(cell) else cell if isinstance(cell, str) else f"{cell:.3g}"
 
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7a7a7a", "#000000")

@@ -17,11 +17,8 @@ LINKS = (8, 9, 10, 12, 16, 24, 36)
 PER_COUNT = 12
 """Connected graphs for each number of links; with 36 there is but one."""
 
-BELOW = (4, 5, 6, 7)
-"""Links of graphs that cannot be connected, which are trees less some links."""
-
-PER_COUNT_BELOW = 2
-"""Graphs for each of these."""
+BELOW, PER_COUNT_BELOW = (4, 5, 6, 7), 2
+"""Links of graphs that cannot be connected, which are trees less some links; graphs for each number of links."""
 
 NOT_CONNECTED = 1e-9
 """Algebraic connectivity of a graph in parts: 0 but for rounding. That of nine in a path is 0.12."""
