@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from gridpeers.rooms import ROOMS
 
 if TYPE_CHECKING:
-    from gridpeers.lab.predict.theory import *  # noqa: F403
+    from gridpeers.lab.predict.theory_parts import *  # noqa: F403
 else:
 
     def __getattr__(name: str) -> Any:

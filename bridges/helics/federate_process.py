@@ -33,7 +33,7 @@ PROBE = 0.1  # time (s) between two attempts to reach a broker
 GONE = ("disconnected", "finalized", "error")  # states of a federate that publishes no more
 
 
-class RefusedError(Exception):
+class _RefusedError(Exception):
     """A request that cannot be done, in words for a person."""
 
 
@@ -59,7 +59,7 @@ class Federate:
             options = f"-f {request['federates']} --loglevel=no_print --localinterface=tcp://{host}:{port}"
             self.broker = helics.helicsCreateBroker("zmq", f"{self.name}-broker", options)
             if not helics.helicsBrokerIsConnected(self.broker):
-                raise RefusedError(f"cannot start a broker at tcp://{host}:{port}")
+                raise _RefusedError(f"cannot start a broker at tcp://{host}:{port}")
         else:
             _reach(host, port, request["wait"])
         info = helics.helicsCreateFederateInfo()
@@ -175,7 +175,7 @@ def _require_free(host: str, port: int) -> None:
                 probe.bind((host, each))
             except OSError as error:
                 text = f"cannot start a broker at tcp://{host}:{port}: port {each}: {error.strerror}"
-                raise RefusedError(f"{text}; end what has it, or choose another port") from None
+                raise _RefusedError(f"{text}; end what has it, or choose another port") from None
 
 
 def _reach(host: str, port: int, wait: float) -> None:
@@ -188,7 +188,7 @@ def _reach(host: str, port: int, wait: float) -> None:
         except OSError as error:
             if time.monotonic() + PROBE > until:
                 why = error.strerror or str(error)
-                raise RefusedError(f"no broker at tcp://{host}:{port} within {wait:g} s ({why})") from None
+                raise _RefusedError(f"no broker at tcp://{host}:{port} within {wait:g} s ({why})") from None
             time.sleep(PROBE)
 
 

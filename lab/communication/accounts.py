@@ -198,7 +198,7 @@ still. Its numbers have no gap then. Shorter pauses are those of a busy host, an
 
 
 @dataclass
-class Heal:
+class LinkHeal:
     link: Link
     t: float
     took: float | None = None
@@ -221,8 +221,8 @@ class Heals:
         self._sent, self._simulated = sent, info.simulated
         self._standstill = inf if info.simulated else max(STANDSTILL, PERIODS * info.T_c)
         """Time (s) between states of successive numbers in which an agent stood still; simulated time has a gap."""
-        self._healed: dict[Link, list[Heal]] = defaultdict(list)
-        self._open: dict[str, list[Heal]] = defaultdict(list)
+        self._healed: dict[Link, list[LinkHeal]] = defaultdict(list)
+        self._open: dict[str, list[LinkHeal]] = defaultdict(list)
         """Those after which nothing new has been used yet, by receiver."""
         self._was_cut: set[Link] = set()
         self._listens: set[Link] = set()
@@ -234,7 +234,7 @@ class Heals:
                 self._losses[link] = [span for span in spans if span.kind in LOSSES]
                 for t, again in _ends(self._losses[link]):
                     if t < t_end:
-                        self._add(Heal(link, t, lost_again=again))
+                        self._add(LinkHeal(link, t, lost_again=again))
 
     def trace(self, trace: LinkTrace) -> None:
         link = trace.src, trace.dst
@@ -246,7 +246,7 @@ class Heals:
                         heal.lost_again = min(heal.lost_again, t)
             elif link in self._was_cut and not isinstance(outcome, str) and not self._is_lossy(link, t):
                 self._was_cut.discard(link)
-                self._add(Heal(link, t))
+                self._add(LinkHeal(link, t))
 
     def use(self, agent: str, state: SentState, uses: Uses, *, new: bool) -> None:
         if new:
@@ -269,7 +269,7 @@ class Heals:
                 self._note_work(heal, state, src, dst)
         self._open[agent] = [heal for heal in self._open[agent] if heal.took is None and state.t <= heal.lost_again]
 
-    def _note_work(self, heal: Heal, state: SentState, src: StateWindow, dst: StateWindow) -> None:
+    def _note_work(self, heal: LinkHeal, state: SentState, src: StateWindow, dst: StateWindow) -> None:
         """Note for how long both have been at work, with an own state of the receiver that uses nothing new."""
         number, goes_on = state.number, _goes_on(dst, state.number, self._standstill)
         if self._simulated:  # numbers are ticks, so that pauses of the sender show, and states that it kept to itself
@@ -289,11 +289,11 @@ class Heals:
     def _is_lossy(self, link: Link, t: float) -> bool:
         return any(span.from_s - 1e-9 <= t < span.to_s - 1e-9 for span in self._losses.get(link, ()))
 
-    def found(self) -> list[Heal]:
+    def found(self) -> list[LinkHeal]:
         """Return the heals of links over which an agent listens, in the order of links and time."""
         return [heal for link in sorted(self._listens) for heal in sorted(self._healed[link], key=lambda one: one.t)]
 
-    def _add(self, heal: Heal) -> None:
+    def _add(self, heal: LinkHeal) -> None:
         if all(abs(known.t - heal.t) > 5e-4 for known in self._healed[heal.link]):
             self._healed[heal.link].append(heal)
             self._open[heal.link[1]].append(heal)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Annotated, Self
 
 from gridpeers.agents.agent_config import MAX_AGE
-from gridpeers.lab.communication.accounts import ArrivalAccounts, Heal, Heals, Missing, TickAccounts
+from gridpeers.lab.communication.accounts import ArrivalAccounts, Heals, LinkHeal, Missing, TickAccounts
 from gridpeers.lab.communication.record_pass import RecordPass, opened
 from gridpeers.lab.communication.sent_states import (
     DecidedStates,
@@ -272,7 +272,7 @@ class CommunicationSummary(RecordPass):
         """Real time: what came over each link, for each time in which both of its ends were there."""
         self.oldest: defaultdict[Link, list[OldUse]] = defaultdict(list)
         """By link, the oldest value that was used, then the oldest one that was used later, and so on: ages fall."""
-        self.heals: list[Heal] = []
+        self.heals: list[LinkHeal] = []
         self._alike: dict[str, tuple[Uses, list[OldUse]]] = {}
         """By agent, the neighbours that its decision in force uses, and the last entries in `oldest` of their links. An
         agent for which quiet states change the ages from tick to tick is left out."""

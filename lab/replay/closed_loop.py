@@ -24,8 +24,8 @@ from gridpeers.agents.laws.law import Law
 from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.lab.replay.changes import ChangedRule, Changes
 from gridpeers.lab.replay.recorded_process import (
+    KeyedMessage,
     MakePlant,
-    Message,
     RecordedProcess,
     RecordedStep,
     ReplayedProcess,
@@ -73,7 +73,7 @@ CUT_OFF = 1.0
 _CALL, _ARRIVAL = 0, 1
 """Order of calls at the same time: processes that share a session send before they hear."""
 
-_NOT_YET = Message("", b"not yet")
+_NOT_YET = KeyedMessage("", b"not yet")
 
 
 class LoopProcess:
@@ -120,13 +120,13 @@ class ClosedLoop:
         self._changed = bool(self._changes) and self._changes.since <= 0.0
         self._laws: list[Law] = []
         self._processes: dict[tuple[str, int], LoopProcess] = {}
-        self._due: list[tuple[float, int, int, LoopProcess, Message | None]] = []
+        self._due: list[tuple[float, int, int, LoopProcess, KeyedMessage | None]] = []
         """What comes next: time (s, monotonic), calls first; process; the message if the record does not have it."""
         self._order = count()
-        self._sent: dict[tuple[str, int, int], tuple[float, Message]] = {}
+        self._sent: dict[tuple[str, int, int], tuple[float, KeyedMessage]] = {}
         """Messages that were sent in the replay, by stream, epoch and number, and when."""
         self._delays = LinkDelays()
-        self._statuses: dict[str, deque[Message]] = {}
+        self._statuses: dict[str, deque[KeyedMessage]] = {}
         self._listens = _listeners(record)
         self._number = -1
         self._t = 0.0
@@ -252,7 +252,7 @@ class ClosedLoop:
 
     # ---------------------------------------------------------------- messages
 
-    def _heard(self, process: LoopProcess, step: RecordedStep) -> Message | None:
+    def _heard(self, process: LoopProcess, step: RecordedStep) -> KeyedMessage | None:
         entry = step.entry
         if not isinstance(entry, MessageReference | ReceivedMessage):
             return None
@@ -282,7 +282,7 @@ class ClosedLoop:
         return recorded(step) if by.head is None else _NOT_YET
 
     def _publish(
-        self, process: LoopProcess, recorded: tuple[SentMessage, ...], sent: list[Message], due: float
+        self, process: LoopProcess, recorded: tuple[SentMessage, ...], sent: list[KeyedMessage], due: float
     ) -> None:
         theirs = {(each.key, state.seq) for each in recorded if (state := tick_message(each)) is not None}
         for message in sent:
@@ -306,7 +306,7 @@ class ClosedLoop:
     def _send_new(
         self,
         process: LoopProcess,
-        message: Message,
+        message: KeyedMessage,
         decoded: State | Measurement,
         theirs: set[tuple[str, int]],
         due: float,

@@ -54,14 +54,14 @@ class ReplayError(ValueError):
         self.problems = problems
 
 
-class Message(NamedTuple):
+class KeyedMessage(NamedTuple):
     """A message on its way; the key is without `gridpeers/<run>/`."""
 
     key: str
     payload: bytes
 
 
-def tick_message(message: Message | SentMessage | ReceivedMessage) -> State | Measurement | None:
+def tick_message(message: KeyedMessage | SentMessage | ReceivedMessage) -> State | Measurement | None:
     """Return a state, or a measurement; None of anything else."""
     decoded = sound(message.payload) if kind_of(message.key) in EACH_TICK else None
     return decoded if isinstance(decoded, State | Measurement) else None
@@ -130,14 +130,14 @@ class RecordedProcess:
                         return
                     yield journal, entry
 
-    def message(self, step: RecordedStep) -> Message | None:
+    def message(self, step: RecordedStep) -> KeyedMessage | None:
         """Return the message that it heard in a step; None if it heard none, or the record does not have it."""
         entry = step.entry
         if isinstance(entry, ReceivedMessage):
-            return Message(entry.key, entry.payload)
+            return KeyedMessage(entry.key, entry.payload)
         if isinstance(entry, MessageReference):
             found = self._parts.index.named_by(entry, step.t)
-            return None if found is None else Message(entry.key, encode(found))
+            return None if found is None else KeyedMessage(entry.key, encode(found))
         return None
 
 
@@ -195,10 +195,10 @@ MakePlant = Callable[[PlantConfig], LivePlant]
 class _Outbox(Traffic):
     def __init__(self, cut: int) -> None:
         self._cut = cut
-        self.messages: list[Message] = []
+        self.messages: list[KeyedMessage] = []
 
     def sent(self, key: str, payload: bytes) -> None:
-        self.messages.append(Message(key[self._cut :], payload))
+        self.messages.append(KeyedMessage(key[self._cut :], payload))
 
 
 class ReplayedProcess:
@@ -215,7 +215,7 @@ class ReplayedProcess:
     def hears(self, key: str) -> bool:
         return self._root + key in self.node.routes and not self.node.finished
 
-    def take(self, step: RecordedStep, message: Message | None = None) -> list[Message]:
+    def take(self, step: RecordedStep, message: KeyedMessage | None = None) -> list[KeyedMessage]:
         node, entry = self.node, step.entry
         at = entry.at or 0.0
         if isinstance(entry, RejectedCount):
@@ -236,11 +236,11 @@ class ReplayedProcess:
             node.asked_to_leave(entry.text)
         return self._take()
 
-    def hear(self, message: Message, at: float) -> list[Message]:
+    def hear(self, message: KeyedMessage, at: float) -> list[KeyedMessage]:
         self.node.received(self._root + message.key, message.payload, at)
         return self._take()
 
-    def end(self) -> list[Message]:
+    def end(self) -> list[KeyedMessage]:
         """Have a node whose journal ends before it does report the rest of its rows, or on its links; return that."""
         node = self.node
         if isinstance(node, RealtimeAgent):
@@ -251,7 +251,7 @@ class ReplayedProcess:
             node.interrupt("its record ends", 0.0)
         return self._take()
 
-    def _take(self) -> list[Message]:
+    def _take(self) -> list[KeyedMessage]:
         self.node.take_actions()
         sent, self._sent.messages = self._sent.messages, []
         return sent

@@ -25,8 +25,8 @@ from gridpeers.agents.carriers.law_registry import close_laws
 from gridpeers.agents.laws.law import Law
 from gridpeers.lab.replay.recomputation import recomputed
 from gridpeers.lab.replay.recorded_process import (
+    KeyedMessage,
     MakePlant,
-    Message,
     RecordedProcess,
     RecordedStep,
     ReplayedProcess,
@@ -63,24 +63,24 @@ class ReplayedPart:
     count: int = 0
     """Number of states of an agent, or of rows of the plant, that were compared."""
     t_end: float = 0.0
-    difference: Difference | None = None
+    difference: ReplayDifference | None = None
 
     @property
     def is_over(self) -> bool:
         return bool(self.note) or self.difference is not None
 
-    def compare(self, t: float, difference: Difference | None) -> None:
+    def compare(self, t: float, difference: ReplayDifference | None) -> None:
         self.difference = difference
         if difference is None:
             self.count, self.t_end = self.count + 1, t
 
 
 @dataclass(frozen=True, kw_only=True)
-class Replay:
+class ReplayedRun:
     parts: tuple[ReplayedPart, ...]
 
     @property
-    def difference(self) -> Difference | None:
+    def difference(self) -> ReplayDifference | None:
         """The first difference of all in run time; None if the replay gives what was recorded, as far as it goes."""
         found = [part.difference for part in self.parts if part.difference is not None]
         return min(found, key=lambda difference: difference.t, default=None)
@@ -91,7 +91,7 @@ class Replay:
         return tuple(dict.fromkeys(part.note for part in self.parts if part.note))
 
 
-def replay(run: Result | RunRecord | str | Path, make_plant: MakePlant | None = start_plant) -> Replay:
+def replay(run: Result | RunRecord | str | Path, make_plant: MakePlant | None = start_plant) -> ReplayedRun:
     """Give the cores of a recorded run, of any driver, their inputs again, and compare their decisions.
 
     Without `make_plant`, which starts the plant, the physics is left out. Raise RecordFileError if the record cannot be
@@ -105,7 +105,7 @@ def replay(run: Result | RunRecord | str | Path, make_plant: MakePlant | None = 
         note = "the physics was not replayed: it was not that of our plant alone"
         found.append(ReplayedPart(PLANT, note))
     names = [PLANT, *in_order({part.name for part in found} - {PLANT})]
-    return Replay(parts=tuple(sorted(found, key=lambda part: names.index(part.name))))
+    return ReplayedRun(parts=tuple(sorted(found, key=lambda part: names.index(part.name))))
 
 
 def record_of(run: Result | RunRecord | str | Path) -> RunRecord:
@@ -118,7 +118,7 @@ def record_of(run: Result | RunRecord | str | Path) -> RunRecord:
 # -------------------------------------------------------------------- differences
 
 
-class Difference(NamedTuple):
+class ReplayDifference(NamedTuple):
     name: str
     t: float
     quantity: str
@@ -143,7 +143,7 @@ def same(a: Any, b: Any) -> bool:
     return bool(a == b)
 
 
-def message_difference(recorded: AnyMessage | None, replayed: AnyMessage | None) -> Difference | None:
+def message_difference(recorded: AnyMessage | None, replayed: AnyMessage | None) -> ReplayDifference | None:
     """Return the first field in which two states, or two measurements, differ; None if there is none."""
     known = recorded or replayed
     if known is None:
@@ -151,25 +151,25 @@ def message_difference(recorded: AnyMessage | None, replayed: AnyMessage | None)
     name = known.to if isinstance(known, Measurement) else known.sender
     if recorded is None or replayed is None or type(recorded) is not type(replayed):
         there = ("missing" if message is None else "there" for message in (recorded, replayed))
-        return Difference(name, known.t, f"the {type(known).__name__} {known.seq}", *there)
+        return ReplayDifference(name, known.t, f"the {type(known).__name__} {known.seq}", *there)
     for field in recorded.__struct_fields__:
         a, b = getattr(recorded, field), getattr(replayed, field)
         if not same(a, b):
-            return Difference(name, recorded.t, field, a, b, UNITS.get(field, ""))
+            return ReplayDifference(name, recorded.t, field, a, b, UNITS.get(field, ""))
     return None
 
 
 def row_difference(
     inverters: tuple[str, ...], recorded: tuple[float, ...], replayed: tuple[float, ...]
-) -> Difference | None:
+) -> ReplayDifference | None:
     """Return the first quantity in which two rows of the plant differ; None if there is none."""
     if len(recorded) != len(replayed):
-        return Difference("plant", recorded[0], "the number of columns", len(recorded), len(replayed))
+        return ReplayDifference("plant", recorded[0], "the number of columns", len(recorded), len(replayed))
     columns = ((name, quantity) for name in inverters for quantity in QUANTITIES)
     for (name, quantity), a, b in zip(columns, recorded[1:], replayed[1:], strict=True):
         if not same(a, b):
             symbol, _, unit = quantity.rpartition("_")
-            return Difference(name, recorded[0], symbol, a, b, unit)
+            return ReplayDifference(name, recorded[0], symbol, a, b, unit)
     return None
 
 
@@ -247,7 +247,7 @@ class _PlantReplay:
     def end(self) -> None:
         self._compare(self._again.end())
 
-    def _compare(self, sent: list[Message]) -> None:
+    def _compare(self, sent: list[KeyedMessage]) -> None:
         for message in sent:
             if message.key == "telemetry":
                 self._rows.take(decode(message.payload))

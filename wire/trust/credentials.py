@@ -29,7 +29,7 @@ LONGEST_COMMON_NAME = 64
 """Characters of a common name (X.520, ub-common-name)."""
 
 
-class Member(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class SiteMember(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     name: str
     """An agent has that of its inverter."""
     role: Role
@@ -77,7 +77,7 @@ class Rule(NamedTuple):
     """Key expression of Zenoh."""
 
 
-def access_control(own: Member, members: Iterable[Member], *, star: bool = False) -> dict[str, Any]:
+def access_control(own: SiteMember, members: Iterable[SiteMember], *, star: bool = False) -> dict[str, Any]:
     """Return Zenoh's ``access_control`` for a process among all members of its site, in any order.
 
     In a star the plant relays all messages.
@@ -109,11 +109,11 @@ def access_control(own: Member, members: Iterable[Member], *, star: bool = False
     }
 
 
-def rules_between(own: Member, other: Member, *, star: bool = False) -> list[Rule]:
+def rules_between(own: SiteMember, other: SiteMember, *, star: bool = False) -> list[Rule]:
     """Return what a process allows on a link whose other end has the certificate of a member."""
     rules = []
     for spec in KEY_SPECS:
-        ways: tuple[tuple[Flow, Member, Member], ...] = (("ingress", other, own), ("egress", own, other))
+        ways: tuple[tuple[Flow, SiteMember, SiteMember], ...] = (("ingress", other, own), ("egress", own, other))
         for flow, sender, receiver in ways:
             if key := _key(spec, sender, receiver, star=star):
                 rules.append(Rule(flow, _FORWARD[spec.kind], key))
@@ -122,7 +122,7 @@ def rules_between(own: Member, other: Member, *, star: bool = False) -> list[Rul
     return [*rules, Rule("ingress", _WATCH, ANY_TOKEN), Rule("egress", _WATCH, ANY_TOKEN)]
 
 
-def _key(spec: KeySpec, writer: Member, reader: Member, *, star: bool) -> str:
+def _key(spec: KeySpec, writer: SiteMember, reader: SiteMember, *, star: bool) -> str:
     """Return the key on which messages of this kind go from one member to another; empty if none do."""
     relayed = star and writer.role == "plant"  # what it relays it may read itself, so the way to it needs no more
     if not ((relayed or writer.role in spec.writers) and reader.role in spec.readers):
@@ -135,18 +135,18 @@ def _key(spec: KeySpec, writer: Member, reader: Member, *, star: bool) -> str:
 class Credentials(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Certificate of a process, and the members of its site."""
 
-    own: Member
+    own: SiteMember
     ca: str
     """Path of the certificate of the site's authority (PEM); the next two are paths of the own files."""
     certificate: str
     key: str
-    members: tuple[Member, ...]
+    members: tuple[SiteMember, ...]
     """Everybody with a certificate of the site, revoked ones included."""
 
     def knowing(self, inverters: tuple[str, ...]) -> Credentials:
         """Return the same with an agent for each of these inverters: their certificates may come during the run."""
         names = {member.name for member in self.members}
-        later = tuple(Member(name=name, role="agent") for name in dict.fromkeys(inverters) if name not in names)
+        later = tuple(SiteMember(name=name, role="agent") for name in dict.fromkeys(inverters) if name not in names)
         return msgspec.structs.replace(self, members=self.members + later)
 
     def common_names(self, sender: str) -> frozenset[str]:

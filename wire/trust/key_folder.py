@@ -24,7 +24,7 @@ import msgspec
 from gridpeers.wire.codec import decode_foreign
 from gridpeers.wire.keys import Role
 from gridpeers.wire.messages import is_name
-from gridpeers.wire.trust.credentials import DATE_AND_TIME, Credentials, Member
+from gridpeers.wire.trust.credentials import DATE_AND_TIME, Credentials, SiteMember
 from gridpeers.wire.wording import printable
 
 if TYPE_CHECKING:
@@ -50,9 +50,9 @@ class MemberList(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     site: str
     version: int
     """Number of changes so far; of two lists the greater is the later."""
-    members: tuple[Member, ...] = ()
+    members: tuple[SiteMember, ...] = ()
 
-    def of(self, name: str) -> Member | None:
+    def of(self, name: str) -> SiteMember | None:
         return next((member for member in self.members if member.name == name), None)
 
 
@@ -142,7 +142,7 @@ def open_credentials(
     ), soon if ends - now < SOON else ""
 
 
-def _end_of(own: x509.Certificate, path: Path, folder: Path, member: Member, now: datetime) -> datetime:
+def _end_of(own: x509.Certificate, path: Path, folder: Path, member: SiteMember, now: datetime) -> datetime:
     """Return the end of a member's certificate, or of the authority's if that is earlier, if both are valid."""
     from cryptography.exceptions import InvalidSignature, UnsupportedAlgorithm
     from cryptography.x509.oid import NameOID

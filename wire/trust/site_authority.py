@@ -16,7 +16,7 @@ import msgspec
 
 from gridpeers.wire.keys import Role
 from gridpeers.wire.messages import is_name
-from gridpeers.wire.trust.credentials import DATE_AND_TIME, LONGEST_COMMON_NAME, Member
+from gridpeers.wire.trust.credentials import DATE_AND_TIME, LONGEST_COMMON_NAME, SiteMember
 from gridpeers.wire.trust.key_folder import (
     CA,
     CA_KEY,
@@ -80,7 +80,7 @@ def make_site(folder: Path, *, days: float = LIFE_DAYS, now: datetime | None = N
 
 def issue(
     folder: Path, name: str, role: Role | None = None, *, days: float = LIFE_DAYS, now: datetime | None = None
-) -> Member:
+) -> SiteMember:
     """Issue a certificate to a name, or renew it; return the member.
 
     An agent's name is that of its inverter. Without a role a name keeps the one it has, and any other is an agent.
@@ -101,7 +101,7 @@ def issue(
             )
         generation = 1 if before is None else before.generation + before.revoked
         ends = min(now + timedelta(days=days), ca.not_valid_after_utc)
-        member = Member(name=name, role=role, generation=generation, expires=f"{ends:{DATE_AND_TIME}}")
+        member = SiteMember(name=name, role=role, generation=generation, expires=f"{ends:{DATE_AND_TIME}}")
         key = ec.generate_private_key(ec.SECP256R1())
         certificate = _certificate(member.common_name, key, ca_key, ca, now, ends - now)
         _write_key(folder / f"{name}.key", key)
@@ -128,7 +128,7 @@ def objection(known: MemberList, name: str, role: Role | None) -> str:
     return ""
 
 
-def revoke(folder: Path, name: str) -> Member:
+def revoke(folder: Path, name: str) -> SiteMember:
     """Revoke the certificate of a name, and delete its key here; return the member."""
     with _changing(folder):
         known, _, ca_key = _authority(folder)
@@ -162,7 +162,7 @@ def _changing(folder: Path) -> Iterator[None]:
         os.close(handle)
 
 
-def _with(known: MemberList, member: Member) -> MemberList:
+def _with(known: MemberList, member: SiteMember) -> MemberList:
     others = [each for each in known.members if each.name != member.name]
     return msgspec.structs.replace(known, version=known.version + 1, members=(*others, member))
 

@@ -46,7 +46,7 @@ class Curve:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Panel:
+class PlotPanel:
     title: str
     x_label: str
     y_label: str
@@ -68,9 +68,9 @@ class Panel:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Page:
+class PlotPage:
     title: str
-    panels: Sequence[Panel]
+    panels: Sequence[PlotPanel]
     columns: int
     names: Mapping[int, str]
     """Meaning of the styles, for the legend."""
@@ -83,10 +83,10 @@ class Page:
 
 def time_panels(
     cases: Sequence[Any], curves: Callable[[str, int, Any], Iterable[Curve]], suffix: str = "", **axes: Any
-) -> list[Panel]:
+) -> list[PlotPanel]:
     """Return a panel for each of the two times after islanding, with `curves(index, style, case)` of each case."""
     return [
-        Panel(
+        PlotPanel(
             title=f"{title}{suffix}",
             y_label="time after islanding (s)",
             curves=[curve for style, case in enumerate(cases) for curve in curves(index, style, case)],
@@ -100,7 +100,7 @@ def time_panels(
 class ExperimentResult:
     """A page, and the rows of its table by columns that end in their unit."""
 
-    page: Page
+    page: PlotPage
     rows: Sequence[Mapping[str, Any]]
     """Of texts and numbers; infinite or None for a time that never came."""
     apart: int = 0
@@ -153,7 +153,7 @@ DPI = 130
 """Points per inch: readable in print, and small enough for a repository."""
 
 
-def draw(page: Page) -> Figure:
+def draw(page: PlotPage) -> Figure:
     """Draw a page."""
     with mpl.rc_context(gp.figures.PAGE):
         rows = -(-len(page.panels) // page.columns)
@@ -172,7 +172,7 @@ def draw(page: Page) -> Figure:
     return figure
 
 
-def _draw(axes: Axes, panel: Panel) -> None:
+def _draw(axes: Axes, panel: PlotPanel) -> None:
     """Draw one panel: scales first, as times that never came are put at the edge."""
     for start, end in panel.spans:
         axes.axvspan(start, end, color="#eeeeee", zorder=0)
@@ -228,7 +228,7 @@ def _plot(axes: Axes, curve: Curve) -> None:
     axes.plot(curve.x, np.where(np.isfinite(curve.y), curve.y, np.nan), color=colour, **looks[curve.look])
 
 
-def _never(axes: Axes, panel: Panel) -> None:
+def _never(axes: Axes, panel: PlotPanel) -> None:
     """Put a sign of infinity at the upper edge for times that never came."""
     curves = [curve for curve in panel.curves if np.isposinf(curve.y).any()]
     for curve in curves:
@@ -240,7 +240,7 @@ def _never(axes: Axes, panel: Panel) -> None:
         axes.annotate(r"$\infty$: not within the run", (1.0, 1.0), ha="right", fontsize=7, color="#444444", **note)
 
 
-def _legend(page: Page) -> list[Line2D]:
+def _legend(page: PlotPage) -> list[Line2D]:
     """Return an entry for each style, and one for filled, hollow and dashed, as far as the page has them."""
     curves = [curve for panel in page.panels for curve in panel.curves]
     used = {curve.look for curve in curves}

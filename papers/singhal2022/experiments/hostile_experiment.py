@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from gridpeers.papers.singhal2022.experiments.experiment_data import SweepData
-from gridpeers.papers.singhal2022.experiments.experiment_output import Curve, ExperimentResult, Page, Panel
+from gridpeers.papers.singhal2022.experiments.experiment_output import Curve, ExperimentResult, PlotPage, PlotPanel
 
 EVENT = "event2"
 """The event at which the lies begin."""
@@ -56,7 +56,7 @@ def hostile(sweep: SweepData) -> ExperimentResult:
         return curves
 
     panels = [
-        Panel(
+        PlotPanel(
             title=sweep.base.cases[case].title if index == MEASURES[0][0] else "",
             x_label="",
             y_label=label if case == GRAPHS[0] else "",
@@ -68,7 +68,7 @@ def hostile(sweep: SweepData) -> ExperimentResult:
         )
         for (index, label, limit, ends, least), case in product(MEASURES, GRAPHS)
     ]
-    page = Page(
+    page = PlotPage(
         title="Agents that lie from 4 s on, as a third of the load is lost; lines: limits of the checks",
         panels=panels,
         columns=len(GRAPHS),

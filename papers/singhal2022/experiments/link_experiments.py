@@ -15,7 +15,13 @@ import numpy as np
 from gridpeers import theory
 from gridpeers.measures import Flags, Floats
 from gridpeers.papers.singhal2022.experiments.experiment_data import INDEXES, SweepData
-from gridpeers.papers.singhal2022.experiments.experiment_output import Curve, ExperimentResult, Page, Panel, time_panels
+from gridpeers.papers.singhal2022.experiments.experiment_output import (
+    Curve,
+    ExperimentResult,
+    PlotPage,
+    PlotPanel,
+    time_panels,
+)
 from gridpeers.theory import var_growth
 
 DELAY, LOSS, K_Q, ON = "link[0].delay", "link[0].loss", "gains.k_q", "link[0].on"
@@ -35,7 +41,7 @@ def delay(sweep: SweepData) -> ExperimentResult:
         yield Curve(*sweep.curve(DELAY, index, {"case": case, K_Q: ALONE}), style, "hollow")
         yield Curve(*sweep.theory(index, case, link_delay_s=fine), style, "predicted")
 
-    page = Page(
+    page = PlotPage(
         title="Islanding over late links",
         panels=time_panels(cases, curves, x_label=X, log="xy", zero=0.02, x_ticks=delays, y_range=(0.3, 40.0)),
         columns=2,
@@ -75,7 +81,7 @@ def loss(sweep: SweepData) -> ExperimentResult:
     by_loss: dict[str, Any] = {"x_label": "probability p that a message is lost", "log": "y", "y_range": range_s}
     by_age: dict[str, Any] = {"x_label": "mean age of what is used: delay, or T_c/(1 - p) (s)", "y_range": range_s}
     by_age |= {"log": "xy", "x_ticks": [0.02, 0.04, 0.1, 0.2, 0.4], "suffix": ", against mean age"}
-    page = Page(
+    page = PlotPage(
         title="Islanding over lossy links, the last state held",
         panels=[*time_panels(cases, against_loss, **by_loss), *time_panels(cases, against_age, **by_age)],
         columns=2,
@@ -127,7 +133,7 @@ def places(sweep: SweepData) -> ExperimentResult:
             calm_s, swings_s = _between(x, y < least)
             row = {"what swings": title, "late": place, "graph": case, "predicted limit (s)": limit}
             rows.append(row | {"calm up to (s)": calm_s, "swings from (s)": swings_s})
-        panel = Panel(
+        panel = PlotPanel(
             title=f"{title}: late {place}",
             x_label=f"delay of {place} (s)",
             y_label=y_label,
@@ -139,7 +145,7 @@ def places(sweep: SweepData) -> ExperimentResult:
             y_range=(LEAST, 1.0),
         )
         panels.append(panel)
-    page = Page(
+    page = PlotPage(
         title="Where a delay sits decides whether it destabilises",
         panels=panels,
         columns=3,

@@ -8,7 +8,7 @@ import numpy as np
 
 from gridpeers.measures import Floats
 from gridpeers.papers.singhal2022.experiments.experiment_data import INDEXES, CaseData, times_of, without
-from gridpeers.papers.singhal2022.experiments.experiment_output import Curve, ExperimentResult, Page, Panel
+from gridpeers.papers.singhal2022.experiments.experiment_output import Curve, ExperimentResult, PlotPage, PlotPanel
 from gridpeers.theory import Case, Loop, Ticks, predicted_times, sharing_index
 
 COLUMNS = (
@@ -40,7 +40,7 @@ def partition(runs: CaseData) -> ExperimentResult:
                 t, of = theory[case]
                 curves.append(Curve(runs.t(case), measure(case), style, "solid"))
                 curves.append(Curve(t + event.t_s, of[row], style, "predicted"))
-            panel = Panel(
+            panel = PlotPanel(
                 title=f"{title}, {name}",
                 x_label="time (s)",
                 y_label=y_label,
@@ -51,7 +51,7 @@ def partition(runs: CaseData) -> ExperimentResult:
             )
             panels.append(panel)
     held, expired = "in groups, last state held", "in groups, states expire after 0.25 s"
-    page = Page(
+    page = PlotPage(
         title="In groups from 2.5 to 7 s (grey); a third of the load is lost at 3 s",
         panels=panels,
         columns=3,
@@ -110,7 +110,7 @@ def flapping(runs: CaseData) -> ExperimentResult:
     """Return f and MPSI over time, and times after each event."""
     cases, events = runs.scenario.cases, runs.scenario.events
     panels = [
-        Panel(
+        PlotPanel(
             title=title,
             x_label="time (s)",
             y_label=y_label,
@@ -120,7 +120,7 @@ def flapping(runs: CaseData) -> ExperimentResult:
         )
         for title, measure, y_label, y_range in _measures(runs, "Frequency", "Power sharing", (59.88, 60.15))
     ]
-    page = Page(
+    page = PlotPage(
         title="A flapping link; islanding at 1 s, loss of load at 6 s",
         panels=panels,
         columns=1,

@@ -57,7 +57,7 @@ def reproduce(
     Example:  gridpeers reproduce --driver inprocess
     """
     from gridpeers.papers.singhal2022.paper_benchmarks import headline
-    from gridpeers.papers.singhal2022.reproduce.report import Reproduction, write
+    from gridpeers.papers.singhal2022.reproduce.paper_report import Reproduction, write
     from gridpeers.papers.singhal2022.reproduce.work import CHOICES, Work, chosen
 
     if only is not None:

@@ -11,11 +11,8 @@ import gridpeers as gp
 from gridpeers.measures import Settling, Steady
 from gridpeers.papers.singhal2022.communication_claims import GraphFindings, GraphRun
 
-LINKS = (8, 9, 10, 12, 16, 24, 36)
-"""Links of the connected graphs; most where the paper's curve bends."""
-
-PER_COUNT = 12
-"""Connected graphs for each number of links; with 36 there is but one."""
+LINKS, PER_COUNT = (8, 9, 10, 12, 16, 24, 36), 12
+"""Links of the connected graphs, most where the paper's curve bends; graphs for each number, but one with 36."""
 
 BELOW, PER_COUNT_BELOW = (4, 5, 6, 7), 2
 """Links of graphs that cannot be connected, which are trees less some links; graphs for each number of links."""
@@ -51,12 +48,10 @@ def topology_study(seed: int, tell: Tell, *, jobs: int | None) -> GraphFindings:
     links = [[[names[i], names[j]] for i, j in edges] for edges in drawn]
     first = {"case.IV.graph": "links", "case.IV.links": links[0], "time.end_s": END_S, "paper": None}
     base = scenario.replace({**first, "event": scenario.tables["event"][:1]})
-
-    def progress(done: int, of: int) -> None:
-        tell(f"{done} of {of} graphs", done / of)
-
-    progress(0, len(drawn))
-    rows = gp.sweep(base, {"case.IV.links": links}, cases=["IV"], jobs=jobs, progress=progress)
+    tell("starting", 0.0)
+    rows = gp.sweep(
+        base, {"case.IV.links": links}, cases=["IV"], jobs=jobs, progress=lambda k, n: tell(f"{k} of {n} graphs", k / n)
+    )
     for edges, (_, row) in zip(drawn, rows.iterrows(), strict=True):
         if row["status"] != "ran":
             raise RuntimeError(f"topology, a graph with {len(edges)} links: {row['why']}")

@@ -32,7 +32,7 @@ class Picture(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Name of the figure of the run (`gridpeers.Results.plot`); a study has the one figure."""
 
 
-class Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class ReportPart(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A part of the reproduction: one experiment, the paper's or ours."""
 
     name: str
@@ -47,7 +47,7 @@ class Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """True if the paper prints a table of the experiment."""
 
 
-class Setting(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class ReportSetting(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A setting of ours that the paper does not print."""
 
     name: str
@@ -59,8 +59,8 @@ class Setting(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class _Parts(msgspec.Struct, forbid_unknown_fields=True):
-    part: tuple[Part, ...]
-    setting: tuple[Setting, ...]
+    part: tuple[ReportPart, ...]
+    setting: tuple[ReportSetting, ...]
 
 
 _READ = msgspec.toml.decode(Path(__file__).with_name("parts.toml").read_bytes(), type=_Parts)
@@ -70,7 +70,7 @@ CHOICES = ("tables", "figures", *(part.name for part in PARTS))
 """Values of `--only`."""
 
 
-def chosen(only: str | None) -> tuple[Part, ...]:
+def chosen(only: str | None) -> tuple[ReportPart, ...]:
     """Return the parts that are to be run."""
     if only in (None, "figures"):
         return PARTS
@@ -85,7 +85,7 @@ TOPOLOGY = "topology"
 class PartResult:
     """Findings, verdicts and files of one part."""
 
-    part: Part
+    part: ReportPart
     found: Findings
     verdicts: Sequence[Verdict]
     tables: tuple[PaperTable, ...]
@@ -114,7 +114,7 @@ class Work:
 
     def __init__(
         self,
-        parts: tuple[Part, ...],
+        parts: tuple[ReportPart, ...],
         driver: Literal["processes", "inprocess"],
         folder: Path,
         seed: int | None,
@@ -150,7 +150,7 @@ class Work:
             yield self._part(part, before, tell, figures)
             before += self._length(part)
 
-    def _part(self, part: Part, before: float, tell: TellPart, figures: bool) -> PartResult:
+    def _part(self, part: ReportPart, before: float, tell: TellPart, figures: bool) -> PartResult:
         wall, cpu = perf_counter(), sum(os.times()[:4])
         length = self._length(part)
         do = self._topology if part.name == TOPOLOGY else self._scenario
@@ -176,14 +176,14 @@ class Work:
             cpu_s=sum(os.times()[:4]) - cpu,
         )
 
-    def _length(self, part: Part) -> float:
+    def _length(self, part: ReportPart) -> float:
         """Return the seconds that are simulated in all runs of a part."""
         if part.name == TOPOLOGY:
             return END_S * sum(1 for _ in graphs(9, self.seed))
         scenario = self._loaded[part.name].spec
         return scenario.time.end_s * len(scenario.cases)
 
-    def _scenario(self, part: Part, folder: Path, tell: Tell) -> _PartOutput:
+    def _scenario(self, part: ReportPart, folder: Path, tell: Tell) -> _PartOutput:
         scenario = self._loaded[part.name]
         order = list(scenario.cases)
 
@@ -193,7 +193,7 @@ class Work:
         run = scenario.run(driver=self.driver, progress=note, folder=folder)
         return run.findings, run.sha256, run.numbers, run.plot
 
-    def _topology(self, part: Part, folder: Path, tell: Tell) -> _PartOutput:
+    def _topology(self, part: ReportPart, folder: Path, tell: Tell) -> _PartOutput:
         found = topology_study(self.seed, tell, jobs=self.jobs)
         return found, {}, None, lambda _: topologies(found.graphs)
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from gridpeers.plant.equipment import Feeder, Switch
 from gridpeers.plant.equipment.connectivity import Connectivity
-from gridpeers.scenarios.results.plots.places import Label, Places, has_coordinates, label_sides, places
+from gridpeers.scenarios.results.plots.places import PlacedLabel, Places, has_coordinates, label_sides, places
 from gridpeers.wire.wording import counted
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
@@ -101,19 +101,21 @@ def _middle(switch: Switch, at: Places) -> tuple[float, float]:
 
 def _draw_labels(feeder: Feeder, at: Places, axes: Axes) -> None:
     """Write the names of marks where they cover least, then those of buses where they cover nothing."""
-    marked: list[Label] = []
+    marked: list[PlacedLabel] = []
     if feeder.source is not None:
-        marked.append(Label("substation", 10.0, at[feeder.source.bus], 9.0))
+        marked.append(PlacedLabel("substation", 10.0, at[feeder.source.bus], 9.0))
     inverters = (*feeder.inverters, *feeder.spares)
     if len(feeder.inverters) <= MOST_LABELS:
-        marked += [Label(f"{row.name}{' (spare)' * row.spare}", 10.0, at[row.bus], 8.0, bold=True) for row in inverters]
+        marked += [
+            PlacedLabel(f"{row.name}{' (spare)' * row.spare}", 10.0, at[row.bus], 8.0, bold=True) for row in inverters
+        ]
     loads: list[str] = []
     if len(feeder.buses) <= MANY:
-        marked += [Label(one.alias or one.name, 7.5, _middle(one, at), 6.0) for one in feeder.switches]
+        marked += [PlacedLabel(one.alias or one.name, 7.5, _middle(one, at), 6.0) for one in feeder.switches]
         loads = list(feeder.load_by_bus())
         taken = {row.bus for row in inverters} | ({feeder.source.bus} if feeder.source else set())
         names = dict.fromkeys((*loads, *(bus.name for bus in feeder.buses)))
-        marked += [Label(bus, 5.5, at[bus], 4.0, optional=True) for bus in names if bus not in taken]
+        marked += [PlacedLabel(bus, 5.5, at[bus], 4.0, optional=True) for bus in names if bus not in taken]
     axes.figure.draw_without_rendering()  # type: ignore[union-attr]  # lays the figure out; subfigures are not used
     ends = [(a, b) for a, b, _ in feeder.branches()] + [(one.from_bus, one.to_bus) for one in feeder.switches]
     lines = _on_paper(axes, [at[bus] for pair in ends for bus in pair]).reshape(-1, 4)

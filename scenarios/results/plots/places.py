@@ -85,7 +85,7 @@ PREFERENCE = 0.05  # Length of covered line (pt) that is as bad as the next side
 WORD, MARK = 20.0, 6.0  # Lengths (pt) as bad as a covered square point of another label, or of a mark
 
 
-class Label(NamedTuple):
+class PlacedLabel(NamedTuple):
     text: str
     size: float
     """Of its type (pt)."""
@@ -98,7 +98,7 @@ class Label(NamedTuple):
     bold: bool = False
 
 
-def label_sides(labels: Sequence[Label], lines: Points, marks: Points) -> list[tuple[int, int] | None]:
+def label_sides(labels: Sequence[PlacedLabel], lines: Points, marks: Points) -> list[tuple[int, int] | None]:
     """Return the side of its mark on which each label stands, one of `SIDES`; those that come first choose first.
 
     None stands for an optional label that has no room. `lines` has x and y of both ends, shape (n, 4); `marks`, also
@@ -117,7 +117,7 @@ def label_sides(labels: Sequence[Label], lines: Points, marks: Points) -> list[t
     return chosen
 
 
-def _box(label: Label, side: tuple[int, int]) -> Points:
+def _box(label: PlacedLabel, side: tuple[int, int]) -> Points:
     """Return the left, lower, right and upper edge of a label (pt)."""
     width, height = WIDTH * label.size * len(label.text), HEIGHT * label.size
     gap = label.gap if 0 in side else 0.7 * label.gap

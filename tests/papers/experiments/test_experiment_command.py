@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from gridpeers.papers.singhal2022.experiments import EXPERIMENTS
-from gridpeers.papers.singhal2022.experiments.experiment_output import Curve, ExperimentResult, Page, Panel
+from gridpeers.papers.singhal2022.experiments.experiment_output import Curve, ExperimentResult, PlotPage, PlotPanel
 from tests import command_line
 
 DOCS = Path(__file__).parents[3] / "docs"
@@ -45,7 +45,7 @@ def test_a_result_is_a_figure_and_the_same_table_twice(tmp_path: Path) -> None:
     """A value that was never reached is written as never, and drawn at the edge."""
     x = np.array([0.0, 0.1, 1.0])
     curves = [Curve(x=x, y=np.array([1.0, 2.0, np.inf]), style=0), Curve(x=x, y=x + 1.0, style=1, look="predicted")]
-    panel = Panel(
+    panel = PlotPanel(
         title="a",
         x_label="x (s)",
         y_label="y (s)",
@@ -56,7 +56,7 @@ def test_a_result_is_a_figure_and_the_same_table_twice(tmp_path: Path) -> None:
     )
     rows = [{"x (s)": 0.0, "y (s)": 1.0}, {"x (s)": 1.0, "y (s)": np.inf}]
 
-    ExperimentResult(Page(title="t", panels=[panel], columns=1, names={0: "one"}), rows).write(tmp_path)
+    ExperimentResult(PlotPage(title="t", panels=[panel], columns=1, names={0: "one"}), rows).write(tmp_path)
 
     assert (tmp_path / "figure.png").read_bytes().startswith(b"\x89PNG")
     assert (tmp_path / "table.csv").read_text() == "x (s),y (s)\n0.0,1.0\n1.0,never\n"

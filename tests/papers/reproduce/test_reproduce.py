@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from gridpeers.papers.singhal2022.paper_benchmarks import CLAIMS, within
-from gridpeers.papers.singhal2022.reproduce.report import Reproduction, lines, metrics_json, render, settings
+from gridpeers.papers.singhal2022.reproduce.paper_report import Reproduction, lines, metrics_json, render, settings
 from gridpeers.papers.singhal2022.reproduce.studies import graphs
-from gridpeers.papers.singhal2022.reproduce.work import CHOICES, PARTS, Part, PartResult, chosen
+from gridpeers.papers.singhal2022.reproduce.work import CHOICES, PARTS, PartResult, ReportPart, chosen
 from gridpeers.papers.singhal2022.tables import TABLES, Cell, tables_of
 from gridpeers.scenarios.results.claims import judge
 from gridpeers.scenarios.results.findings import Findings
@@ -18,7 +18,7 @@ from gridpeers.scenarios.results.metrics import Steady
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.sweep.axes import algebraic_connectivity
 
-ISLANDING: Part = PARTS[0]
+ISLANDING: ReportPart = PARTS[0]
 PIXEL = bytes.fromhex(
     "89504e470d0a1a0a0000000d49484452000000010000000108060000001f15c489"
     "0000000d49444154789c6360000002000001e221bc330000000049454e44ae426082"

@@ -23,7 +23,7 @@ from gridpeers.scenarios.live.run_address import (
 from gridpeers.scenarios.live.run_client import NobodyError, RunClient
 from gridpeers.wire.driver.inbox import Inbox
 from gridpeers.wire.keys import Keys
-from gridpeers.wire.trust.credentials import Credentials, Member
+from gridpeers.wire.trust.credentials import Credentials, SiteMember
 
 
 @pytest.mark.parametrize("run", ["a/b", "", "a*", "$", "run 1", "x" * 65, "@run", "é"])
@@ -126,7 +126,7 @@ class Clock:
 
 Waiting = Callable[..., list[str]]
 
-INV1 = Member(name="inv1", role="agent")
+INV1 = SiteMember(name="inv1", role="agent")
 SHOWN = Credentials(own=INV1, ca="ca.pem", certificate="inv1.pem", key="inv1.key", members=(INV1,))
 
 

@@ -13,7 +13,7 @@ from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.equipment.derived_feeders import joined_copies
 from gridpeers.plant.tables import read_feeder
 from gridpeers.scenarios.results.plots.feeder_diagram import feeder_diagram
-from gridpeers.scenarios.results.plots.places import Label, label_sides
+from gridpeers.scenarios.results.plots.places import PlacedLabel, label_sides
 
 Place = tuple[float, float]
 
@@ -75,7 +75,7 @@ def test_no_word_covers_another_and_none_of_the_substation_lies_on_a_branch(name
 @pytest.mark.parametrize("degrees", [(90,), (0, 90, 180), (80, -80, 180)])
 def test_a_word_stands_where_no_branch_leads(degrees: tuple[int, ...]) -> None:
     """However branches lead away from a mark, its word is on none of them."""
-    label = Label("substation", 10.0, (30.0, 40.0), 9.0)
+    label = PlacedLabel("substation", 10.0, (30.0, 40.0), 9.0)
     lines = np.array([(30.0, 40.0, 30.0 + 200.0 * cos(radians(d)), 40.0 + 200.0 * sin(radians(d))) for d in degrees])
 
     (side,) = label_sides([label], lines, np.array([[30.0, 40.0, 5.0]]))
@@ -93,7 +93,7 @@ def test_a_word_stands_where_no_branch_leads(degrees: tuple[int, ...]) -> None:
 def test_the_name_of_a_bus_that_has_no_room_is_left_out() -> None:
     """Branches on all sides leave no room for what is optional; everything else has its place."""
     star = [(0.0, 0.0, 50.0 * cos(radians(d)), 50.0 * sin(radians(d))) for d in range(0, 360, 15)]
-    needed = Label("inv1", 10.0, (0.0, 0.0), 8.0)
+    needed = PlacedLabel("inv1", 10.0, (0.0, 0.0), 8.0)
 
     assert label_sides([needed, needed._replace(optional=True)], np.array(star), np.empty((0, 3)))[1] is None
     assert label_sides([needed._replace(optional=True)], np.empty((0, 4)), np.empty((0, 3))) == [(1, 1)]

@@ -15,14 +15,14 @@ from gridpeers.wire.keys import KEY_SPECS, Keys, Role
 from gridpeers.wire.trust.credentials import (
     Credentials,
     LinkCertificates,
-    Member,
     Rule,
+    SiteMember,
     access_control,
     rules_between,
 )
 
-PLANT, OPERATOR, VIEWER = (Member(name=role, role=role) for role in ("plant", "operator", "viewer"))
-INV1, INV2, INV3 = (Member(name=f"inv{k}", role="agent") for k in (1, 2, 3))
+PLANT, OPERATOR, VIEWER = (SiteMember(name=role, role=role) for role in ("plant", "operator", "viewer"))
+INV1, INV2, INV3 = (SiteMember(name=f"inv{k}", role="agent") for k in (1, 2, 3))
 ALL = (PLANT, OPERATOR, VIEWER, INV1, INV2, INV3)
 DEMO = Keys("demo")
 CONCRETE = tuple(
@@ -42,7 +42,7 @@ def allowed(rules: list[Rule], flow: str, message: str, key: str) -> int:
     )
 
 
-def puts(sender: Member, receiver: Member, *, star: bool = False) -> set[str]:
+def puts(sender: SiteMember, receiver: SiteMember, *, star: bool = False) -> set[str]:
     rules = rules_between(receiver, sender, star=star)
     return {"/".join(key.split("/")[2:]) for key in CONCRETE if allowed(rules, "ingress", "put", key)}
 
@@ -62,7 +62,7 @@ def test_both_ends_of_a_link_allow_the_same_and_no_two_rules_can_apply_to_one_me
 
 
 @given(st.permutations(ALL), st.sampled_from(ALL), st.booleans())
-def test_the_order_of_members_decides_nothing(members: list[Member], own: Member, star: bool) -> None:
+def test_the_order_of_members_decides_nothing(members: list[SiteMember], own: SiteMember, star: bool) -> None:
     """Any order gives the same bytes."""
     assert json.dumps(access_control(own, members, star=star)) == json.dumps(access_control(own, ALL, star=star))
 
@@ -96,7 +96,7 @@ def test_a_relay_passes_on_to_each_what_it_may_hear_and_takes_from_each_its_own(
 @pytest.mark.parametrize("role", ["plant", "agent", "operator", "viewer"])
 def test_nobody_holds_a_token_or_answers_a_query_for_another(role: Role) -> None:
     """Of tokens an agent holds its own; a nameplate is the agent's, a configuration the plant's, to whom it is for."""
-    member = Member(name="inv1" if role == "agent" else role, role=role)
+    member = SiteMember(name="inv1" if role == "agent" else role, role=role)
     rules = rules_between(INV2, member)
     held = {key for key in CONCRETE if allowed(rules, "ingress", "liveliness_token", key)}
     answered = {key for key in CONCRETE if allowed(rules, "ingress", "reply", key)}
@@ -115,7 +115,7 @@ def test_nobody_holds_a_token_or_answers_a_query_for_another(role: Role) -> None
 def test_an_agent_asks_for_no_configuration_but_its_own(star: bool) -> None:
     """Operators and viewers ask for all; of nameplates an agent asks for those of the others."""
 
-    def asked(member: Member, of: Member) -> set[str]:
+    def asked(member: SiteMember, of: SiteMember) -> set[str]:
         rules = rules_between(of, member, star=star)
         return {"/".join(key.split("/")[2:]) for key in CONCRETE if allowed(rules, "ingress", "query", key)}
 
@@ -129,10 +129,10 @@ def test_an_agent_asks_for_no_configuration_but_its_own(star: bool) -> None:
 
 def test_a_revoked_name_has_no_rule_until_its_next_certificate() -> None:
     """Its common name is no subject any more; the one of the next generation is, before and after it is issued."""
-    revoked = Member(name="inv1", role="agent", revoked=True)
-    again = Member(name="inv1", role="agent", generation=2)
+    revoked = SiteMember(name="inv1", role="agent", revoked=True)
+    again = SiteMember(name="inv1", role="agent", generation=2)
 
-    def names(*members: Member) -> list[list[str]]:
+    def names(*members: SiteMember) -> list[list[str]]:
         return [subject["cert_common_names"] for subject in access_control(PLANT, members)["subjects"]]
 
     assert names(INV1) == [["agent:inv1", "agent:inv1:2"]]
@@ -142,7 +142,7 @@ def test_a_revoked_name_has_no_rule_until_its_next_certificate() -> None:
 
 def test_an_agent_whose_certificate_comes_later_has_its_rules_now() -> None:
     """Inverters of the feeder are subjects though nobody has their certificates; a name with another role keeps it."""
-    known = (PLANT, Member(name="inv2", role="viewer"))
+    known = (PLANT, SiteMember(name="inv2", role="viewer"))
     later = msgspec.structs.replace(SHOWN, members=known).knowing(("inv1", "inv2"))
 
     subjects = [subject["id"] for subject in access_control(INV3, later.members)["subjects"]]
@@ -150,8 +150,8 @@ def test_an_agent_whose_certificate_comes_later_has_its_rules_now() -> None:
     assert subjects == ["agent:inv1", "plant:plant", "viewer:inv2"]
 
 
-REVOKED = Member(name="eve", role="operator", revoked=True)
-PLANTS = (Member(name="plant", role="plant"), Member(name="second", role="plant", generation=3))
+REVOKED = SiteMember(name="eve", role="operator", revoked=True)
+PLANTS = (SiteMember(name="plant", role="plant"), SiteMember(name="second", role="plant", generation=3))
 SHOWN = Credentials(
     own=INV1, ca="ca.pem", certificate="inv1.pem", key="inv1.key", members=(INV1, REVOKED, *PLANTS)
 ).knowing(("inv1", "inv2"))

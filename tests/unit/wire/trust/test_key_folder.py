@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from gridpeers.wire.trust.credentials import Credentials, Member
+from gridpeers.wire.trust.credentials import Credentials, SiteMember
 
 pytest.importorskip("cryptography", reason="certificates need the extra keys")
 
@@ -204,7 +204,7 @@ def test_a_new_certificate_after_a_revoked_one_has_another_common_name(lab: Path
 
 
 def shown(site: Path, ca: Path | None = None) -> Credentials:
-    own = Member(name="inv1", role="agent")
+    own = SiteMember(name="inv1", role="agent")
     certificate, key = str(site / "inv1.pem"), str(site / "inv1.key")
     return Credentials(own=own, ca=str(ca or site / "ca.pem"), certificate=certificate, key=key, members=())
 

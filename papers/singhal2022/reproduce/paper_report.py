@@ -82,7 +82,7 @@ def settings(scenarios: Mapping[str, ScenarioModel]) -> list[tuple[str, str, str
     return rows
 
 
-class Entry(NamedTuple):
+class TableEntry(NamedTuple):
     """One number beside the paper's."""
 
     paper: str
@@ -97,9 +97,9 @@ class Entry(NamedTuple):
 _CASES = {"I": "no control", "II": "un-coordinated", "III": "GFM-coordinated", "IV": "fully coordinated"}
 
 
-def lines(table: PaperTable, result: PartResult) -> dict[str, list[Entry]]:
+def lines(table: PaperTable, result: PartResult) -> dict[str, list[TableEntry]]:
     """Return the rows of a table by their case or island and event, in the paper's order."""
-    rows: dict[str, list[Entry]] = {}
+    rows: dict[str, list[TableEntry]] = {}
     for cell in table.cells:
         what = f"island of {cell.island}" if cell.island else f"{cell.case} {_CASES.get(cell.case, '')}".rstrip()
         label = f"{what}, {cell.event}" if len(table.events) > 1 else what
@@ -121,7 +121,7 @@ def tolerances(table: PaperTable) -> list[str]:
     return found
 
 
-def _entry(cell: Cell, result: PartResult) -> Entry:
+def _entry(cell: Cell, result: PartResult) -> TableEntry:
     reason = result.found.reason(cell)
     ours = float("nan") if reason else result.found.value(cell)
     digits, paper = cell.digits + 1, f"{cell.paper:.{cell.digits}f}"
@@ -132,10 +132,10 @@ def _entry(cell: Cell, result: PartResult) -> Entry:
     }
     judged = tuple((name, holds) for name, holds in by.items() if holds is not None)
     if reason:
-        return Entry(paper, reason.partition(":")[0], "-", judged)
+        return TableEntry(paper, reason.partition(":")[0], "-", judged)
     off = round(ours - cell.paper, digits) + 0.0  # no "-0.000"
     times = f" ({ours / cell.paper:.2g} times)" if cell.tolerance.value is None else ""
-    return Entry(paper, f"{ours:.{digits}f}", f"{off:+.{digits}f}{times}", judged)
+    return TableEntry(paper, f"{ours:.{digits}f}", f"{off:+.{digits}f}{times}", judged)
 
 
 PAPER = (
