@@ -9,7 +9,6 @@ from __future__ import annotations
 import dataclasses
 import traceback
 from collections.abc import Callable
-from contextlib import ExitStack
 from datetime import datetime
 from importlib import import_module
 from pathlib import Path
@@ -24,16 +23,14 @@ from gridpeers.plant.simulators import SIMULATORS
 from gridpeers.scenarios.checks.check_registry import ALWAYS, CHECKS
 from gridpeers.scenarios.drivers.free_endpoint import local_endpoint
 from gridpeers.scenarios.record.record_info import RecordInfo
-from gridpeers.scenarios.results.claims import NO_BENCHMARK, benchmark_of
 from gridpeers.scenarios.results.figure_processes import drawn_on_all_cores, prepare_figures
-from gridpeers.scenarios.results.metrics_file import case_facts, metrics_json
+from gridpeers.scenarios.results.metrics_file import case_facts
 from gridpeers.scenarios.results.record import Recorded, Recorder, RecordError
 from gridpeers.scenarios.results.recorded_events import ended_by_a_law
 from gridpeers.scenarios.results.run_files import broken_if_ended, no_room, refusal, set_complete, shown, write_whole
 from gridpeers.scenarios.run_request import BrokenRunError, LawStopError, Outcome, Progress, Request
 from gridpeers.scenarios.schema.configs import configs, secured
 from gridpeers.scenarios.schema.participants import inverters_of
-from gridpeers.scenarios.schema.plugin_keys import claims_of
 from gridpeers.scenarios.schema.scenario_writing import to_toml
 from gridpeers.scenarios.versions import version_of, versions
 from gridpeers.wire.driver.ending import OutputLostError
@@ -46,10 +43,7 @@ if TYPE_CHECKING:
     from gridpeers.scenarios.live.departures import Departures
     from gridpeers.scenarios.results.report import RunReport
 
-_AFTER_RUN = (
-    *("results.findings", "results.claims", "results.report"),
-    *("results.plots.drawing", "checks.judging"),
-)
+_AFTER_RUN = ("measured_run", "results.plots.drawing")
 """Modules that are used after a run, and imported while it goes on: this process has little to do then."""
 
 
@@ -93,7 +87,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
     pacing: dict[str, Pacing] = {}
     for case in scenario.cases:
         recorded[case], outcome = run_case(request, case, text, progress)
-        from gridpeers.scenarios.results.history import as_they_came, late_moves
+        from gridpeers.scenarios.results.history import late_moves
 
         notes += [f"case {case}: {note}" for note in (*outcome.notes, *recorded[case].link_lines)]
         if outcome.pacing is not None:
@@ -108,18 +102,13 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
             file=log,
             flush=True,
         )
-    from gridpeers.scenarios.checks.check_verdict import FILE, verdicts_json
     from gridpeers.scenarios.checks.checked_case import CheckedCase
-    from gridpeers.scenarios.checks.judging import JudgingStop, judge_case
-    from gridpeers.scenarios.results.claims import judge, judged
-    from gridpeers.scenarios.results.findings import find
-    from gridpeers.scenarios.results.recorded_events import law_failures
-    from gridpeers.scenarios.results.report import RunReport, plain
+    from gridpeers.scenarios.checks.judging import JudgingStop
+    from gridpeers.scenarios.measured_run import write_measures
 
     cases = {
         case: CheckedCase.of(scenario, request.feeder, case, record, folder / case) for case, record in recorded.items()
     }
-    findings = find(cases)
     compared: dict[str, Departures] = {}
     if request.clock == "wall":
         from gridpeers.scenarios.live.departures import compare
@@ -127,50 +116,31 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
         for case, record in recorded.items():
             one_case = replace(scenario, cases={case: scenario.cases[case]})
             compared[case] = compare(one_case, request.feeder, record.events, record.ended)
-    disturbed = any(one.disturbed for one in compared.values())
+        notes += [f"case {case}: {one.note}" for case, one in compared.items() if one.note]
+        notes.append("in wall-clock time no two runs are the same: each has its own delays")
     facts = {}
     for case, record in recorded.items():
         unlike: dict[str, Any] = {}
-        if one := compared.get(case):
-            labels = [window.label for window in one.disturbed]
-            unlike = {"disturbed": labels, "departures": one.lines()} if one.events else {}
-            notes += [f"case {case}: {one.note}"] if one.note else []
+        if (one := compared.get(case)) and one.events:
+            unlike = {"disturbed": [window.label for window in one.disturbed], "departures": one.lines}
         if saved := cases[case].messages_saved:
             shares = ", ".join(f"{100.0 * share:.0f} % in {window}" for window, share in saved.items())
             notes.append(f"case {case}: states not sent to neighbours: {shares}")
+        if request.clock == "simulated" and not record.reproducible:
+            notes.append(f"case {case} cannot be reproduced: something happened in it that the scenario does not have")
         facts[case] = case_facts(record, pacing.get(case), **unlike)
-    write_whole(folder / "metrics.json", metrics_json(request, findings, facts))
-    stop = JudgingStop()
-    checks = {name: judge_case(case, stop) for name, case in cases.items()}
-    write_whole(folder / FILE, verdicts_json(checks))
-    if request.clock == "wall":
-        notes.append("in wall-clock time no two runs are the same: each has its own delays")
-    else:
-        why = "something happened in it that the scenario does not have"
-        unlike_any = [case for case, one in recorded.items() if not one.reproducible]
-        notes += [f"case {case} cannot be reproduced: {why}" for case in unlike_any]
-    with ExitStack() as beside:
-        if request.lasting and stop.raised is None:
-            from gridpeers.scenarios.results.plots.drawing import drawing_of
 
-            last = recorded[list(recorded)[-1]]  # in wall-clock time each case has its own events
-            drawing = drawing_of(scenario, cases, as_they_came(scenario, last.events))
-            beside.enter_context(drawn_on_all_cores(drawing, folder / "plots"))
-        benchmark = NO_BENCHMARK if disturbed else benchmark_of(scenario.paper)
-        own = () if disturbed else judged(findings, claims_of(scenario))
-        report = RunReport(
-            scenario=scenario.name,
-            titles={case: rule.title for case, rule in scenario.cases.items()},
-            findings=findings,
-            verdicts=(*judge(findings, benchmark.claims), *own),
-            benchmark=benchmark,
-            checks=checks,
-            failures={case: law_failures(record.events) for case, record in recorded.items()},
-            notes=notes,
-            folder=place + "/" if request.lasting else "",
-        )
-        write_whole(folder / "report.txt", plain(report))
+    disturbed = any(one.disturbed for one in compared.values())
+    stop, where = JudgingStop(), place + "/" if request.lasting else ""
+    report = write_measures(request, cases, facts, notes, stop, place=where, disturbed=disturbed, claims=True)
     stop.end()
+    if request.lasting:
+        from gridpeers.scenarios.results.history import as_they_came
+        from gridpeers.scenarios.results.plots.drawing import drawing_of
+
+        last = recorded[list(recorded)[-1]]  # in wall-clock time each case has its own events
+        with drawn_on_all_cores(drawing_of(scenario, cases, as_they_came(scenario, last.events)), folder / "plots"):
+            pass
     ended_early = {case: record.record_failure for case, record in recorded.items() if record.record_failure}
     set_complete(folder, (f"case {case}: {why}" for case, why in ended_early.items()))
     return report

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.equipment.connectivity import switch_names
@@ -37,33 +37,28 @@ def few(lines: Sequence[str]) -> str:
     return f"{'; '.join(lines[:_SHOWN])}{more}"
 
 
-State = Literal["measured", "too_short", "not_reached", "unrecorded"]
-"""A window is "too_short" if the next event ended it before values can be steady, and "unrecorded" if rows are missing
-at its end, where it is measured."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class Departures:
     events: tuple[PlantEvent, ...]
     live: Mapping[str, str]
-    """By label, the operations of each event that people made."""
-    windows: tuple[tuple[Window, State], ...]
+    """By label of the window, the operations that people made at its start."""
+    measured: tuple[Window, ...]
+    unmeasured: tuple[Window, ...]
+    """Windows that the run did not finish, that are too short to be steady, or without rows at their end."""
     disturbed: tuple[Window, ...]
     """Measured windows of the scenario that end after the first departure, or miss rows."""
 
-    def those(self, *states: State) -> tuple[Window, ...]:
-        return tuple(window for window, state in self.windows if state in states)
-
-    def lines(self, end: float = inf) -> list[str]:
-        return [line_of(event).strip() for event in self.events if event.t < end]
+    @property
+    def lines(self) -> list[str]:
+        return [line_of(event).strip() for event in self.events]
 
     @property
     def note(self) -> str:
         if not self.disturbed:
             return ""
-        lines = self.lines(self.disturbed[-1].end) or ["rows that are missing"]
         names = ", ".join(window.label for window in self.disturbed)
-        return f"{names}: disturbed by what the scenario does not have: {few(lines)}"
+        before = [line_of(event).strip() for event in self.events if event.t < self.disturbed[-1].end]
+        return f"{names}: disturbed by what the scenario does not have: {few(before or ['rows that are missing'])}"
 
 
 def compare(
@@ -75,48 +70,39 @@ def compare(
 ) -> Departures:
     """Compare a run of one case, whose last row was at `ended` (s), with its scenario.
 
-    A live event opens a window, which lasts to the next event or to the end of the run, and ends the one before it. At
-    the moment of an event of the scenario it belongs to the window of that event. `missing` has the times (s) of the
-    rows before and after each interval without rows.
+    A switch or load that people operate opens a window, which lasts to the next event or to the end of the run, and
+    ends the one before it. At the moment of an event of the scenario it belongs to the window of that event. `missing`
+    has the times (s) of the rows before and after each interval without rows.
     """
-    meant = windows([(event.label, event.t_s) for event in scenario.events], scenario.time.end_s)
-    scripted = windows(as_they_came(scenario, events), scenario.time.end_s)
-    departures = sorted(_departures(scenario, feeder, events, meant, ended), key=lambda one: one.t)
-    switched = [event for event in departures if event.kind in ("switch", "load")]
-    live = {t: f"live at {round(t, 3):.12g} s" for t in dict.fromkeys(event.t for event in switched)}
-    starts = [window.start for window in scripted]
-    opening = [t for t in live if all(abs(t - start) > NEAR for start in starts)]
-    starts += opening
-    came, not_reached = [], []
-    for plan, window in zip(meant, scripted, strict=True):
-        cut = [t for t in opening if window.start < t < window.end - NEAR]
-        if cut or plan.end <= ended + NEAR:
-            came.append(replace(window, end=cut[0]) if cut else window)
-        else:
-            not_reached.append(plan)
-    for t in opening:
-        end = min((start for start in starts if start > t), default=ended)
-        came.append(Window(label=live[t], start=t, end=min(end, ended)))
-    shortest = max(STEADY, 2.0 * scenario.time.record_s) - NEAR
-
-    def state(window: Window) -> State:
-        if window not in scripted and window.end - window.start < shortest:
-            return "too_short"
+    departures = sorted(_departures(scenario, feeder, events, ended), key=lambda one: one.t)
+    came = as_they_came(scenario, events)
+    scripted = {window.label: window for window in windows(came, scenario.time.end_s)}
+    live: dict[float, list[str]] = {}
+    for event in departures:
+        if event.kind in ("switch", "load"):
+            live.setdefault(event.t, []).append(event.text)
+    labels = {t: f"live at {round(t, 3):.12g} s" for t in live}
+    opened = [(label, t) for t, label in labels.items() if all(abs(t - start) > NEAR for _, start in came)]
+    measured, unmeasured = list[Window](), list[Window]()
+    for window in windows(sorted([*came, *opened], key=lambda one: one[1]), inf):
+        plan = scripted.get(window.label)
+        window = replace(window, end=min(window.end, ended if plan is None else plan.end))
+        whole = window.end <= ended + NEAR and (
+            window == plan or window.end - window.start >= max(STEADY, 2.0 * scenario.time.record_s) - NEAR
+        )
         holed = any(a < window.end and b > window.end - STEADY - NEAR for a, b in missing)
-        return "unrecorded" if holed else "measured"
-
-    reached = [(window, state(window)) for window in sorted(came, key=lambda window: window.start)]
-    measured = {window.label for window, state in reached if state == "measured"}
-    first = departures[0].t if departures else ended
+        (measured if whole and not holed else unmeasured).append(window)
+    first = departures[0].t if departures else inf
     return Departures(
         events=tuple(departures),
-        live={label: "; ".join(one.text for one in switched if one.t == t) for t, label in live.items()},
-        windows=(*reached, *((window, "not_reached") for window in not_reached)),
+        live={labels[t]: "; ".join(texts) for t, texts in live.items()},
+        measured=tuple(measured),
+        unmeasured=tuple(unmeasured),
         disturbed=tuple(
             window
-            for window in meant
-            if window.label in measured
-            and (first < window.end - NEAR or any(a < window.end and b > window.start for a, b in missing))
+            for window in measured
+            if (plan := scripted.get(window.label)) is not None
+            and (first < plan.end - NEAR or any(a < plan.end and b > plan.start for a, b in missing))
         ),
     )
 
@@ -130,42 +116,35 @@ class _Planned(NamedTuple):
     since: float
     until: float
     """Times (s) between which it may happen."""
-    complaint: str = ""
-    """Text of the departure if people, or the driver, have not done it in time; "" if it need not happen."""
 
 
-def _planned(
-    scenario: ScenarioModel, feeder: Feeder, switches: Mapping[str, str], meant: Sequence[Window]
-) -> Iterator[_Planned]:
-    loads = named_loads(feeder)
-    for event, window in zip(scenario.events, meant, strict=True):
-        t, start, end = event.t_s, window.start, window.end
-        latest = t + (scenario.plant.sync_check.timeout if event.synchronised else 0.0)
+def _planned(scenario: ScenarioModel, feeder: Feeder) -> Iterator[_Planned]:
+    switches, loads = switch_names(feeder), named_loads(feeder)
+    ends = [*(event.t_s for event in scenario.events), scenario.time.end_s][1:]
+    for event, end in zip(scenario.events, ends, strict=True):
+        t, latest = event.t_s, event.t_s + (scenario.plant.sync_check.timeout if event.synchronised else 0.0)
         yield from (_Planned("opened", switches[name], t, t + NEAR) for name in event.open)
         yield from (_Planned("closed", switches[name], t, latest + NEAR) for name in event.close)
         yield from (_Planned("load", load_name(loads, text), t, t + NEAR) for text in event.load)
-        for name in event.leave:
-            yield _Planned("left", name, start, end, f"{name} was to leave, and nobody had it leave in time")
-        for name in event.join:
-            yield _Planned("joined", name, start, end, f"{name} was to join, and nobody started it in time")
+        yield from (_Planned("left", name, t, end) for name in event.leave)
+        yield from (_Planned("joined", name, t, end) for name in event.join)
     (case,) = scenario.cases
     for node in netem_of(scenario, case).nodes:
-        if node.kill:
-            yield _Planned("died", node.name, node.from_s, inf, f"{node.name} was to be killed, and was not")
-        elif node.pause:  # an agent paused for longer than Zenoh's lease counts as dead, until it goes on
-            yield from (_Planned(done, node.name, node.from_s, inf) for done in ("died", "joined"))
+        if node.kill or node.pause:
+            yield _Planned("died", node.name, node.from_s, inf)
+        if node.pause:  # an agent paused for longer than Zenoh's lease counts as dead, until it goes on
+            yield _Planned("joined", node.name, node.from_s, inf)
 
 
 def _departures(
-    scenario: ScenarioModel, feeder: Feeder, events: Sequence[PlantEvent], meant: Sequence[Window], ended: float
+    scenario: ScenarioModel, feeder: Feeder, events: Sequence[PlantEvent], ended: float
 ) -> Iterator[PlantEvent]:
-    """Yield each event that the scenario does not have, and one for each change that people left undone."""
-    switches = switch_names(feeder)
-    planned = [*_planned(scenario, feeder, switches, meant)]
+    """Yield each event that the scenario does not have, and one for each agent that did not leave or join in time."""
+    switches, planned = switch_names(feeder), [*_planned(scenario, feeder)]
     (case,) = scenario.cases
     netem = netem_of(scenario, case)
     faults = [entry for entries in LISTS for entry in getattr(netem, entries.name)]
-    first = {row.name for row in feeder.inverters}
+    first, came = {row.name for row in feeder.inverters}, set[_Planned]()
     for event in events:
         done, name = "", event.subject
         if event.kind in ("switch", "load") and event.text.endswith(" already"):
@@ -185,13 +164,14 @@ def _departures(
                 continue  # another event, "started without", names the agents that are absent at the start
         elif (event.kind, name) != ("link", "links"):
             continue
-        it = next(
-            (it for it in planned if (it.done, it.name) == (done, name) and it.since - NEAR <= event.t < it.until), None
-        )
-        if it is None:
+        it = [
+            it for it in planned if it[:2] == (done, name) and it.since - NEAR <= event.t < it.until and it not in came
+        ]
+        if not it:
             yield event
-        elif it.complaint:
-            planned.remove(it)
-    for it in planned:
-        if it.complaint and (it.since if it.until == inf else it.until) <= ended + NEAR:
-            yield PlantEvent(t=it.since, kind="roster", subject=it.name, text=it.complaint)
+        elif it[0].until < inf and done in ("left", "joined"):
+            came.add(it[0])
+    for one in planned:
+        if one.done in ("left", "joined") and one.until <= ended + NEAR and one not in came:
+            text = f"{one.name} was to {'leave' if one.done == 'left' else 'join'}, and did not in time"
+            yield PlantEvent(t=one.since, kind="roster", subject=one.name, text=text)

@@ -2,35 +2,28 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import msgspec
 
-from gridpeers.scenarios.checks.check_verdict import FILE, verdicts_json
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.checks.judging import JudgingStop, judge_case
+from gridpeers.scenarios.checks.judging import JudgingStop
 from gridpeers.scenarios.console import terminal
 from gridpeers.scenarios.live.departures import Departures, compare, few
 from gridpeers.scenarios.live.live_files import ended_scenario, write_scenario
 from gridpeers.scenarios.live.live_processes import ProcessOutcome
-from gridpeers.scenarios.results.claims import NO_BENCHMARK, benchmark_of
-from gridpeers.scenarios.results.findings import find
-from gridpeers.scenarios.results.history import Window, as_they_came, late_moves, messages_saved
+from gridpeers.scenarios.measured_run import write_measures
+from gridpeers.scenarios.results.history import as_they_came, late_moves, messages_saved
 from gridpeers.scenarios.results.island_membership import taken_part
-from gridpeers.scenarios.results.metrics_file import RunMetrics, case_facts, metrics_json
+from gridpeers.scenarios.results.metrics_file import RunMetrics, case_facts
 from gridpeers.scenarios.results.plots.drawing import Drawing, Mark, drawing_of
 from gridpeers.scenarios.results.record import Recorded
-from gridpeers.scenarios.results.recorded_events import law_failures
-from gridpeers.scenarios.results.report import RunReport, plain, show
-from gridpeers.scenarios.results.run_files import set_broken, set_complete, shown, write_whole
+from gridpeers.scenarios.results.report import RunReport, show
+from gridpeers.scenarios.results.run_files import set_broken, set_complete, shown
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.wire.driver.drive import StoppedError
 from gridpeers.wire.messages import Pacing, PlantEvent
-
-PRESENT = {"opened": "opens", "closed": "closes", "joined": "joins", "left": "leaves", "died": "dies"}
-"""Verbs of the plant's events, and the same in figures."""
 
 
 def live_drawing(departures: Departures, case: CheckedCase) -> Drawing:
@@ -45,23 +38,11 @@ def live_drawing(departures: Departures, case: CheckedCase) -> Drawing:
 
 
 def _marks(departures: Iterable[PlantEvent]) -> Iterator[Mark]:
-    by_time: dict[float, list[PlantEvent]] = {}
-    for event in departures:
-        if event.t > 0.0:
-            by_time.setdefault(event.t, []).append(event)
-    for t, of in by_time.items():
-        what = ", ".join(dict.fromkeys(text for event in of if (text := _in_short(event))))
-        yield Mark("live" if any(event.kind in ("switch", "load") for event in of) else "", t, what)
-
-
-def _in_short(event: PlantEvent) -> str:
-    """Return a departure in two words; "" if that takes more."""
-    if event.kind == "link":
-        return "links"
-    if event.kind == "load":
-        return f"load {event.subject}"
-    match = re.match(r"(?:switch )?(\S+)(?: \(.*\))? (opened|closed|joined|left|died)\b", event.text)
-    return f"{match[1]} {PRESENT[match[2]]}" if match else ""
+    """Yield a mark at each time at which people departed from the scenario, with the names of what they moved."""
+    for t in dict.fromkeys(event.t for event in departures if event.t > 0.0):
+        of = [event for event in departures if event.t == t]
+        label = "live" if any(event.kind in ("switch", "load") for event in of) else ""
+        yield Mark(label, t, ", ".join(dict.fromkeys(event.subject for event in of)))
 
 
 def write_report(metrics: RunMetrics, recorded: Recorded, pacing: Pacing | None, *, figures: bool = True) -> RunReport:
@@ -73,36 +54,25 @@ def write_report(metrics: RunMetrics, recorded: Recorded, pacing: Pacing | None,
     scenario, feeder, (case,) = metrics.scenario, metrics.feeder, metrics.scenario.cases
     departures = compare(scenario, feeder, recorded.events, recorded.ended, recorded.missing)
     whole = CheckedCase.of(scenario, feeder, case, recorded, metrics.folder / case)
-    measured = departures.those("measured")
-    saved = messages_saved(scenario, feeder, case, recorded.quiet, measured)
+    saved = messages_saved(scenario, feeder, case, recorded.quiet, departures.measured)
     rows = taken_part(scenario, feeder, whole.history)
-    taken = replace(whole, history=rows, windows=measured, messages_saved=saved)
-    findings = find({case: taken})
+    taken = replace(whole, history=rows, windows=departures.measured, messages_saved=saved)
     stop = JudgingStop(StoppedError, KeyboardInterrupt)
-    checks = {case: judge_case(taken, stop)}
-    report = RunReport(
-        scenario=scenario.name,
-        titles={case: scenario.cases[case].title},
-        findings=findings,
-        verdicts=(),
-        benchmark=NO_BENCHMARK if departures.disturbed else benchmark_of(scenario.paper),
-        checks=checks,
-        failures={case: law_failures(recorded.events)},
-        notes=[f"case {case}: {note}" for note in _notes(scenario, recorded, departures)],
-        folder=shown(metrics.folder) + "/",
+    report = write_measures(
+        metrics,
+        {case: taken},
+        {case: case_facts(recorded, pacing)},
+        [f"case {case}: {note}" for note in _notes(scenario, recorded, departures)],
+        stop,
+        place=shown(metrics.folder) + "/",
+        disturbed=bool(departures.disturbed),
+        live=_live_table(recorded, departures),
     )
-    facts = {case: case_facts(recorded, pacing)}
-    write_whole(
-        metrics.folder / "metrics.json", metrics_json(metrics, findings, facts, _live_table(recorded, departures))
-    )
-    write_whole(metrics.folder / FILE, verdicts_json(checks))
-    write_whole(metrics.folder / "report.txt", plain(report))
     stop.end()
-    if not figures:
-        return report
-    from gridpeers.scenarios.results.plots.run_figures import draw_all  # matplotlib takes longest to import
+    if figures:
+        from gridpeers.scenarios.results.plots.run_figures import draw_all  # matplotlib takes longest to import
 
-    draw_all(live_drawing(departures, taken), metrics.folder / "plots")
+        draw_all(live_drawing(departures, taken), metrics.folder / "plots")
     return report
 
 
@@ -111,52 +81,37 @@ def _live_table(recorded: Recorded, departures: Departures) -> dict[str, object]
         "ended_s": recorded.ended,
         "windows": {
             window.label: {"t_s": window.start, "end_s": window.end, "what": departures.live[window.label]}
-            for window in departures.those("measured")
+            for window in departures.measured
             if window.label in departures.live
         },
-        "too_short": _labels(departures.those("too_short")),
-        "not_reached": _labels(departures.those("not_reached")),
-        "disturbed": _labels(departures.disturbed),
-        "departures": departures.lines(),
+        "unmeasured": [window.label for window in departures.unmeasured],
+        "disturbed": [window.label for window in departures.disturbed],
+        "departures": departures.lines,
     }
-    if recorded.missing:
-        table["missing"] = [{"after_s": a, "before_s": b} for a, b in recorded.missing]
-        table["unrecorded"] = _labels(departures.those("unrecorded"))
-    return table
+    missing = [{"after_s": a, "before_s": b} for a, b in recorded.missing]
+    return table | ({"missing": missing} if missing else {})
 
 
 def _notes(scenario: ScenarioModel, recorded: Recorded, departures: Departures) -> Iterable[str]:
-    ended, end_s, measured = f"{recorded.ended:.2f} s", scenario.time.end_s, departures.those("measured")
+    end_s = scenario.time.end_s
     if not scenario.events and not departures.live:
         yield "the scenario has no event, and nobody made one, so there is no window to measure in"
-    elif not_reached := departures.those("not_reached"):
-        what = "they have no numbers" if measured else "nothing was measured"
-        yield f"ended at {ended}, before the end of {_named(not_reached)}: {what}"
-    elif end_s < recorded.ended and all(window.end <= end_s for window in measured):
-        yield f"measured up to {end_s:g} s, where the scenario ends; the history goes on to {ended}"
+    elif end_s < recorded.ended and all(window.end <= end_s for window in departures.measured):
+        yield f"measured up to {end_s:g} s, where the scenario ends; the history goes on to {recorded.ended:.2f} s"
+    if departures.unmeasured:
+        spans = ", ".join(f"{window.label} ({window.start:g} to {window.end:g} s)" for window in departures.unmeasured)
+        yield f"ended at {recorded.ended:.2f} s; not reached, too short, or without rows, so without numbers: {spans}"
     if departures.live:
         lines = [f"{label}: {what}" for label, what in departures.live.items()]
         yield f"events that the scenario does not have: {few(lines)}"
     if recorded.missing:
         spans = ", ".join(f"{before:.2f} and {after:.2f} s" for before, after in recorded.missing)
         yield f"rows are missing between {spans}, as the record was out of the plant's reach"
-    if unrecorded := departures.those("unrecorded"):
-        yield f"without rows where they are measured, so without numbers: {_named(unrecorded)}"
-    if too_short := departures.those("too_short"):
-        yield f"too short to be measured: {_named(too_short)}"
     if recorded.record_failure:
         yield f"{recorded.record_failure}; the run went on without it"
     yield from late_moves(scenario, recorded.events)
     if departures.note:
         yield departures.note
-
-
-def _labels(windows: Iterable[Window]) -> list[str]:
-    return [window.label for window in windows]
-
-
-def _named(windows: Iterable[Window]) -> str:
-    return ", ".join(f"{window.label} ({window.start:g} to {window.end:g} s)" for window in windows)
 
 
 def conclude(outcome: ProcessOutcome, metrics: RunMetrics) -> ProcessOutcome:

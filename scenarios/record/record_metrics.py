@@ -97,8 +97,8 @@ def _live(record: RunRecord, scenario: ScenarioModel, feeder: Feeder) -> _Measur
     history, events = record.physics(), record.events()
     end = float(history.t[-1])
     departures = compare(scenario, feeder, events, end)
-    left_out = departures.those("not_reached", "too_short")
+    left_out = departures.unmeasured
     notes = [f"the record ends at {end:.2f} s"] if end < scenario.time.end_s - 1e-9 else []
     notes += [f"not measured: {', '.join(window.label for window in left_out)}"] if left_out else []
     notes += [departures.note] if departures.note else []
-    return taken_part(scenario, feeder, history), departures.those("measured"), notes
+    return taken_part(scenario, feeder, history), departures.measured, notes

@@ -163,7 +163,7 @@ def test_up_stays_until_it_is_ended_and_leaves_no_process(desk: Desk) -> None:
     for child in children:
         with pytest.raises(ProcessLookupError):
             os.kill(child, 0)
-    up.expect(r"NOTE  case IV: ended at .* s, before the end of late \(0.6 to 3600 s\): they have no numbers")
+    up.expect(r"NOTE  case IV: ended at .* s; not reached, .* so without numbers: late \(0.6 to 3600 s\)")
     here = desk.folder / "here"
     events = (here / "IV" / "events.csv").read_text()
     assert " left" not in events
@@ -172,8 +172,7 @@ def test_up_stays_until_it_is_ended_and_leaves_no_process(desk: Desk) -> None:
     assert sorted(path.name for path in (here / "IV").iterdir()) == ["events.csv", "history.csv", "run.mcap"]
     metrics = json.loads((here / "metrics.json").read_text())
     assert metrics["live"] | {"ended_s": 0.0} == {
-        **{"ended_s": 0.0, "windows": {}, "too_short": []},
-        **{"not_reached": ["late"], "disturbed": [], "departures": []},
+        **{"ended_s": 0.0, "windows": {}, "unmeasured": ["late"], "disturbed": [], "departures": []},
     }
     early = metrics["cases"]["IV"]["early"]
     assert early["f_error_Hz"] is None  # 0.4 s after the event nothing is steady yet
