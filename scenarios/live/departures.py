@@ -1,26 +1,26 @@
-"""Departures of a run from its scenario: what people did or left undone, and the windows that it disturbs."""
+"""Departures of a run from its scenario: what people did, and the windows that it disturbs."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
-from typing import NamedTuple
 
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.equipment.connectivity import switch_names
 from gridpeers.plant.equipment.named_loads import load_name, named_loads
 from gridpeers.scenarios.live.run_monitor import line_of
 from gridpeers.scenarios.results.history import Window, as_they_came, windows
-from gridpeers.scenarios.results.island_membership import is_closed
 from gridpeers.scenarios.results.metrics import STEADY
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.scenarios.schema.participants import LISTS, netem_of
 from gridpeers.wire.messages import PlantEvent
 
 _SILENCE = re.compile(r"\S+ (is silent:|does not hear )")
-_AGAIN = re.compile(r"\S+ (is heard again|hears .* again)")
+_NOTHING = re.compile(r" already$|^\S+ (is heard again|hears .* again)")
+"""To open an open switch changes nothing; a silence has ended."""
 
 _NOTICED = 1.0
 """Time (s) after the end of a fault until which a silence is its doing: states have to come and to be reported."""
@@ -74,7 +74,7 @@ def compare(
     ends the one before it. At the moment of an event of the scenario it belongs to the window of that event. `missing`
     has the times (s) of the rows before and after each interval without rows.
     """
-    departures = sorted(_departures(scenario, feeder, events, ended), key=lambda one: one.t)
+    departures = sorted(_departures(scenario, feeder, events), key=lambda one: one.t)
     came = as_they_came(scenario, events)
     scripted = {window.label: window for window in windows(came, scenario.time.end_s)}
     live: dict[float, list[str]] = {}
@@ -107,71 +107,45 @@ def compare(
     )
 
 
-class _Planned(NamedTuple):
-    """A switch, a load or an agent that the scenario changes."""
+def _departures(scenario: ScenarioModel, feeder: Feeder, events: Iterable[PlantEvent]) -> Iterator[PlantEvent]:
+    """Yield each event that the scenario does not have: of a switch, a load or an agent at another time, or of links.
 
-    done: str
-    """As the plant's events say it: "closed", "opened", "load", "left", "joined" or "died"."""
-    name: str
-    since: float
-    until: float
-    """Times (s) between which it may happen."""
+    A fault of the scenario may silence agents, and kill or pause those that it names.
+    """
+    switches, planned, faults = switch_names(feeder), _planned(scenario, feeder), [*_faults(scenario)]
+    for event in events:
+        name = switches.get(event.subject, event.subject) if event.kind == "switch" else event.subject
+        if event.kind not in ("switch", "load", "roster") and (event.kind, name) != ("link", "links"):
+            continue
+        if _NOTHING.search(event.text) or (event.t == 0.0 and " joined" in event.text):
+            continue
+        times = planned.get(name, ()) if not _SILENCE.match(event.text) else faults
+        if not any(since - NEAR <= event.t < until + NEAR for since, until in times):
+            yield event
 
 
-def _planned(scenario: ScenarioModel, feeder: Feeder) -> Iterator[_Planned]:
+def _planned(scenario: ScenarioModel, feeder: Feeder) -> dict[str, list[tuple[float, float]]]:
+    """Return the times (s) within which the scenario moves a switch, a load or an agent, by its name."""
     switches, loads = switch_names(feeder), named_loads(feeder)
+    found = defaultdict[str, list[tuple[float, float]]](list)
     ends = [*(event.t_s for event in scenario.events), scenario.time.end_s][1:]
     for event, end in zip(scenario.events, ends, strict=True):
         t, latest = event.t_s, event.t_s + (scenario.plant.sync_check.timeout if event.synchronised else 0.0)
-        yield from (_Planned("opened", switches[name], t, t + NEAR) for name in event.open)
-        yield from (_Planned("closed", switches[name], t, latest + NEAR) for name in event.close)
-        yield from (_Planned("load", load_name(loads, text), t, t + NEAR) for text in event.load)
-        yield from (_Planned("left", name, t, end) for name in event.leave)
-        yield from (_Planned("joined", name, t, end) for name in event.join)
+        for name, until in (
+            *((switches[name], latest if name in event.close else t) for name in (*event.open, *event.close)),
+            *((load_name(loads, text), t) for text in event.load),
+            *((name, end - 2.0 * NEAR) for name in (*event.leave, *event.join)),
+        ):
+            found[name].append((t, until))
     (case,) = scenario.cases
     for node in netem_of(scenario, case).nodes:
         if node.kill or node.pause:
-            yield _Planned("died", node.name, node.from_s, inf)
-        if node.pause:  # an agent paused for longer than Zenoh's lease counts as dead, until it goes on
-            yield _Planned("joined", node.name, node.from_s, inf)
+            found[node.name].append((node.from_s, inf))
+    return found
 
 
-def _departures(
-    scenario: ScenarioModel, feeder: Feeder, events: Sequence[PlantEvent], ended: float
-) -> Iterator[PlantEvent]:
-    """Yield each event that the scenario does not have, and one for each agent that did not leave or join in time."""
-    switches, planned = switch_names(feeder), [*_planned(scenario, feeder)]
+def _faults(scenario: ScenarioModel) -> Iterator[tuple[float, float]]:
     (case,) = scenario.cases
     netem = netem_of(scenario, case)
-    faults = [entry for entries in LISTS for entry in getattr(netem, entries.name)]
-    first, came = {row.name for row in feeder.inverters}, set[_Planned]()
-    for event in events:
-        done, name = "", event.subject
-        if event.kind in ("switch", "load") and event.text.endswith(" already"):
-            continue  # to open an open switch changes nothing
-        if event.kind == "switch":
-            done, name = "closed" if is_closed(event) else "opened", switches.get(name, name)
-        elif event.kind == "load":
-            done = "load"
-        elif event.kind == "roster" and not _AGAIN.match(event.text):
-            if _SILENCE.match(event.text) and any(
-                fault.from_s <= event.t < (inf if fault.to_s is None else fault.to_s + _NOTICED) for fault in faults
-            ):
-                continue  # a fault of the scenario may silence agents
-            match = re.match(rf"{re.escape(name)} (joined|left|died)", event.text)
-            done = match[1] if match else ""
-            if event.t == 0.0 and done and name in first:
-                continue  # another event, "started without", names the agents that are absent at the start
-        elif (event.kind, name) != ("link", "links"):
-            continue
-        it = [
-            it for it in planned if it[:2] == (done, name) and it.since - NEAR <= event.t < it.until and it not in came
-        ]
-        if not it:
-            yield event
-        elif it[0].until < inf and done in ("left", "joined"):
-            came.add(it[0])
-    for one in planned:
-        if one.done in ("left", "joined") and one.until <= ended + NEAR and one not in came:
-            text = f"{one.name} was to {'leave' if one.done == 'left' else 'join'}, and did not in time"
-            yield PlantEvent(t=one.since, kind="roster", subject=one.name, text=text)
+    for fault in (entry for entries in LISTS for entry in getattr(netem, entries.name)):
+        yield fault.from_s, inf if fault.to_s is None else fault.to_s + _NOTICED
