@@ -36,8 +36,6 @@ class RunClient:
 
     def _open(self) -> None:
         self._tokens = RunTokens(self.where.run)
-        self._refused_links: list[str] = []
-        """Lines on links to ends without access; the session gives each once."""
         self._session = Session(
             "visitor",
             listen=self._listen,
@@ -144,20 +142,8 @@ class RunClient:
         """
         began = monotonic()
         look, reminder = FIRST_LOOK, REMINDER
-        told: set[str] = set()
-        others: set[str] = set()
-
-        def is_news() -> bool:
-            return self.plant or not self._others <= others
-
-        while True:
-            self.until(is_news, began + min(look, reminder, wait) - monotonic())
-            if self.plant:
-                return
+        while not self.until(lambda: self.plant, began + min(look, reminder, wait) - monotonic()):
             waited = monotonic() - began
-            if is_news():
-                others |= self._others
-                tell(f"no plant yet of {self.where} (runs there: {', '.join(sorted(others))}); waits on")
             if waited >= wait:
                 raise NobodyError(self._failure(wait))
             if waited >= look:
@@ -168,15 +154,12 @@ class RunClient:
                     self.renew()
             if waited >= reminder:
                 reminder *= 2.0
-                tell(f"no plant yet of {self.where}; {waited:.0f} of {wait:g} s waited")
-                for line in self._link_faults():
-                    if line not in told:
-                        told.add(line)
-                        tell(line)
+                tell(f"no plant yet of {self.where}{self._runs_there}; {waited:.0f} of {wait:g} s waited")
 
     @property
-    def _others(self) -> set[str]:
-        return self.runs - {self.where.run}
+    def _runs_there(self) -> str:
+        others = sorted(self.runs - {self.where.run})
+        return f" (runs there: {', '.join(others)})" if others else ""
 
     def _refused(self) -> str:
         """Return why no link will come, if every endpoint refuses one; else the empty string."""
@@ -185,28 +168,26 @@ class RunClient:
         refusals = [_refusal(text, self.where) for text in self.where.connect]
         return "\n".join(refusals) if all(refusals) else ""
 
-    def _link_faults(self) -> list[str]:
+    def _link_faults(self) -> str:
+        """Return why links without access bring nothing; empty if they have it, or there are no certificates."""
         if (credentials := self.where.credentials) is None:
-            return []
+            return ""
         own, vouched = credentials.own, self._session.vouches(PLANT)  # it looks at new links, and notes their lines
-        self._refused_links += self._session.take_lines()
         silent = (
             f"the plant at {', '.join(self.where.connect)} takes the link, but nothing passes on it: it is still being "
             f"built, or its members.json revokes or lacks the certificate of {own.name}, which its output says; "
             f"gridpeers keys issue {own.name} --role {own.role}, where the site was made, gives {own.name} a new one"
         )
-        return [*self._refused_links, *([silent] if vouched and not self.runs else [])]
+        return "; ".join([*self._session.take_lines(), *([silent] if vouched and not self.runs else [])])
 
     def _failure(self, wait: float) -> str:
         where = self.where
         if self._session.peers():
-            missing = f"no plant of {where} within {wait:g} s"
-            runs = f"runs there: {', '.join(sorted(self._others))}" if self._others else ""
+            missing = f"no plant of {where} within {wait:g} s{self._runs_there}"
             if faults := self._link_faults():
-                return f"{missing}{runs and f' ({runs})'}: {'; '.join(faults)}"
+                return f"{missing}: {faults}"
             start = command_line("plant", "SCENARIO", "--run", where.run, *where.access.words)
-            there = runs or "no other run is there either"
-            return f"{missing} ({there}); start one ({start}), or give another name by --run"
+            return f"{missing}; start one ({start}), or give another name by --run"
         if refused := self._refused():
             return refused
         if mute := ", ".join(accepting(where.connect)):
