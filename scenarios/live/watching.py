@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-import os
-import select
-import sys
-import termios
-import tty
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from time import monotonic
 from typing import Any, NamedTuple, Protocol
 
@@ -116,7 +111,7 @@ def table(snapshot: Snapshot) -> Group:
         styles = ["yellow" if wrong.get(column.head) else "" for column in columns]
         grid.add_row(*(Text(column.text(one), style) for column, style in zip(columns, styles, strict=True)))
     events = [Text(line, style="dim", no_wrap=True, overflow="ellipsis") for line in snapshot.events[-EVENTS:]]
-    return Group(Text(head(snapshot), style="bold"), Text(), grid, Text(), *events, Text("q: quit", style="dim"))
+    return Group(Text(head(snapshot), style="bold"), Text(), grid, Text(), *events, Text("Ctrl-C: quit", style="dim"))
 
 
 class TakesMessages(Protocol):
@@ -232,29 +227,7 @@ def watch(client: RunClient, console: Console, seconds: float | None) -> None:
             subscriber.take_until(min(end, monotonic() + PERIOD))
             console.print(plain(monitor.snapshot(client.present, monotonic())), soft_wrap=True)
         return
-    with _keyboard() as key, Live(console=console, screen=True, auto_refresh=False) as live:
+    with Live(console=console, screen=True, auto_refresh=False) as live:
         while monotonic() < end:
             subscriber.take_until(monotonic() + REFRESH)
             live.update(table(monitor.snapshot(client.present, monotonic())), refresh=True)
-            if key() in ("q", "Q", "\x1b"):
-                return
-
-
-@contextmanager
-def _keyboard() -> Iterator[Callable[[], str]]:
-    """Yield a function that returns a key typed without Enter, or "" at once. Ctrl-C stays Ctrl-C."""
-    file = sys.stdin.fileno()
-    if not os.isatty(file):
-        yield lambda: ""
-        return
-    before = termios.tcgetattr(file)
-
-    def read() -> str:
-        ready, _, _ = select.select([file], [], [], 0.0)
-        return os.read(file, 1).decode(errors="replace") if ready else ""
-
-    tty.setcbreak(file)
-    try:
-        yield read
-    finally:
-        termios.tcsetattr(file, termios.TCSADRAIN, before)

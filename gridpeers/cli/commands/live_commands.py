@@ -92,10 +92,10 @@ def status(live: LiveRun) -> None:
 def watch(
     live: LiveRun,
     duration: Annotated[
-        float | None, typer.Option("--for", metavar="SECONDS", help="Stop after so long; at q if left out.")
+        float | None, typer.Option("--for", metavar="SECONDS", help="Stop after so long; at Ctrl-C if left out.")
     ] = None,
 ) -> None:
-    """Watch a run as a live table; q quits. Where the output is no terminal, a text every second.
+    """Watch a run as a live table, until Ctrl-C. Where the output is no terminal, a text every second.
 
     Example:  gridpeers watch --keys lab --connect tls/192.168.1.10:7447
     """

@@ -125,7 +125,7 @@ def test_watch_shows_the_same_as_a_table() -> None:
     console.print(table(monitor().snapshot({"inv1"}, now=10.0)))
     text = console.export_text()
 
-    for word in ("run lab", "60.010", "310.0", "without inv2", "no agent", "13-152 opened", "q: quit"):
+    for word in ("run lab", "60.010", "310.0", "without inv2", "no agent", "13-152 opened", "Ctrl-C: quit"):
         assert word in text
 
 
