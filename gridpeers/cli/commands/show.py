@@ -34,7 +34,7 @@ def check(
     """Check a scenario file and its feeder for problems.
 
     All problems come at once. A file without any is tried: whether its feeder has an operating point to start from.
-    Notes tell what its events de-energise, which agents lie, and where a graph bears fewer liars than its law should.
+    Notes tell what its events de-energise, and where a graph bears fewer liars than its law should.
 
     Exit code: 0 it can be run, 2 it has problems.
 
@@ -45,14 +45,14 @@ def check(
     from gridpeers.cli.progress import TRYING, explained
     from gridpeers.rooms import ROOMS
     from gridpeers.scenarios.results.file_sizes import file_sizes
-    from gridpeers.scenarios.schema.check_notes import liar_notes, start_problem
+    from gridpeers.scenarios.schema.check_notes import start_problem
     from gridpeers.scenarios.schema.supply import supply_notes
 
     with explained(lambda: typer.echo(TRYING)):
         problem = start_problem(spec, feeder)
     if problem:
         fail([f"{file}: the plant cannot start: {problem}"], BAD_INPUT)
-    of_scenario = (supply_notes, liar_notes, ROOMS.resolve("robustness_notes"))
+    of_scenario = (supply_notes, ROOMS.resolve("robustness_notes"))
     for note in chain.from_iterable(notes(spec, feeder) for notes in of_scenario):
         typer.echo(f"NOTE  {note}")
     typer.echo(

@@ -1,4 +1,4 @@
-"""Islands and loads that nothing feeds, and what `gridpeers check` says beside: loads, supply, liars."""
+"""Islands and loads that nothing feeds, and what `gridpeers check` says beside: loads and supply."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from gridpeers.plant.plant_config import LoadEvent
 from gridpeers.plant.tables.read import DATA
 from gridpeers.scenarios.catalogue_files import CATALOGUE
 from gridpeers.scenarios.schema import ScenarioError, load_scenario
-from gridpeers.scenarios.schema.check_notes import liar_notes
 from gridpeers.scenarios.schema.configs import configs
 from gridpeers.scenarios.schema.supply import supply_notes
 from gridpeers.wire.messages import LoadSetting
@@ -159,17 +158,6 @@ name = "inv3"
 from_s = 1.0
 lies = { model = "offset", P_set_W = 1e5 }
 """
-
-
-def test_check_lists_each_liar_with_its_time_its_lie_and_its_cases(tmp_path: Path) -> None:
-    """A sentence for each, with the cases if it does not lie in all."""
-    (tmp_path / "liars.toml").write_text(LIARS, encoding="utf-8")
-    scenario, feeder = load_scenario(tmp_path / "liars.toml")
-
-    assert list(liar_notes(scenario, feeder)) == [
-        "inv3 lies from 1 s to the end: offset, P_set_W 100000",
-        "inv2 lies from 0 s to 1.5 s: freeze, in the name of inv5, to the plant too (in II)",
-    ]
 
 
 def test_nobody_lies_in_anothers_name_behind_certificates(tmp_path: Path) -> None:
