@@ -9,10 +9,7 @@ import msgspec
 
 from gridpeers.netem.fault_schedule import Change, Heal
 from gridpeers.netem.ledger import LinkCounts, LinkTrace
-from gridpeers.netem.models.delay import Constant, Uniform
-from gridpeers.netem.models.loss import Bernoulli
-from gridpeers.netem.models.medium import Cut, Rate
-from gridpeers.netem.schema.fault import LONGEST_RUN, PROFILES, Fault
+from gridpeers.netem.schema.fault import LONGEST_RUN, Fault
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.netem.schema.pattern import Link, objections
 from gridpeers.wire.codec import decode_foreign
@@ -107,44 +104,29 @@ def report_data(
 
 
 def words(kind: str, model: Any) -> str:
-    """Return a fault in words: plain if it has one or two numbers, else the profile that has it, or its keys."""
-    match model:
-        case Plugin(parameters=parameters):
-            keys = [f"{name} {_shown(value)}" for name, value in parameters]
-            return f"{kind} ({', '.join(keys)})" if keys else kind
-        case Cut(hold=hold):
-            return f"{kind}, messages kept" if hold else kind
-        case Constant(delay_s=delay, fifo=False):
-            return f"{kind} {delay:g} s"
-        case Uniform(low_s=low, high_s=high, fifo=False, correlation=0.0):
-            return f"{kind} {low:g} to {high:g} s"
-        case Bernoulli(p=p):
-            return f"{kind} {p:g}"
-        case Rate(bytes_per_s=rate):
-            return f"{kind} {rate:g} bytes/s"
-    for name, profile in PROFILES.items():
-        if getattr(profile, kind, None) == model:
-            return f"{kind} of {name}"
-    fields = msgspec.structs.fields(model)
-    given = [(field.name, getattr(model, field.name), field.default) for field in fields]
-    keys = [f"{name} {_shown(value)}" for name, value, default in given if value != default]
-    if fields[0].name == "p" and len(keys) == 1:
-        return f"{kind} {keys[0].removeprefix('p ')}"
-    model_name = model.__struct_config__.tag
-    return f"{kind} {model_name} ({', '.join(keys)})" if model_name else f"{kind} ({', '.join(keys)})"
+    """Return a fault in words: its model and its keys as in a scenario, but for defaults; one number alone as it is."""
+    if isinstance(model, Plugin):
+        name, keys = None, list(model.parameters)
+    else:
+        fields = ((it, getattr(model, it.name)) for it in msgspec.structs.fields(model))
+        keys = [(it.name, value) for it, value in fields if value != it.default]
+        name = model.__struct_config__.tag
+    if len(keys) == 1 and keys[0][0] in ("p", "delay_s", "bytes_per_s"):
+        return f"{kind} {_shown(keys[0][1])}"
+    listed = ", ".join(f"{key} {_shown(value)}" for key, value in keys)
+    return " ".join(filter(None, [kind, name, listed and f"({listed})"]))
 
 
 def _shown(value: Any) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    return f"{value:g}" if isinstance(value, float) else str(value) if not isinstance(value, tuple) else "..."
+    if isinstance(value, bool | tuple):
+        return "..." if isinstance(value, tuple) else str(value).lower()
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 EVERYTHING = "{*, plant} <-> {*, plant}"
 """Pattern of all links there are."""
 
-MOST_NAMED = 8
-"""Links that are named at most; a partition of nine inverters affects 36."""
+MOST_NAMED = 8  # Links that are named at most; a partition of nine inverters affects 36
 
 
 class LinkCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):

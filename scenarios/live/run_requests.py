@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import secrets
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from math import inf
 from time import monotonic
 from typing import Any, Literal, NamedTuple, TypeVar
@@ -13,17 +13,11 @@ import msgspec
 
 from gridpeers.agents.agent_config import AgentConfig, check_nameplate
 from gridpeers.plant.equipment.named_loads import FACTOR
-from gridpeers.scenarios.emulation.link_data import (
-    NO_MESSAGES,
-    EmulationConfig,
-    LinkCommand,
-    LinkStatus,
-    decode_statuses,
-)
+from gridpeers.scenarios.emulation.link_data import EmulationConfig, LinkCommand
 from gridpeers.scenarios.live.run_address import UsageError
 from gridpeers.scenarios.live.run_client import NobodyError, RunClient
 from gridpeers.scenarios.live.run_monitor import PlantStatus
-from gridpeers.scenarios.short_texts import aligned, in_order
+from gridpeers.scenarios.short_texts import in_order
 from gridpeers.wire.codec import decode_foreign, encode
 from gridpeers.wire.driver.command_line import command_line
 from gridpeers.wire.messages import MOST_COUNT, PLANT, Answer, Command, LinkAcknowledgement, LoadSetting
@@ -32,7 +26,7 @@ from gridpeers.wire.wording import printable
 
 T = TypeVar("T")
 
-Verb = Literal["open", "close", "synchronise", "load", "stop", "down", "status", "link", "links"]
+Verb = Literal["open", "close", "synchronise", "load", "stop", "down", "status", "link"]
 
 ANSWER = 10.0
 """Longest wait (s) for the answer of a plant that is there; on a busy machine it may take a second."""
@@ -84,7 +78,7 @@ def request(
     def give() -> None:
         client.publish(client.keys.for_verb(verb), encode(command))
 
-    again = ASKED_AGAIN if verb in ("status", "links") else inf
+    again = ASKED_AGAIN if verb == "status" else inf
     if not _hear(client, take, lambda: bool(answers), wait, give, again):
         raise NobodyError(
             f"the plant of {client.where} is there but has not answered within {wait:.3g} s; is it frozen?"
@@ -237,7 +231,7 @@ def load_setting(factor: float | None, P_kW: float | None, Q_kvar: float | None)
 
 
 class _LinkReply(msgspec.Struct, frozen=True):
-    """The plant's answer to "link" and "links"; see `gridpeers.plant.realtime.run_commands`."""
+    """The plant's answer to "link"; see `gridpeers.plant.realtime.run_commands`."""
 
     number: int
     t: float
@@ -295,38 +289,3 @@ def command_links(client: RunClient, command: LinkCommand) -> LinkCommandResult:
         absent=[name for name in reply.receivers if name not in reached],
         failures=failures,
     )
-
-
-def link_states(client: RunClient) -> tuple[float, dict[tuple[str, str], LinkStatus], list[str]]:
-    """Return the run time (s), the state of every link that has or had a fault, and the receivers without an answer."""
-    answer, answers = request(client, lambda it: {*data_of(client, it, _LinkReply).asked, PLANT}, verb="links")
-    reply = data_of(client, answer, _LinkReply)
-    statuses: dict[tuple[str, str], LinkStatus] = {}
-    for name, acknowledgement in answers.items():
-        if acknowledgement.ok:
-            try:
-                of_sender: dict[str, LinkStatus] = decode_statuses(acknowledgement.data)
-            except msgspec.DecodeError:  # counts as no answer
-                continue
-            statuses |= {(src, name): state for src, state in of_sender.items()}
-    return reply.t, statuses, [name for name in reply.asked if name not in answers]
-
-
-def links_text(run: str, t: float, states: Mapping[tuple[str, str], LinkStatus]) -> str:
-    """Return one line for each link that is impaired at t (s), one for all that once were; by sender and receiver."""
-    order = [*in_order({name for link in states for name in link} - {PLANT}), PLANT]
-    now = {link: state for link, state in states.items() if state.holds}
-    count = "no link is impaired" if not now else f"{len(now)} link{'s' if len(now) > 1 else ''} impaired"
-    text = [f"run {run}   t = {t:.2f} s   {count}"]
-    rows = [("link", "sent", "delivered", "dropped", "now")]
-    for src, dst in sorted(now, key=lambda link: tuple(map(order.index, link))):
-        state = now[src, dst]
-        book = state.counts or NO_MESSAGES
-        reasons = ", ".join(f"{reason} {count}" for reason, count in sorted(book.dropped.items()))
-        dropped = f"{sum(book.dropped.values())}" + (f" ({reasons})" if reasons else "")
-        rows.append((f"{src} -> {dst}", str(book.sent), str(book.delivered), dropped, ", ".join(state.holds)))
-    text += aligned(rows, right=range(1, 4)) if now else ()
-    if before := [state.counts or NO_MESSAGES for link, state in states.items() if link not in now]:
-        sent, dropped_before = sum(book.sent for book in before), sum(sum(book.dropped.values()) for book in before)
-        text.append(f"impaired before: {len(before)} links; sent over them {sent}, dropped {dropped_before}")
-    return "\n".join(text) + "\n"

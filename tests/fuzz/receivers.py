@@ -26,7 +26,6 @@ from gridpeers.scenarios.emulation.link_data import EmulationConfig, data_of, de
 from gridpeers.scenarios.live.feeder_map import read_feeder_map
 from gridpeers.scenarios.live.run_client import RunClient
 from gridpeers.scenarios.live.run_monitor import PlantStatus
-from gridpeers.scenarios.live.run_requests import links_text
 from gridpeers.scenarios.record.journal_reader import entries_of, values_of
 from gridpeers.scenarios.results.record import Recorder, RecordError
 from gridpeers.viewer.run_view import Cursor, RunView
@@ -188,7 +187,7 @@ class Recording:
 
 
 class View:
-    """A person's view of a run: what `gridpeers view`, `watch` and `link show` make of what comes."""
+    """A person's view of a run: what `gridpeers view` and `watch` make of what comes."""
 
     def __init__(self) -> None:
         self._begin()
@@ -202,7 +201,6 @@ class View:
         keys = (KEYS.telemetry, KEYS.answer("visitor"), *(KEYS.status(name) for name in NAMES))
         now = self._taken * 0.01
         message = RunClient.read(self._client, rng.choice(keys), payload)  # type: ignore[arg-type]
-        with_link = {}
         try:
             if isinstance(message, Telemetry):
                 self._view.telemetry(message, now)
@@ -211,14 +209,10 @@ class View:
             elif isinstance(message, Answer):
                 self._view.plant_status(msgspec.convert(message.data, PlantStatus))
             elif isinstance(message, LinkAcknowledgement):
-                with_link = decode_statuses(message.data)
-                self._view.accounts(message.sender, with_link)
+                self._view.accounts(message.sender, decode_statuses(message.data))
         except msgspec.DecodeError:
             return "garbled"
         self._taken += 1
-        if with_link:
-            text = links_text("toy", 0.0, {(src, "inv1"): status for src, status in with_link.items()})
-            assert text.replace("\n", "").isprintable(), text
         if self._taken % TICK == 0:
             self._view.forget_silent(now)
             msgspec.json.encode(self._view.frame(Cursor(), now))

@@ -106,24 +106,6 @@ def heal(
     _give(links or [], "<->", None, None, live)
 
 
-@link.command()
-@of_live_run
-def show(live: LiveRun) -> None:
-    """Show every impaired link, and how its messages have fared.
-
-    Exit code: 0 all have answered, 2 nobody there, 3 somebody has not answered.
-
-    Example:  gridpeers link show
-    """
-    from gridpeers.scenarios.live.run_requests import link_states, links_text
-
-    with live.client() as client:
-        t, states, silent = link_states(client)
-        typer.echo(links_text(live.run, t, states), nl=False)
-        if silent:
-            fail([f"has not answered: {', '.join(silent)}; what its links do is not shown"], BROKEN)
-
-
 def _delay(delay: float | None, jitter: float | None) -> dict[str, Any]:
     from gridpeers.netem.models.delay import DELAY, Uniform
 

@@ -10,14 +10,16 @@ from typing import Any, cast
 import msgspec
 import pytest
 
+from gridpeers.netem.fault_schedule import Heal
+from gridpeers.scenarios.emulation.link_data import LinkCommand
 from gridpeers.scenarios.live import run_requests
 from gridpeers.scenarios.live.run_address import RUN, Access, RunAddress
 from gridpeers.scenarios.live.run_client import NobodyError, RunClient
 from gridpeers.scenarios.live.run_requests import (
     ask,
+    command_links,
     configurations,
     free_configurations,
-    link_states,
     links_of_run,
     plant_status,
     request,
@@ -174,10 +176,9 @@ def test_an_answer_of_another_form_is_told_in_one_line() -> None:
     """Of a plant of another version, or of whoever speaks as one on open links: nothing else is raised."""
     with pytest.raises(NobodyError, match=r"run demo answers what cannot be read here: .* `phase`; is it of another"):
         plant_status(Client())  # type: ignore[arg-type]
-    with pytest.raises(NobodyError, match=r"Expected `int`, got `bool` - at `\$.number`; is it of another version"):
-        link_states(Client(number=True))  # type: ignore[arg-type]
-    with pytest.raises(NobodyError, match=r"Expected `int`, got `array` - at `\$.number`; is it of another version"):
-        link_states(Client(number=[3]))  # type: ignore[arg-type]
+    for number, found in ((True, "bool"), ([3], "array")):
+        with pytest.raises(NobodyError, match=rf"Expected `int`, got `{found}` - at `\$.number`; is it of another"):
+            command_links(Client(number=number), LinkCommand(heal=Heal(on="*", from_s=0.0)))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
