@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from gridpeers.scenarios.live.departures import Departures
     from gridpeers.scenarios.results.report import RunReport
 
-_AFTER_RUN = ("measured_run", "results.plots.drawing")
+_AFTER_RUN = ("record.record_reader", "measured_run", "results.plots.drawing")
 """Modules that are used after a run, and imported while it goes on: this process has little to do then."""
 
 
@@ -89,7 +89,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
         recorded[case], outcome = run_case(request, case, text, progress)
         from gridpeers.scenarios.results.history import late_moves
 
-        notes += [f"case {case}: {note}" for note in (*outcome.notes, *recorded[case].link_lines)]
+        notes += [f"case {case}: {note}" for note in (*outcome.notes, *recorded[case].links.lines())]
         if outcome.pacing is not None:
             pacing[case] = outcome.pacing
             pace = sentence(outcome.pacing, scenario.time.T_c_s / request.speed)
@@ -141,8 +141,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
         last = recorded[list(recorded)[-1]]  # in wall-clock time each case has its own events
         with drawn_on_all_cores(drawing_of(scenario, cases, as_they_came(scenario, last.events)), folder / "plots"):
             pass
-    ended_early = {case: record.record_failure for case, record in recorded.items() if record.record_failure}
-    set_complete(folder, (f"case {case}: {why}" for case, why in ended_early.items()))
+    set_complete(folder)
     return report
 
 
@@ -203,12 +202,7 @@ def run_case(
             if outcome.broke:
                 stopped = ended_by_a_law(plant.on_law_failure, outcome.events)
                 raise (LawStopError if stopped else BrokenRunError)(f"case {case}: {outcome.broke}")
-            recorded = recorder.finish(time.end_s, time.record_s)
-            if recorder.record_failure:
-                outcome = dataclasses.replace(
-                    outcome, notes=(*outcome.notes, f"{recorder.record_failure}; the run went on without it")
-                )
-            return recorded, outcome
+            return recorder.finish(time.end_s, time.record_s), outcome
         except RecordError as error:
             raise BrokenRunError(f"case {case}: {error}") from error
 

@@ -20,7 +20,9 @@ from gridpeers.bridges.gridlabd.gridlabd_plant import GridlabdPlant
 from gridpeers.plant.build import build_plant
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.drivers.process_driver import run_processes
-from gridpeers.scenarios.results.record import PARTIAL, Recorder
+from gridpeers.scenarios.record.record_info import FILE
+from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
+from gridpeers.scenarios.results.record import Recorder
 from gridpeers.scenarios.schema.configs import configs
 from gridpeers.wire.node import Publish
 from gridpeers.wire.post import Post
@@ -28,7 +30,7 @@ from gridpeers.wire.post import Post
 CASE = "IV"
 
 LOOK = 0.002
-"""Time (s) between two looks at the history that is being written."""
+"""Time (s) between two looks at the record that is being written."""
 
 
 class OurCase:
@@ -103,7 +105,7 @@ class OurCase:
     def by_command(self) -> dict[str, float]:
         """Measure `gridpeers run` with processes (s) from its start: to its first row, to its last, and to its end.
 
-        The last row is there once the history has its name; tables and figures follow.
+        The last row is there once there is history.csv; measures and figures follow.
         """
         with tempfile.TemporaryDirectory(prefix="gp-command-") as name:
             folder = Path(name)
@@ -114,8 +116,8 @@ class OurCase:
                 began = perf_counter()
                 run = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=errors, stderr=errors)
                 try:
-                    first = _until(run, out / CASE / PARTIAL, out / CASE / "history.csv") - began
-                    last = _until(run, out / CASE / "history.csv") - began
+                    first = _until(run, lambda: _has_row(out / CASE / FILE)) - began
+                    last = _until(run, (out / CASE / "history.csv").exists) - began
                     run.wait(DEADLINE)
                     end = perf_counter() - began
                 finally:
@@ -172,18 +174,19 @@ def help_time() -> dict[str, float]:
     return {"ours.help": perf_counter() - began}
 
 
-def _until(run: subprocess.Popen[bytes], *files: Path) -> float:
-    """Return the time at which one of some files has something in it, or the command has ended."""
+def _until(run: subprocess.Popen[bytes], happened: Callable[[], bool]) -> float:
+    """Return the time at which something has happened, or the command has ended."""
     until = perf_counter() + DEADLINE
-    while run.poll() is None and perf_counter() < until:
-        for file in files:
-            try:
-                if file.stat().st_size:
-                    return perf_counter()
-            except FileNotFoundError:
-                continue
+    while run.poll() is None and perf_counter() < until and not happened():
         sleep(LOOK)
     return perf_counter()
+
+
+def _has_row(file: Path) -> bool:
+    try:
+        return next(RunRecord.open(file).telemetry(), None) is not None
+    except RecordFileError:  # it begins
+        return False
 
 
 def _check(broke: str) -> None:

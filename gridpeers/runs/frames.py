@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from io import StringIO
-from pathlib import Path
+from math import nan
 from typing import Any
 
 import pandas as pd
 
+from gridpeers.netem.ledger import LinkTrace
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict, Violation
-from gridpeers.scenarios.results.link_record import COLUMNS
 from gridpeers.scenarios.results.recorded_events import LawFailure
+from gridpeers.scenarios.results.tables import EVENTS, LINKS, event_rows, link_rows
 from gridpeers.scenarios.sweep.sweep_table import unit_of
+from gridpeers.wire.messages import PlantEvent
 
 
 def metrics_frame(windows: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
@@ -81,26 +82,22 @@ def failures_frame(failures: Mapping[str, Iterable[LawFailure]]) -> pd.DataFrame
     return frame
 
 
-def events_frame(file: Path) -> pd.DataFrame:
-    """Return the events of a run, from events.csv."""
-    return _from_csv(file, {"t_s": float})
+def events_frame(events: Iterable[PlantEvent]) -> pd.DataFrame:
+    """Return the events of a run, a row each; units are in `attrs`."""
+    return _table(event_rows(events), EVENTS)
 
 
-def links_frame(file: Path) -> pd.DataFrame:
-    """Return the fate of every message on emulated links, from links.csv; without the file there are no rows."""
-    kinds = {"seq": int, "t_s": float, "delay_s": float}
-    return _from_csv(file, kinds) if file.exists() else _from_csv(StringIO(",".join(COLUMNS) + "\n"), {})
+def links_frame(traces: Iterable[LinkTrace]) -> pd.DataFrame:
+    """Return the fate of every message on emulated links, link by link; the delay of one that was dropped is nan."""
+    frame = _table((row for trace in traces for row in link_rows(trace)), LINKS)
+    kinds = {"seq": int, "t": float, "delay": float}
+    frame = frame.replace({"delay": {"": nan}}).astype(kinds)
+    return frame.sort_values(["src", "dst"], kind="stable", ignore_index=True)
 
 
-def _from_csv(file: Path | StringIO, kinds: Mapping[str, type]) -> pd.DataFrame:
-    """Return the rows of a file, to the last bit of its numbers; units go from its header into `attrs`.
-
-    Columns without a kind are texts; an empty number is nan.
-    """
-    frame = pd.read_csv(file, dtype=str, keep_default_na=False)
-    for name, kind in kinds.items():
-        frame[name] = pd.Series([kind(text or "nan") for text in frame[name]], dtype=kind)
-    times = [name for name in frame if name.endswith("_s")]
-    frame = frame.rename(columns={name: name.removesuffix("_s") for name in times})
-    frame.attrs["units"] = {name.removesuffix("_s"): "s" for name in times}
+def _table(rows: Iterable[tuple[object, ...]], header: Iterable[str]) -> pd.DataFrame:
+    """Return rows with columns as in the header of a file; units go from there into `attrs`."""
+    names = [name.removesuffix("_s") for name in header]
+    frame = pd.DataFrame(rows, columns=names)
+    frame.attrs["units"] = {name.removesuffix("_s"): "s" for name in header if name.endswith("_s")}
     return frame

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import hashlib
 import re
 import shutil
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import msgspec
 import pandas as pd
@@ -26,10 +25,10 @@ from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.checks.judging import judge_case
 from gridpeers.scenarios.live.departures import compare
 from gridpeers.scenarios.live.live_report import live_drawing
-from gridpeers.scenarios.record.record_info import LIVE
+from gridpeers.scenarios.record.record_info import FILE, LIVE
 from gridpeers.scenarios.results.claims import Verdict, benchmark_of, judge, judged
 from gridpeers.scenarios.results.findings import Findings, find
-from gridpeers.scenarios.results.history import History, as_they_came, read_history, windows
+from gridpeers.scenarios.results.history import History, as_they_came, windows
 from gridpeers.scenarios.results.plots.drawing import Drawing, drawing_of
 from gridpeers.scenarios.results.recorded_events import law_failures
 from gridpeers.scenarios.results.run_files import FolderError, refusal, shown, write_whole
@@ -44,6 +43,8 @@ if TYPE_CHECKING:
     from gridpeers.lab.explanation.explanation import Explanation
     from gridpeers.lab.replay.replay import ReplayedRun
     from gridpeers.scenarios.record.record_reader import RunRecord
+
+T = TypeVar("T")
 
 
 class _FromFolder:
@@ -182,7 +183,7 @@ class Result(_FromFolder):
     @cached_property
     def record(self) -> History:
         """The recorded rows as numpy arrays, by quantity."""
-        return self._folder.read(f"{self.case}/history.csv", read_history)
+        return self._recorded(lambda record: record.physics())
 
     @cached_property
     def history(self) -> pd.DataFrame:
@@ -205,13 +206,12 @@ class Result(_FromFolder):
     @cached_property
     def events(self) -> pd.DataFrame:
         """Events of the plant and the agents: time t (s), kind, subject, text."""
-        return self._folder.read(f"{self.case}/events.csv", frames.events_frame)
+        return frames.events_frame(self.plant_events)
 
     @cached_property
-    def plant_events(self) -> list[PlantEvent]:
+    def plant_events(self) -> tuple[PlantEvent, ...]:
         """The events as the plant sent them."""
-        rows = self.events.itertuples(index=False)
-        return [PlantEvent(t=row.t, kind=row.kind, subject=row.subject, text=row.text) for row in rows]
+        return self._recorded(lambda record: record.events())
 
     @property
     def failures(self) -> pd.DataFrame:
@@ -221,7 +221,7 @@ class Result(_FromFolder):
     @cached_property
     def links(self) -> pd.DataFrame:
         """Fate of every message on emulated links: src, dst, seq, t (s), delay (s; nan: dropped), fate."""
-        return self._folder.read(f"{self.case}/links.csv", frames.links_frame)
+        return frames.links_frame(self._recorded(lambda record: list(record.links())))
 
     @cached_property
     def run_record(self) -> RunRecord:
@@ -249,8 +249,8 @@ class Result(_FromFolder):
 
     @cached_property
     def sha256(self) -> str:
-        """SHA-256 of the bytes of the history: equal runs have equal ones."""
-        return hashlib.sha256(self._folder.read(f"{self.case}/history.csv", Path.read_bytes)).hexdigest()
+        """SHA-256 of the bytes of the recorded rows (docs/results.md): equal runs have equal ones."""
+        return self.record.sha256
 
     @property
     def links_sha256(self) -> str:
@@ -304,6 +304,18 @@ class Result(_FromFolder):
     def save(self, folder: str | Path) -> Path:
         """Write the run folder as the command does, with all cases of the run; see `Results.save`."""
         return self._run.save(folder)
+
+    def _recorded(self, read: Callable[[RunRecord], T]) -> T:
+        """Read something from the record, which a run that came to its end has whole."""
+
+        def whole(file: Path) -> T:
+            record = self.run_record
+            found = read(record)
+            if record.damage:
+                raise ValueError(record.damage[0])
+            return found
+
+        return self._folder.read(f"{self.case}/{FILE}", whole)
 
     @property
     def _whole(self) -> dict[str, Any]:

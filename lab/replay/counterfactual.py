@@ -23,7 +23,7 @@ from gridpeers.runs.run_folder import RunFolder, new_home
 from gridpeers.runs.running import read, warn_of_laws
 from gridpeers.scenario import plain
 from gridpeers.scenarios.live.live_report import write_report
-from gridpeers.scenarios.record.record_info import LIVE
+from gridpeers.scenarios.record.record_info import LIVE, RecordInfo
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.results.metrics_file import RunMetrics
 from gridpeers.scenarios.results.record import Recorded, Recorder, RecordError
@@ -32,7 +32,7 @@ from gridpeers.scenarios.run_request import Other, Progress
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.scenarios.schema.scenario_writing import to_toml
 from gridpeers.scenarios.versions import versions
-from gridpeers.wire.messages import Telemetry
+from gridpeers.wire.messages import LinkReport, Telemetry
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -105,12 +105,14 @@ class Counterfactual:
         self.changes = changes = rule.changes
         rows, effect = ComparedRows(record, changes.since if changes else inf), ComparedRows(record)
         run = _in_simulated_time if record.info.simulated else _in_real_time
-        with Recorder(would_be.path / rule.case, gaps=True) as recorder:
+        text = _scenario_text(record, rule, rule.scenario, would_be=True)
+        with Recorder(would_be.path / rule.case, gaps=True, record=_physics(record, text)) as recorder:
 
             def take(message: Telemetry | Other) -> None:
                 rows.take(message)
                 effect.take(message)
-                recorder(message)
+                if isinstance(message, Telemetry | LinkReport):  # what else there is was never on a wire
+                    recorder(message)
                 if tell is not None and isinstance(message, Telemetry) and message.rows and message.rows[-1][0] > 0.0:
                     tell(rule.case, message.rows[-1][0], record.t_end)
 
@@ -123,9 +125,10 @@ class Counterfactual:
         self.difference, self.compared, self.notes = rows.part.difference, rows.part.count, tuple(notes)
         """The first row of the plant before the change that differs from the record (there should be none); the number
         of rows compared; sentences on effects that are left out, or that the change had none."""
-        _write(record, rule, rule.scenario, would_be.path, recorded, would_be=True)
-        before = _as_recorded(record, was.path / rule.case, recorded.ended)
-        _write(record, rule, rule.recorded, was.path, before, would_be=False)
+        _write(record, rule, rule.scenario, would_be.path, text, recorded, figures=True)
+        text = _scenario_text(record, rule, rule.recorded, would_be=False)
+        before = _as_recorded(record, text, was.path / rule.case, recorded.ended)
+        _write(record, rule, rule.recorded, was.path, text, before, figures=False)
         self.was, self.would_be = _result(was.path), _result(would_be.path)
 
     @property
@@ -175,8 +178,8 @@ def _in_simulated_time(record: RunRecord, rule: ChangedRule, take: Take) -> list
     return [f"the run would have broken: {broke}"] if broke else []
 
 
-def _as_recorded(record: RunRecord, folder: Path, until: float) -> Recorded:
-    with Recorder(folder, gaps=True) as recorder:
+def _as_recorded(record: RunRecord, text: str, folder: Path, until: float) -> Recorded:
+    with Recorder(folder, gaps=True, record=_physics(record, text)) as recorder:
         for message in record.telemetry():
             rows = tuple(row for row in message.rows if row[0] <= until + 1e-9)
             events = tuple(event for event in message.events if event.t <= until + 1e-9)
@@ -184,21 +187,37 @@ def _as_recorded(record: RunRecord, folder: Path, until: float) -> Recorded:
         return recorder.finish(recorder.ended, recorder.record_step)
 
 
-def _write(
-    record: RunRecord, rule: ChangedRule, scenario: ScenarioModel, folder: Path, recorded: Recorded, *, would_be: bool
-) -> None:
+def _physics(record: RunRecord, text: str) -> RecordInfo:
+    """Return the run of a record that has rows, events and fates alone, made in this process."""
+    return msgspec.structs.replace(record.info, level="physics", toml=text, driver="inprocess", versions=versions())
+
+
+def _scenario_text(record: RunRecord, rule: ChangedRule, scenario: ScenarioModel, *, would_be: bool) -> str:
     info = record.info
     made = {"replayed": str(record.path.resolve()), "changes": str(rule.changes) if would_be else ""}
     as_run = {"driver": info.driver, "clock": info.clock, **made}
     remarks = rule.unwritten(clock=info.clock) if would_be else ()
-    write_whole(folder / "scenario.toml", to_toml(scenario, as_run | versions(), remarks))
+    return to_toml(scenario, as_run | versions(), remarks)
+
+
+def _write(
+    record: RunRecord,
+    rule: ChangedRule,
+    scenario: ScenarioModel,
+    folder: Path,
+    text: str,
+    recorded: Recorded,
+    *,
+    figures: bool,
+) -> None:
+    write_whole(folder / "scenario.toml", text)
     metrics = RunMetrics(
         scenario=scenario,
         feeder=rule.feeder,
         driver=LIVE,  # its windows are those of what happened
         folder=folder,
-        clock=info.clock,
-        speed=info.plant.speed,
+        clock=record.info.clock,
+        speed=record.info.plant.speed,
     )
-    write_report(metrics, recorded, None, figures=would_be)
+    write_report(metrics, recorded, None, figures=figures)
     set_status(folder, "complete")

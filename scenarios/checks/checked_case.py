@@ -19,7 +19,6 @@ from gridpeers.scenarios.results.history import (
     Nameplates,
     Window,
     as_they_came,
-    history_of,
     messages_saved,
     read_only,
     windows,
@@ -81,15 +80,23 @@ class CheckedCase:
 
     @classmethod
     def of(
-        cls, scenario: ScenarioModel, feeder: Feeder, case: str, recorded: Recorded, folder: Path | None = None
+        cls,
+        scenario: ScenarioModel,
+        feeder: Feeder,
+        case: str,
+        recorded: Recorded,
+        folder: Path | None = None,
+        measured: Sequence[Window] | None = None,
     ) -> CheckedCase:
-        """Return a case as recorded, with the windows of the scenario's events as they came."""
-        came = windows(as_they_came(scenario, recorded.events), scenario.time.end_s)
+        """Return a case as recorded, and windows to measure in, by default those of the events as they came."""
+        came = measured
+        if came is None:
+            came = windows(as_they_came(scenario, recorded.events), scenario.time.end_s)
         return cls(
             scenario=scenario,
             feeder=feeder,
             case=case,
-            history=history_of(recorded),
+            history=recorded.history,
             windows=came,
             events=recorded.events,
             messages_saved=messages_saved(scenario, feeder, case, recorded.quiet, came),

@@ -129,7 +129,7 @@ class LiveRecorder:
         return True
 
     def _finish(self, recorder: Recorder) -> None:
-        """Give the files their names; those of a record that is not whole keep the partial ones."""
+        """Write the tables; of a record that is not whole there are none."""
         if recorder.count < 2:
             say("nothing was recorded, so there are no numbers")
         elif not self.client.ended:
@@ -138,7 +138,7 @@ class LiveRecorder:
             self.failure = self.failure or text
         else:
             self.recorded = recorder.finish(recorder.ended, recorder.record_step)
-            _say_all(self.recorded.link_lines)
+            _say_all(self.recorded.links.lines())
 
     def _follow(self) -> None:
         while not self.client.ended:
@@ -156,12 +156,10 @@ class LiveRecorder:
                 self._say_events(message)
             if recorder is None:
                 return
-            known, sound = len(recorder.missing), not recorder.record_failure
+            known = len(recorder.missing)
             if not self._tried(f"the record ends at {recorder.ended:.2f} s", lambda: recorder(message), GOES_ON):
                 self._recorder = None
                 recorder.close()
-            if sound and recorder.record_failure:
-                say(recorder.record_failure + GOES_ON)
             for before, after in recorder.missing[known:]:
                 say(f"rows between {before:.2f} and {after:.2f} s are missing: for so long no word came of the plant")
         except Exception as error:

@@ -14,7 +14,7 @@ from gridpeers.scenarios.live.departures import Departures, compare, few
 from gridpeers.scenarios.live.live_files import ended_scenario, write_scenario
 from gridpeers.scenarios.live.live_processes import ProcessOutcome
 from gridpeers.scenarios.measured_run import write_measures
-from gridpeers.scenarios.results.history import as_they_came, late_moves, messages_saved
+from gridpeers.scenarios.results.history import as_they_came, late_moves
 from gridpeers.scenarios.results.island_membership import taken_part
 from gridpeers.scenarios.results.metrics_file import RunMetrics, case_facts
 from gridpeers.scenarios.results.plots.drawing import Drawing, Mark, drawing_of
@@ -53,10 +53,8 @@ def write_report(metrics: RunMetrics, recorded: Recorded, pacing: Pacing | None,
     """
     scenario, feeder, (case,) = metrics.scenario, metrics.feeder, metrics.scenario.cases
     departures = compare(scenario, feeder, recorded.events, recorded.ended, recorded.missing)
-    whole = CheckedCase.of(scenario, feeder, case, recorded, metrics.folder / case)
-    saved = messages_saved(scenario, feeder, case, recorded.quiet, departures.measured)
-    rows = taken_part(scenario, feeder, whole.history)
-    taken = replace(whole, history=rows, windows=departures.measured, messages_saved=saved)
+    whole = CheckedCase.of(scenario, feeder, case, recorded, metrics.folder / case, departures.measured)
+    taken = replace(whole, history=taken_part(scenario, feeder, whole.history))
     stop = JudgingStop(StoppedError, KeyboardInterrupt)
     report = write_measures(
         metrics,
@@ -107,8 +105,6 @@ def _notes(scenario: ScenarioModel, recorded: Recorded, departures: Departures) 
     if recorded.missing:
         spans = ", ".join(f"{before:.2f} and {after:.2f} s" for before, after in recorded.missing)
         yield f"rows are missing between {spans}, as the record was out of the plant's reach"
-    if recorded.record_failure:
-        yield f"{recorded.record_failure}; the run went on without it"
     yield from late_moves(scenario, recorded.events)
     if departures.note:
         yield departures.note
@@ -127,7 +123,7 @@ def conclude(outcome: ProcessOutcome, metrics: RunMetrics) -> ProcessOutcome:
         # first: a signal may end what follows
         write_scenario(folder, *ended_scenario(metrics.scenario, recorded.ended))
         show(write_report(metrics, recorded, outcome.pacing), terminal())
-        set_complete(folder, filter(None, [recorded.record_failure]))
+        set_complete(folder)
     except (StoppedError, KeyboardInterrupt) as stop:
         set_broken(folder, "interrupted while its numbers were made")
         return replace(outcome, interrupted=str(stop) or "SIGINT")

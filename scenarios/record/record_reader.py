@@ -21,6 +21,7 @@ from gridpeers.scenarios.record.message_index import MessageIndex, MessageOnWire
 from gridpeers.scenarios.record.record_file import RecordFile, RecordFileError, record_path
 from gridpeers.scenarios.record.recorded_decision import RecordedDecision
 from gridpeers.scenarios.results.history import History
+from gridpeers.scenarios.results.record import canonical
 from gridpeers.scenarios.short_texts import short
 from gridpeers.wire.journal import Entry
 from gridpeers.wire.messages import AnyMessage, LinkReport, LinkRequest, PlantEvent, Telemetry
@@ -92,18 +93,17 @@ class RunRecord:
         return self.index.of_type("telemetry", Telemetry, self.index.near(since, until))
 
     def physics(self) -> History:
-        """Return the rows of the plant as in history.csv, to the last bit; RecordFileError if there are none."""
-        rows: list[tuple[float, ...]] = []
-        inverters = self.info.inverters
+        """Return the rows of the plant, to the last bit; RecordFileError if there are none."""
+        rows, inverters = bytearray(), self.info.inverters
         for message in self.telemetry():
             inverters = message.inverters
-            rows += message.rows
+            rows += canonical(message.rows)
         if not rows:
             raise RecordFileError(f"{self.path}: it has no rows: it ends before the run began")
-        return History.of(inverters, rows)
+        return History.of(inverters, bytes(rows))
 
     def events(self) -> tuple[PlantEvent, ...]:
-        """Return the events of the plant, the roster and the links, in the order of time, as in events.csv."""
+        """Return the events of the plant, the roster and the links, in the order of time."""
         return tuple(event for message in self.telemetry() for event in message.events)
 
     def messages(

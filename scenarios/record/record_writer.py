@@ -1,7 +1,7 @@
 """Write the record of one case while it runs: chunks, each on the disk within a second of its first message.
 
-A thread encodes, compresses and writes, so that the run waits for no disk; a run in one process writes in between. A
-full or broken disk ends the record with one sentence, and the run goes on.
+A thread encodes, compresses and writes, so that the run waits for no disk that keeps up; a run in one process writes in
+between. A full or broken disk ends the record with its last whole chunk.
 """
 
 from __future__ import annotations
@@ -10,9 +10,10 @@ import contextlib
 import os
 import threading
 from collections.abc import Iterator, Sequence
+from math import inf
 from pathlib import Path
 from tempfile import TemporaryFile
-from time import monotonic
+from time import monotonic, sleep
 from typing import Any, cast
 
 import lz4.frame  # noqa: F401  # without these two mcap fails at the first chunk
@@ -32,6 +33,7 @@ from gridpeers.scenarios.record.record_info import (
     Topic,
     channels,
 )
+from gridpeers.scenarios.results.tables import QUANTITIES
 from gridpeers.wire.codec import payload_of
 from gridpeers.wire.messages import Journal, LinkReport, LinkRequest, PlantEvent, Telemetry
 
@@ -46,7 +48,7 @@ CHUNK = 150_000
 processor's cache holds, and a reader takes one at a time."""
 
 BEHIND = 64_000_000
-"""Bytes of messages that may wait for the disk; more end the record, so that the memory of a run is bounded."""
+"""Bytes of messages that may wait for the disk: with more, who records waits too, so that memory is bounded."""
 
 
 class _WholeWrites:
@@ -111,14 +113,13 @@ class _FileIndex:
 class RecordWriter:
     """Write one record: `add` its messages, then `close` it.
 
-    Raise OSError if the file cannot be made. Later errors end the record: `failure` says so.
+    Raise OSError if the file cannot be made. A later one ends the record, and is its `error`.
     """
 
     def __init__(self, path: Path, info: RecordInfo, channels: tuple[RecordChannel, ...]) -> None:
         self.path = path
-        self._why = ""
-        """Why the record ended early; empty while it goes on, and after a whole one."""
-        self.ended = 0
+        self.error: OSError | None = None
+        """Why the record ended early; None while it goes on, and after a whole one."""
         self._index = _FileIndex(path.parent)  # should the system give no file for it, there is no empty record
         self._file = _WholeWrites(path)
         # LZ4 takes a third of the time and half as much room again: beside a run in one process that time counts.
@@ -137,33 +138,28 @@ class RecordWriter:
         self._waiting: list[tuple[Topic, int, int, bytes]] = []
         self._bytes = 0
         self._lock, self._wake, self._closed = threading.Lock(), threading.Event(), threading.Event()
-        self._written_at = self._began = monotonic()
+        self._began, self._written_at = monotonic(), -inf
         self._syncs = False
         self._thread: threading.Thread | None = None
         if info.driver != "inprocess":  # there the run would take turns with it, 5 ms each, and wait for longer
             self._thread = threading.Thread(target=self._write_all, name="record", daemon=True)
             self._thread.start()
 
-    @property
-    def failure(self) -> str:
-        """Sentence on why the record ended early; empty if it did not."""
-        return self._why and f"the record {self.path.name} ends at {self.ended / 1e9:.2f} s: {self._why}"
-
     def add(self, topic: Topic, t: int, number: int, data: bytes) -> None:
         """Take a message of run time t (ns); it is on the disk within a second."""
-        if self._why:
+        if self.error is not None:
             return
         with self._lock:
             self._waiting.append((topic, t, number, data))
             self._bytes += len(data)
             many = self._bytes
-        if many > BEHIND:
-            self._fail(f"its disk takes too long: {many / 1e6:.0f} MB wait for it")
-        elif self._thread is None:
-            if many > CHUNK or monotonic() - self._written_at > PERIOD:
+        if many > CHUNK or monotonic() - self._written_at > PERIOD:
+            if self._thread is None:
                 self._write()
-        elif many > CHUNK:
-            self._wake.set()
+            else:
+                self._wake.set()
+        while self._thread is not None and self._bytes > BEHIND and self.error is None:
+            sleep(0.01)
 
     def close(self) -> None:
         if self._closed.is_set():
@@ -172,19 +168,19 @@ class RecordWriter:
         self._wake.set()
         if self._thread is not None:
             self._thread.join()
-        elif not self._why:
+        elif self.error is None:
             self._write()
-        if not self._why:
+        if self.error is None:
             try:
                 self._writer.finish()  # type: ignore[no-untyped-call,unused-ignore]  # as mcap declares it
                 self._file.flush()
             except OSError as error:
-                self._fail(error.strerror or str(error))
+                self._fail(error)
         self._index.close()
         self._file.close()
 
     def _write_all(self) -> None:
-        while not self._why:
+        while self.error is None:
             self._wake.wait(PERIOD)
             self._wake.clear()
             closing = self._closed.is_set()
@@ -200,13 +196,12 @@ class RecordWriter:
                 self._writer.add_message(self._channels[topic], t, data, t, number)
             if waiting:
                 self._flush()
-                self.ended = waiting[-1][1]
             self._written_at = monotonic()
             if not self._syncs and self._written_at - self._began > SYNC:  # a shorter run has no need of it
                 self._syncs, words = True, (self._file.descriptor(),)
                 threading.Thread(target=self._sync_all, args=words, name="sync", daemon=True).start()
         except OSError as error:
-            self._fail(error.strerror or str(error))
+            self._fail(error)
 
     def _sync_all(self, descriptor: int) -> None:
         """Have the disk keep what is written against a loss of power; the writer does not wait for a busy disk."""
@@ -218,8 +213,8 @@ class RecordWriter:
     def _flush(self) -> None:
         self._writer.flush()  # type: ignore[no-untyped-call,unused-ignore]  # as mcap declares it
 
-    def _fail(self, why: str) -> None:
-        self._why = self._why or why
+    def _fail(self, error: OSError) -> None:
+        self.error = OSError(error.errno, error.strerror or str(error), str(self.path))
         with self._lock:
             self._waiting.clear()
             self._bytes = 0
@@ -239,9 +234,8 @@ def nanoseconds(t: float) -> int:
 class Recording(RecordWriter):
     """Record one case: give it all that the plant publishes for recorders, then close it."""
 
-    def __init__(self, folder: Path, info: RecordInfo, quantities: Sequence[str]) -> None:
-        super().__init__(folder / FILE, info, channels(info.inverters, tuple(quantities)))
-        self._quantities = quantities
+    def __init__(self, folder: Path, info: RecordInfo) -> None:
+        super().__init__(folder / FILE, info, channels(info.inverters, QUANTITIES))
         self._step = nanoseconds(LIVE_VIEW_STEP if info.clock == "wall" else VIEW_STEP)
         self._t = self._next = 0.0
         """Time (s) of the last telemetry, and from which on a row is the next for viewers."""
@@ -261,10 +255,10 @@ class Recording(RecordWriter):
 
     def _add_row(self, inverters: Sequence[str], row: Sequence[float]) -> None:
         """Add a row for viewers; null stands for a number that is not finite."""
-        at, number = nanoseconds(row[0]), len(self._quantities)
+        at, number = nanoseconds(row[0]), len(QUANTITIES)
         self._next = (at + self._step) / NANO - 0.5 / NANO
         starts = range(1, len(row), number)
-        parts = (dict(zip(self._quantities, row[i : i + number], strict=True)) for i in starts)
+        parts = (dict(zip(QUANTITIES, row[i : i + number], strict=True)) for i in starts)
         named = dict(zip(inverters, parts, strict=True))
         self.add("physics", at, 0, msgspec.json.encode({"t_s": row[0]} | named))
 

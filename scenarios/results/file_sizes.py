@@ -11,15 +11,15 @@ from gridpeers.agents.graphs import GraphError, in_neighbours
 from gridpeers.netem.schema.pattern import Link
 from gridpeers.plant.equipment import Feeder, InverterRow
 from gridpeers.scenarios.results.metrics_file import Clock
-from gridpeers.scenarios.results.record import QUANTITIES
 from gridpeers.scenarios.results.run_files import FolderError, shown
+from gridpeers.scenarios.results.tables import QUANTITIES
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.scenarios.schema.configs import configs
 from gridpeers.scenarios.schema.participants import inverters_of, netem_of, setup_of, with_agent
 from gridpeers.wire.messages import PLANT
 
 NUMBER = 18  # Bytes of a number in history.csv with its comma: 17.5 measured over 600 s of islanding
-VERDICT, VERDICT_UNDER_WAY = 36, 26  # Bytes of a message's row in links.csv, and in its file while the case runs
+VERDICT = 36  # Bytes of a message's row in links.csv
 RECORDED_NUMBER = 6  # Bytes of a number of telemetry in run.mcap, compressed: 5.2 to 7.5 measured
 
 RECORDED_DECISION = {"simulated": 75, "wall": 150}
@@ -73,7 +73,7 @@ def file_sizes(
         used = _links_used(scenario, feeder, case, agents) if arrivals or faults else []
         messages = ticks * sum(bool(setup.netem.spans(link, setup.microgrids)) for link in used)
         links += messages * VERDICT
-        most = max(most, messages * VERDICT_UNDER_WAY)
+        most = max(most, messages * VERDICT)  # rows are sorted by link in another file first
         record += numbers * RECORDED_NUMBER
         if scenario.record != "physics":
             record += ticks * len(agents) * RECORDED_DECISION[clock] + messages * RECORDED_VERDICT

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
-from pathlib import Path
+from hashlib import sha256
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gridpeers.plant.equipment import Feeder, InverterRow
-from gridpeers.scenarios.results.record import QUANTITIES, Recorded, Row, header
+from gridpeers.scenarios.results.tables import QUANTITIES, history_csv
 from gridpeers.scenarios.schema.participants import with_agent
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.wire.messages import PlantEvent
@@ -71,6 +71,8 @@ T = TypeVar("T", bound="Nameplates | History")
 UNITS = {"t": "s", "f": "Hz", "P": "W", "Q": "var", "V": "V", "P_set": "W", "V_set": "V"}
 """Units of a history's time and quantities."""
 
+_OF_INVERTERS = tuple(name for name in UNITS if name != "t")
+
 
 @dataclass(frozen=True, kw_only=True)
 class History:
@@ -109,20 +111,34 @@ class History:
         """Return a table with columns (inverter, quantity) and the index t (s); `attrs["units"]` has the units."""
         import pandas as pd  # takes longer to import than a case to run
 
-        quantities = [name for name in UNITS if name != "t"]
-        values = np.stack([getattr(self, name) for name in quantities], axis=2).reshape(len(self.t), -1)
-        columns = pd.MultiIndex.from_product([self.inverters, quantities], names=["inverter", "quantity"])
-        frame = pd.DataFrame(values, index=pd.Index(self.t, name="t"), columns=columns)
+        columns = pd.MultiIndex.from_product([self.inverters, _OF_INVERTERS], names=["inverter", "quantity"])
+        frame = pd.DataFrame(self.table[:, 1:], index=pd.Index(self.t, name="t"), columns=columns)
         frame.attrs["units"] = dict(UNITS)
         return frame
 
+    @property
+    def table(self) -> Floats:
+        """All numbers, row by row, as `gridpeers.wire.messages.Telemetry.rows` has them; shape (T, 1 + 6 N)."""
+        values = np.stack([getattr(self, name) for name in _OF_INVERTERS], axis=2)
+        return np.column_stack((self.t, values.reshape(len(self.t), len(_OF_INVERTERS) * len(self.inverters))))
+
+    @property
+    def sha256(self) -> str:
+        """Of the bytes of history.csv."""
+        return sha256("".join(history_csv(self)).encode("ascii")).hexdigest()
+
     @classmethod
-    def of(cls, inverters: tuple[str, ...], rows: Sequence[Row] | Floats) -> History:
-        """Return the arrays of rows of telemetry; ValueError if they have not as many numbers as inverters need."""
-        table, shape = np.asarray(rows, np.float64), (len(rows), 1 + len(QUANTITIES) * len(inverters))
-        if table.shape != shape:
-            raise ValueError(f"the rows of a history have {table.shape[1:]} numbers instead of {shape[1]}")
-        f, P, Q, V, P_set, V_set = np.moveaxis(table[:, 1:].reshape(len(rows), len(inverters), len(QUANTITIES)), 2, 0)
+    def of(cls, inverters: tuple[str, ...], rows: Sequence[Sequence[float]] | Floats | bytes) -> History:
+        """Return the arrays of rows, or of their canonical bytes; ValueError if one is too short or long."""
+        columns = 1 + len(QUANTITIES) * len(inverters)
+        if isinstance(rows, bytes):
+            table = np.frombuffer(rows, "<f8").reshape(-1, columns)
+        else:
+            table = np.asarray(rows, np.float64)
+            if table.shape != (len(rows), columns):
+                raise ValueError(f"the rows of a history have {table.shape[1:]} numbers instead of {columns}")
+        values = table[:, 1:].reshape(len(table), len(inverters), len(QUANTITIES))
+        f, P, Q, V, P_set, V_set = np.moveaxis(values, 2, 0)
         return cls(inverters=inverters, t=table[:, 0], f=f, P=P, Q=Q, V=V, P_set=P_set, V_set=V_set)
 
 
@@ -134,20 +150,6 @@ def read_only(of: T) -> T:
             views[item.name] = array.view()
             views[item.name].setflags(write=False)
     return replace(of, **views)
-
-
-def read_history(path: Path) -> History:
-    """Read history.csv back, to the last bit. Raise ValueError if its header is not that of a history."""
-    with path.open(encoding="ascii") as file:
-        first = file.readline().rstrip("\n")
-        names = tuple(column.removesuffix("_f_Hz") for column in first.split(",") if column.endswith("_f_Hz"))
-        if tuple(first.split(",")) != header(names):
-            raise ValueError(f"{path.name}: the first line is not the header of a history: {first[:80]}")
-        return History.of(names, np.loadtxt(file, delimiter=",", ndmin=2))
-
-
-def history_of(recorded: Recorded) -> History:
-    return History.of(recorded.inverters, recorded.rows) if recorded.file is None else read_history(recorded.file)
 
 
 @dataclass(frozen=True, kw_only=True)

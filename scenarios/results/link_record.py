@@ -1,40 +1,27 @@
-"""Record of the emulated links of one case: every verdict in links.csv, counts and one hash of all in links.json."""
+"""Record of the emulated links of one case: counts and one hash of all verdicts, for links.json and the report."""
 
 from __future__ import annotations
 
 import json
 from collections import Counter
 from collections.abc import Iterator
-from io import SEEK_END, BytesIO
-from itertools import chain
 from pathlib import Path
-from typing import BinaryIO
 
 import msgspec
 
-from gridpeers.netem.ledger import LinkCounts, LinkTrace, combined, copies_of
+from gridpeers.netem.ledger import LinkCounts, LinkTrace, combined
 from gridpeers.scenarios.emulation.link_data import data_of
-from gridpeers.scenarios.results.run_files import csv_text, write_whole
+from gridpeers.scenarios.results.run_files import write_whole
 from gridpeers.wire.messages import LinkReport
-
-COLUMNS = ("src", "dst", "seq", "t_s", "delay_s", "fate")
-"""Columns of links.csv: one row for each copy of a message, or for a message that was dropped."""
-
-PARTIAL = "links.partial"  # Name of the verdicts' file while the case runs; links.csv takes its place
-_SIZE = 4  # Bytes of the size before each part in that file
 
 
 class LinkRecord:
-    """Record the link reports of one case.
+    """Record the link reports of one case; verdicts, as many as messages, stay in memory only where `keep` says so."""
 
-    Verdicts are as many as messages: with a folder they are in a file there until the case has ended, not in memory.
-    """
-
-    def __init__(self, folder: Path | None = None) -> None:
-        self._path = None if folder is None else folder / PARTIAL
-        self._file: BinaryIO = BytesIO()
-        self._parts: dict[tuple[str, str], list[int]] = {}
-        """Places in the file of the verdicts of each link, as they were reported."""
+    def __init__(self, *, keep: bool = True) -> None:
+        self._keep = keep
+        self.traces: list[LinkTrace] = []
+        """Verdicts, in parts of one link, as they were reported."""
         self.counts: dict[tuple[str, str], LinkCounts] = {}
         """Counts of the messages of each link (src, dst)."""
         self.garbled = 0
@@ -49,21 +36,12 @@ class LinkRecord:
         except msgspec.DecodeError:
             self.garbled += 1
             return
-        self._keep(data.traces)
+        if self._keep:
+            self.traces += data.traces
         self.failures += data.failures
         self.counts.update({(src, report.sender): counts for src, counts in data.counts.items()})
         if data.sha256:
             self._sha256[report.sender] = data.sha256
-
-    def _keep(self, traces: tuple[LinkTrace, ...]) -> None:
-        if traces and self._path is not None and not self._parts:
-            self._file = self._path.open("w+b")
-        self._file.seek(0, SEEK_END)
-        for trace in traces:
-            self._parts.setdefault((trace.src, trace.dst), []).append(self._file.tell())
-            encoded = _encode(trace)
-            self._file.write(len(encoded).to_bytes(_SIZE, "little") + encoded)
-        self._file.flush()  # a run that is killed leaves its verdicts
 
     @property
     def sent(self) -> int:
@@ -80,32 +58,20 @@ class LinkRecord:
         open_ = ((link, counts) for link, counts in self.counts.items() if not counts.closes)
         return tuple(f"{src} -> {dst}: the account does not close: {counts}" for (src, dst), counts in open_)
 
-    def traces(self) -> Iterator[LinkTrace]:
-        """Yield the verdicts in parts, link by link; only one part at a time is decoded."""
-        for link in sorted(self._parts):
-            for part in self._parts[link]:
-                self._file.seek(part)
-                yield _decode(self._file.read(int.from_bytes(self._file.read(_SIZE), "little")))
+    def write(self, folder: Path) -> None:
+        """Write links.json; nothing if no message was sent."""
+        if self.sent:
+            counts = [
+                {"src": src, "dst": dst, **msgspec.to_builtins(of)} for (src, dst), of in sorted(self.counts.items())
+            ]
+            whole: dict[str, object] = {"trace_sha256": self.sha256, "accounts": counts}
+            whole |= {"failures": sorted(self.failures)} if self.failures else {}
+            write_whole(folder / "links.json", json.dumps(whole, indent=1, default=str) + "\n")
 
-    def write(self, folder: Path) -> list[str]:
-        """Write links.csv and links.json, and return the lines for the report; nothing if no message was sent."""
+    def lines(self) -> Iterator[str]:
+        """Yield the lines for the report; none if no message was sent."""
         if not self.sent:
-            return []
-        parts = chain([[COLUMNS]], map(_rows, self.traces()))
-        write_whole(folder / "links.csv", map(csv_text, parts))  # part by part: an hour has hundreds of megabytes
-        write_whole(folder / "links.json", self._json())
-        if self._path is not None:
-            self._file.close()
-            self._path.unlink(missing_ok=True)
-        return list(self._lines())
-
-    def _json(self) -> str:
-        counts = [{"src": src, "dst": dst, **msgspec.to_builtins(of)} for (src, dst), of in sorted(self.counts.items())]
-        whole: dict[str, object] = {"trace_sha256": self.sha256, "accounts": counts}
-        whole |= {"failures": sorted(self.failures)} if self.failures else {}
-        return json.dumps(whole, indent=1, default=str) + "\n"
-
-    def _lines(self) -> Iterator[str]:
+            return
         dropped: Counter[str] = Counter()
         lies: Counter[str] = Counter()
         for (src, _), counts in sorted(self.counts.items()):
@@ -123,16 +89,3 @@ class LinkRecord:
             first, *others = sorted(self.failures)
             more = f" (and {len(others)} more of this kind, links.json)" if others else ""
             yield f"WARNING: {first}{more}"
-
-
-_encode = msgspec.msgpack.Encoder().encode
-_decode = msgspec.msgpack.Decoder(LinkTrace).decode
-
-
-def _rows(trace: LinkTrace) -> Iterator[tuple[object, ...]]:
-    for seq, t, outcome in zip(trace.seq, trace.t, trace.outcome, strict=True):
-        sent = trace.src, trace.dst, seq, t
-        if isinstance(outcome, str):
-            yield *sent, "", outcome
-        for copy, (delay_s, bit) in enumerate(copies_of(outcome)):
-            yield *sent, delay_s, ("copy" if copy else "passed") + ("" if bit is None else f", bit {bit} flipped")

@@ -1,107 +1,104 @@
-"""Record one case of a run, by any driver: history.csv, events.csv and the files of its links, or all in memory.
+"""Record one case of a run, by any driver: into run.mcap while it runs, or in memory; tables at its end.
 
-Rows go to `history.partial.csv` while the case runs, which gets its name when the last row is there, and keeps the
-partial one if the case breaks.
+Nothing else keeps an account: the file has all that came until a kill, and what is read later is read from it.
 """
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from struct import pack
+from typing import TYPE_CHECKING
 
-import msgspec
-
+from gridpeers.netem.ledger import LinkTrace
 from gridpeers.scenarios.results.link_record import LinkRecord
-from gridpeers.scenarios.results.run_files import csv_text, write_whole
+from gridpeers.scenarios.results.tables import header, write_tables
 from gridpeers.wire.messages import Journal, LinkReport, LinkRequest, PlantEvent, Telemetry
 
 if TYPE_CHECKING:
     from gridpeers.scenarios.record.record_info import RecordInfo
+    from gridpeers.scenarios.record.record_reader import RunRecord
     from gridpeers.scenarios.record.record_writer import Recording
-
-QUANTITIES = ("f_Hz", "P_W", "Q_var", "V_V", "P_set_W", "V_set_V")
-"""Columns of each inverter, in the order of `gridpeers.wire.messages.Telemetry.rows`, with their units."""
-
-PARTIAL = "history.partial.csv"  # Name of the history while it is incomplete
-
-
-Row = tuple[float, ...]  # As in `gridpeers.wire.messages.Telemetry.rows`
-
-
-class Recorded(msgspec.Struct, frozen=True, kw_only=True):
-    inverters: tuple[str, ...]
-    """Order of the columns."""
-    rows: Sequence[Row] = ()
-    """Rows in the order of time; empty where they are in a file."""
-    file: Path | None = None
-    """The history.csv with the rows; None where they are in memory."""
-    ended: float
-    missing: tuple[tuple[float, float], ...] = ()
-    """Times (s) of the last row before and of the first row after each interval of which no rows came."""
-    events: tuple[PlantEvent, ...]
-    quiet: tuple[tuple[float, int], ...] = ()
-    """Run time (s), and number of states of that tick that were not sent to the neighbours."""
-    links: LinkRecord = msgspec.field(default_factory=LinkRecord)
-    link_lines: tuple[str, ...] = ()
-    """Lines for the report on the emulated links; none without a folder."""
-    sha256: str
-    """Of the bytes of history.csv."""
-    reproducible: bool
-    """True if the same scenario and seed give the same bytes again."""
-    record_failure: str = ""
-    """Sentence on why run.mcap ends early, or is not there; empty if it is whole, or was not asked for."""
+    from gridpeers.scenarios.results.history import History
 
 
 class RecordError(RuntimeError):
     """The record is not the whole run."""
 
 
-def header(inverters: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the names of the columns of history.csv."""
-    return ("t_s", *(f"{name}_{quantity}" for name in inverters for quantity in QUANTITIES))
+def canonical(rows: Iterable[Sequence[float]]) -> bytes:
+    """Return the bytes of rows: float64, little-endian, row by row."""
+    return b"".join([pack(f"<{len(row)}d", *row) for row in rows])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recorded:
+    """A case as recorded; its rows and the verdicts on its messages are in memory, or read from its file."""
+
+    inverters: tuple[str, ...]
+    """Order of the columns."""
+    table: bytes = b""
+    """Rows in memory, `canonical`."""
+    file: RunRecord | None = None
+    """The record with the rows and verdicts; None where they are in memory."""
+    ended: float
+    missing: tuple[tuple[float, float], ...] = ()
+    """Times (s) of the last row before and of the first row after each interval of which no rows came."""
+    events: tuple[PlantEvent, ...]
+    quiet: tuple[tuple[float, int], ...] = ()
+    """Run time (s), and number of states of that tick that were not sent to the neighbours."""
+    links: LinkRecord
+    sha256: str
+    """Of the bytes of history.csv."""
+    reproducible: bool
+    """True if the same scenario and seed give the same bytes again."""
+
+    @cached_property
+    def history(self) -> History:
+        from gridpeers.scenarios.results.history import History  # numpy, which a run starts without
+
+        return History.of(self.inverters, self.table) if self.file is None else self.file.physics()
+
+    def traces(self) -> Iterator[LinkTrace]:
+        """Yield the verdicts of the emulated links, in parts of one link."""
+        yield from self.links.traces if self.file is None else self.file.links()
 
 
 class Recorder:
     """Record one case: call it with every message that the plant publishes for recorders, then `finish()`.
 
-    With a folder it writes history.csv, events.csv, links.csv and links.json and keeps no rows, so that hours take no
-    more memory than seconds; without one it keeps the rows and writes nothing. The hash is the same either way. Rows
-    may be missing (`gaps`) in a run whose recorder was out of reach. `record` is the run of a run.mcap beside.
+    With a `record`, the run of a run.mcap in the folder, it keeps no rows, so that hours take no more memory than
+    seconds; without one they are in memory. With a folder the tables are written at the end. The fingerprint is the
+    same either way. Rows may be missing (`gaps`) in a run whose recorder was out of reach.
+
+    Raise OSError if the file cannot be made, or takes no more.
     """
 
     def __init__(self, folder: Path | None = None, *, gaps: bool = False, record: RecordInfo | None = None) -> None:
         self._gaps, self._folder = gaps, folder
         self._hash = hashlib.sha256()
-        self._file: BinaryIO | None = None
+        self._table = bytearray()
+        self._file: Recording | None = None
         if folder is not None:
             folder.mkdir(parents=True)
-            self._file = (folder / PARTIAL).open("wb")
-        self._recording: Recording | None = None
-        self._not_recorded = ""
-        """Why there is no run.mcap though one was asked for."""
-        if folder is not None and record is not None:
-            from gridpeers.scenarios.record.record_writer import Recording  # imports mcap, which a sweep does without
+            if record is not None:
+                from gridpeers.scenarios.record.record_writer import Recording  # imports mcap, which sweeps do without
 
-            try:
-                self._recording = Recording(folder, record, QUANTITIES)
-            except OSError as error:
-                self._not_recorded = f"there is no run.mcap: it cannot be made: {error.strerror}"
-        self._finished = False
+                self._file = Recording(folder, record)
         self._inverters: tuple[str, ...] = ()
         self._first: list[float] = []
         """Times of the first two rows (s)."""
-        self.rows: list[Row] = []
         self.count = 0
         self.ended = 0.0
         self.missing: list[tuple[float, float]] = []
-        self._events: list[PlantEvent] = []
-        self.quiet: list[tuple[float, int]] = []
+        self.events: list[PlantEvent] = []
+        self._quiet: list[tuple[float, int]] = []
         self.reproducible = True
         """False once something unscripted, such as the death of an agent, has entered the run."""
-        self.links = LinkRecord(folder)
+        self.links = LinkRecord(keep=self._file is None)
 
     def __enter__(self) -> Recorder:
         return self
@@ -114,21 +111,14 @@ class Recorder:
             self._take(message)
         elif isinstance(message, LinkReport):
             self.links(message)
-        if self._recording is not None:
-            self._recording(message)
-
-    @property
-    def events(self) -> tuple[PlantEvent, ...]:
-        return tuple(self._events)
-
-    @property
-    def record_failure(self) -> str:
-        return self._not_recorded if self._recording is None else self._recording.failure
+        if self._file is not None:
+            self._file(message)
+            _require(self._file)
 
     def _take(self, telemetry: Telemetry) -> None:
         if not self._inverters:
             self._inverters = telemetry.inverters
-            self._write((",".join(header(telemetry.inverters)) + "\n").encode("ascii"))
+            self._hash.update((",".join(header(telemetry.inverters)) + "\n").encode("ascii"))
         for row in telemetry.rows:
             if self.count and row[0] <= self.ended:
                 raise RecordError(f"telemetry: a row of {row[0]:g} s came after that of {self.ended:g} s")
@@ -138,21 +128,18 @@ class Recorder:
                 self.missing.append((self.ended, row[0]))
             self.ended = row[0]
             self.count += 1
-            if self._file is None:
-                self.rows.append(row)
-            self._write((",".join(map(repr, row)) + "\n").encode("ascii"))  # `repr` reads back to the same bits
-        self._events.extend(telemetry.events)
-        self.quiet.extend(telemetry.quiet)
+        self._hash.update("".join([",".join(map(repr, row)) + "\n" for row in telemetry.rows]).encode("ascii"))
+        if self._file is None:
+            self._table += canonical(telemetry.rows)
+        self.events += telemetry.events
+        self._quiet += telemetry.quiet
         self.reproducible = self.reproducible and telemetry.reproducible
-        if self._file is not None:
-            self._file.flush()
 
     def finish(self, end: float, record_step: float) -> Recorded:
-        """Give the files their names; raise RecordError if rows are missing: then they keep PARTIAL."""
-        if self._recording is not None:
-            self._recording.close()
+        """Close the record, and write the tables of the case into its folder; raise RecordError if rows are missing."""
+        self.close()
         if self._file is not None:
-            self._file.close()
+            _require(self._file)
         expected = round(end / record_step) + 1
         absent = sum(round((after - before) / record_step) - 1 for before, after in self.missing)
         if self.count + (absent if self._gaps else 0) != expected:
@@ -162,49 +149,43 @@ class Recorder:
                 f"history has {self.count} rows, but {end:g} s in steps of {record_step:g} s are {expected}; "
                 f"{last}{holes}"
             )
-        file, link_lines = None, []
-        if self._folder is not None:
-            self._write_events(self._folder)
-            link_lines = self.links.write(self._folder)
-            file = (self._folder / PARTIAL).rename(self._folder / "history.csv")
-        self._finished = True
-        return Recorded(
+        recorded = Recorded(
             inverters=self._inverters,
-            rows=self.rows,
-            file=file,
+            table=bytes(self._table),
+            file=None if self._file is None else _opened(self._file.path),
             ended=self.ended,
             missing=tuple(self.missing),
-            events=self.events,
-            quiet=tuple(self.quiet),
+            events=tuple(self.events),
+            quiet=tuple(self._quiet),
             links=self.links,
-            link_lines=tuple(link_lines),
             sha256=self._hash.hexdigest(),
             reproducible=self.reproducible,
-            record_failure=self.record_failure,
         )
+        if self._folder is not None:
+            write_tables(
+                self._folder, recorded.history, recorded.events, recorded.traces() if self.links.sent else None
+            )
+            self.links.write(self._folder)
+        return recorded
 
     def close(self) -> None:
-        """End the record. What came of a case that was not finished stays, under the partial name."""
-        if self._recording is not None:
-            self._recording.close()
-        if self._folder is not None and self._file is not None and not self._finished:
-            # On a full disk both may fail: what is in the files stays, and the caller has the first error already.
-            with contextlib.suppress(OSError):
-                self._file.close()
-            with contextlib.suppress(OSError):
-                self._write_events(self._folder)
-                self.links.write(self._folder)
+        """End the record: what came of a case that was not finished is in its file."""
+        if self._file is not None:
+            self._file.close()
 
     @property
     def record_step(self) -> float:
         """Distance of the first two rows (s); 0 while there are not two."""
         return round(self._first[1] - self._first[0], 9) if len(self._first) == 2 else 0.0
 
-    def _write(self, bytes_: bytes) -> None:
-        self._hash.update(bytes_)
-        if self._file is not None:
-            self._file.write(bytes_)
 
-    def _write_events(self, folder: Path) -> None:
-        rows = ((repr(event.t), event.kind, event.subject, event.text) for event in self._events)
-        write_whole(folder / "events.csv", csv_text([("t_s", "kind", "subject", "text"), *rows]))
+def _require(file: Recording) -> None:
+    if file.error is not None:
+        raise file.error
+
+
+def _opened(file: Path) -> RunRecord:
+    from gridpeers.scenarios.record.record_reader import RunRecord  # decoders, which sweeps do without
+
+    file.stat()  # OSError if somebody has removed it
+    return RunRecord.open(file)

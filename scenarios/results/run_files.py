@@ -100,17 +100,17 @@ def _unmade(folder: Path, why: str | None, option: str) -> str:
 
 
 def set_status(folder: Path, status: str) -> None:
-    """Write the one line of status.txt: "running", "complete", "complete: what is missing", or "broken: why"."""
+    """Write the one line of status.txt: "running", "complete", or "broken: why"."""
     write_whole(folder / STATUS, status.replace("\n", " ") + "\n")
 
 
-def set_complete(folder: Path, missing: Iterable[str] = ()) -> None:
-    """Write to status.txt that a run has ended and has its results, with sentences on what is missing."""
-    set_status(folder, ": ".join(filter(None, ("complete", "; ".join(missing)))))
+def set_complete(folder: Path) -> None:
+    """Write to status.txt that a run has ended and has its results."""
+    set_status(folder, "complete")
 
 
 def is_complete(status: str) -> bool:
-    return status.partition(":")[0] == "complete"
+    return status.partition(":")[0] == "complete"  # older runs said what their record lacked
 
 
 def set_broken(folder: Path, why: str) -> None:
@@ -131,7 +131,7 @@ def no_room(error: BaseException) -> bool:
 def refusal(folder: Path, error: OSError) -> str:
     """Return the file of a folder that could not be written, and the reason."""
     if no_room(error) or error.errno in _GONE:
-        return f"{error.filename or shown(folder)}: cannot be written: {error.strerror}"
+        return f"{shown(Path(error.filename or folder))}: cannot be written: {error.strerror}"
     return str(error)
 
 
@@ -151,7 +151,7 @@ def write_whole(path: Path, content: str | bytes | Iterable[str]) -> None:
     except OSError as error:
         with contextlib.suppress(OSError):
             partial.unlink()
-        if error.filename == str(partial):
+        if error.filename in (None, str(partial)):
             error.filename = str(path)  # the file that the user asked for
         raise
 

@@ -13,7 +13,7 @@ from gridpeers.scenarios.catalogue_files import CATALOGUE
 from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.results.findings import find
-from gridpeers.scenarios.results.history import Nameplates, history_of
+from gridpeers.scenarios.results.history import Nameplates
 from gridpeers.scenarios.results.metrics_file import RunMetrics, metrics_json
 from gridpeers.scenarios.results.record import Recorded, Recorder
 from gridpeers.scenarios.schema import load_scenario
@@ -36,7 +36,7 @@ def recorded(path: Path, case: str) -> Recorded:
 def test_islanding_at_50_hz_settles_at_50_hz(tmp_path: Path) -> None:
     """The same feeder as 50 Hz equipment: on the grid at 50 Hz, restored to 50 Hz, with equal power, and no trip."""
     text = ISLANDING.replace("V_set0_pu = 1.0", "V_set0_pu = 1.0\nf_nom_Hz = 50.0").replace("7.0", "4.2")
-    history = history_of(recorded(written(tmp_path, text), "IV"))
+    history = recorded(written(tmp_path, text), "IV").history
     _, feeder = load_scenario("islanding")
     before, after = history.t < 1.0, (history.t > 3.8) & (history.t < 4.0)
     share = history.P[after] / Nameplates.of(feeder.inverters).s

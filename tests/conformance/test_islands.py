@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.scenarios.results.history import History, Nameplates, as_they_came, history_of, windows
+from gridpeers.scenarios.results.history import History, Nameplates, as_they_came, windows
 from gridpeers.scenarios.results.metrics import measure
 from gridpeers.scenarios.run_request import Outcome
 from gridpeers.scenarios.schema import load_scenario
@@ -20,7 +20,7 @@ from tests.golden.catalogue.pins import ran
 def blackout() -> tuple[History, Outcome]:
     """Case IV of the catalogue's scenario."""
     recorded, outcome = ran("blackout", "IV")
-    return history_of(recorded), outcome
+    return recorded.history, outcome
 
 
 def test_a_blackout_does_not_end_the_run(blackout: tuple[History, Outcome]) -> None:
@@ -81,7 +81,7 @@ Row = tuple[float, ...]
 
 def rows(case: str) -> Sequence[Row]:
     """Records of a case of unheard-switches."""
-    return ran("unheard-switches", case)[0].rows
+    return [tuple(row) for row in ran("unheard-switches", case)[0].history.table.tolist()]
 
 
 def row_at(case: str, t: float) -> Row:

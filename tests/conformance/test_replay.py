@@ -19,7 +19,7 @@ from gridpeers.lab.replay.replay import replay
 from gridpeers.runs.result import Result
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.results.plots import run_figures
-from gridpeers.scenarios.results.record import QUANTITIES
+from gridpeers.scenarios.results.tables import QUANTITIES
 from gridpeers.wire.journal import RecordLevel
 from gridpeers.wire.messages import Telemetry
 from tests.command_line import invoke

@@ -16,8 +16,8 @@ from pathlib import Path
 
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
 from gridpeers.scenarios.record.record_file import RecordFileError
+from gridpeers.scenarios.record.record_info import FILE
 from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.scenarios.results.record import PARTIAL
 from tests.record.killed_commands import wait_for_rows
 from tests.record.reader_commands import assert_commands_read
 
@@ -29,8 +29,8 @@ OWN_NAMESPACE = ("unshare", "--user", "--map-root-user", "--mount")
 SIZE = 64_000_000
 """Bytes of the file system."""
 
-ROWS = 60_000
-"""Bytes of history from which on the disk is filled: about a second, so that there are decisions."""
+BEGUN = 1.0
+"""Run time (s) of the record from which on the disk is filled, so that there are decisions."""
 
 CALM = """
 [time]
@@ -83,7 +83,7 @@ def filled(kind: str, words: tuple[str, ...], disk: Path, kept: Path) -> str:
             [sys.executable, "-m", "gridpeers", *words, "--out", "out"], cwd=disk, stdout=printed, stderr=printed
         )
         try:
-            wait_for_rows(command, out / "calm" / PARTIAL, more=ROWS)
+            wait_for_rows(command, out / "calm" / FILE, lambda t: t > BEGUN)
             fill(disk)
             command.wait(120.0)
         finally:

@@ -12,15 +12,16 @@ import signal
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable
 from math import inf
 from pathlib import Path
-from time import monotonic, sleep
+from time import monotonic, sleep, time
 from typing import Literal, NamedTuple
 
 from gridpeers.lab.replay.recomputation import recomputed
+from gridpeers.scenarios.record.record_file import RecordFile, RecordFileError
 from gridpeers.scenarios.record.record_info import FILE
 from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.scenarios.results.record import PARTIAL
 from tests.record.reader_commands import assert_commands_read
 
 LONG = """
@@ -54,10 +55,8 @@ class Left(NamedTuple):
     """What a killed command has left behind."""
 
     record: RunRecord
-    history: float
-    """Last run time in the history (s)."""
     lost: float
-    """Wall time (s) by which the record ends before the history, at the pace of the run."""
+    """Wall time (s) from the record's last chunk to the kill; its nodes had kept the first of it for 0.2 s."""
 
 
 def killed(folder: Path, clock: Clock, after: float, who: str = "command", most: float = inf) -> Left:
@@ -71,56 +70,46 @@ def killed(folder: Path, clock: Clock, after: float, who: str = "command", most:
     pace = ("--driver", "inprocess") if clock == "one process" else ("--clock", clock)
     words = [sys.executable, "-m", "gridpeers", "run", "long.toml", *pace, "--out", "out"]
     command = subprocess.Popen(words, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    history = folder / "out" / "IV" / PARTIAL
+    file = folder / "out" / "IV" / FILE
     try:
-        began = wait_for_rows(command, history)
+        t = wait_for_rows(command, file)
         if most == inf:
             sleep(after)
         else:
-            _wait_for_chunk(command, history, monotonic() + after, began[1] + most)
+            until = monotonic() + after
+            wait_for_rows(command, file, lambda now: now > t and (now >= t + most or monotonic() >= until))
         process = command.pid if who == "command" else _process(command.pid, who)
-        first, t = began
+        t = _last_time(file)
+        killed_at = time()
         os.kill(process, signal.SIGKILL)
-        killed_at = monotonic()
         if who == "plant":  # the run breaks, and the command closes its files
             command.wait(60.0)
         elif who != "command":
-            wait_for_rows(command, history, more=20_000)
+            wait_for_rows(command, file, lambda now: now > t + 0.2)
     finally:
         command.kill()
         command.wait()
-    last = _last_time(history)
-    record = RunRecord.open(folder / "out" / "IV")
-    speed = 1.0 if clock == "wall" else max((last - t) / (killed_at - first), 1e-9)
-    lost = min(max(0.0, last - record.t_end) / speed, killed_at - first)  # a busy machine may let a run stand still
-    return Left(record, last, lost)
+    return Left(RunRecord.open(file), killed_at - file.stat().st_mtime)
 
 
-def wait_for_rows(command: subprocess.Popen[bytes], history: Path, more: int = 5000) -> tuple[float, float]:
-    """Wait for the first rows, or some bytes more of them; return when they came, and their run time."""
+def wait_for_rows(
+    command: subprocess.Popen[bytes], file: Path, enough: Callable[[float], bool] = lambda t: t >= 0.0
+) -> float:
+    """Wait until the last run time (s) of a record is enough, and return it."""
     deadline = monotonic() + 120.0
-    more += history.stat().st_size if history.exists() else 0
-    while monotonic() < deadline:
+    while not enough(t := _last_time(file)):
         assert command.poll() is None, "the command ended by itself"
-        if history.exists() and history.stat().st_size > more:
-            return monotonic(), _last_time(history)
+        assert monotonic() < deadline, "no rows within 120 s"
         sleep(0.02)
-    raise AssertionError("no rows within 120 s")
+    return t
 
 
-def _wait_for_chunk(command: subprocess.Popen[bytes], history: Path, until: float, t: float) -> None:
-    """Wait until a time (s, monotonic), or a run time (s) if that comes earlier, and until the record has grown."""
-    record = history.with_name(FILE)
-    size, deadline = record.stat().st_size, monotonic() + 120.0
-    while (monotonic() < until and _last_time(history) < t) or record.stat().st_size == size:
-        assert command.poll() is None, "the command ended by itself"
-        assert monotonic() < deadline, "the record has not grown within 120 s"
-        sleep(0.02)
-
-
-def _last_time(history: Path) -> float:
-    rows = history.read_bytes().split(b"\n")
-    return float(rows[-2].split(b",")[0])
+def _last_time(file: Path) -> float:
+    """Return the last run time (s) in a record; -1 before it has a part."""
+    try:
+        return (RecordFile(file).ends or [-1.0])[-1]
+    except RecordFileError:
+        return -1.0
 
 
 def _process(parent: int, name: str) -> int:
@@ -134,7 +123,7 @@ def assert_usable(left: Left, *, complete: bool = False) -> None:
     record = left.record
     assert record.complete == complete
     assert complete or any("cut off" in text for text in record.damage)
-    assert left.lost <= 1.0, f"{left.lost:.2f} s lost: history to {left.history:.2f} s, record to {record.t_end:.2f} s"
+    assert left.lost <= 1.0, f"the last chunk, up to {record.t_end:.2f} s, came {left.lost:.2f} s before the kill"
     begun = record.t_end > 0.5  # in one process a second of run time passes before the first chunk: `lost` judges that
     assert not begun or len(record.physics().t) > 1
     for agent in record.agents[:2]:
@@ -157,12 +146,13 @@ def main() -> None:
                 left = killed(Path(folder) / "run", clock, after, who)
                 assert_usable(left, complete=who == "plant")
                 assert_commands_read(left.record)
-                ends = f"history to {left.history:.2f} s, record to {left.record.t_end:.2f} s: {left.lost:.2f} s lost"
+                ends = f"record to {left.record.t_end:.2f} s, last chunk {left.lost:.2f} s before"
                 print(f"{number} {clock}: {who} killed after {after:.2f} s; {ends}", flush=True)
                 lost[clock].append(left.lost)
     for clock, of in ((clock, of) for clock, of in lost.items() if of):
         load = os.getloadavg()[0]
-        print(f"{clock}: {len(of)} records opened and were read; at most {max(of):.2f} s lost; load {load:.1f}")
+        chunk = f"last chunk at most {max(of):.2f} s before"
+        print(f"{clock}: {len(of)} records opened and were read; {chunk}; load {load:.1f}")
 
 
 if __name__ == "__main__":

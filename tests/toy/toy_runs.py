@@ -107,7 +107,7 @@ def first_difference(expected: Rows, got: Rows) -> str:
 def by_link(record: LinkRecord) -> dict[tuple[str, str], LinkTrace]:
     """Return the verdicts of each link (src, dst)."""
     found: dict[tuple[str, str], LinkTrace] = {}
-    for part in record.traces():
+    for part in record.traces:
         link = part.src, part.dst
         one = found.get(link, LinkTrace(*link, (), (), ()))
         found[link] = LinkTrace(*link, one.seq + part.seq, one.t + part.t, one.outcome + part.outcome)

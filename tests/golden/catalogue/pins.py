@@ -30,7 +30,7 @@ class Pin(NamedTuple):
     """Result of one case."""
 
     sha256: str
-    """Of the bytes of its history.csv."""
+    """Fingerprint of its rows."""
     last: tuple[float, ...]
     """Last row of the first inverter, in the order of `QUANTITIES`."""
 
@@ -53,7 +53,7 @@ def ran(name: str, case: str) -> tuple[Recorded, Outcome]:
 def run_case(name: str, case: str) -> Pin:
     """Run one case in this process."""
     recorded, _ = ran(name, case)
-    return Pin(recorded.sha256, recorded.rows[-1][1 : 1 + len(QUANTITIES)])
+    return Pin(recorded.sha256, tuple(recorded.history.table[-1, 1 : 1 + len(QUANTITIES)].tolist()))
 
 
 def environment() -> dict[str, str]:

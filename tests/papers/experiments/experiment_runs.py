@@ -57,5 +57,4 @@ def _history(spec: ScenarioModel, feeder: Feeder, case: str) -> History:
     recorder = Recorder()
     outcome = run_inprocess(plant, agents, recorder, plant=plant_at_start(plant))
     assert not outcome.broke, outcome.broke
-    recorded = recorder.finish(spec.time.end_s, spec.time.record_s)
-    return History.of(recorded.inverters, recorded.rows)
+    return recorder.finish(spec.time.end_s, spec.time.record_s).history

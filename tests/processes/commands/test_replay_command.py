@@ -11,7 +11,6 @@ from pathlib import Path
 import pytest
 
 import gridpeers as gp
-from gridpeers.scenarios.results.record import PARTIAL
 
 SHORT = """
 law = "held:Held"
@@ -77,5 +76,5 @@ def test_a_stopped_replay_ends_as_a_stopped_run(
     if words:
         by = "from the keyboard" if number == signal.SIGINT else "by SIGTERM"
         assert (tmp_path / "would" / "status.txt").read_text() == f"broken: interrupted {by}\n"
-        assert (tmp_path / "would" / "IV" / PARTIAL).exists()
+        assert (tmp_path / "would" / "IV" / "run.mcap").exists()
         assert not (tmp_path / "would" / "metrics.json").exists()

@@ -125,7 +125,7 @@ def test_a_complaint_that_cannot_be_written_keeps_its_exit_status(tmp_path: Path
 
 
 def test_a_run_without_room_for_its_record_breaks_in_one_line(tmp_path: Path) -> None:
-    """Exit status 3; the history keeps its partial name, and nothing in the folder claims to be whole."""
+    """Exit status 3; there is no history, and nothing in the folder claims to be whole."""
     (tmp_path / "long.toml").write_text(SHORT.replace("end_s = 1.5", "end_s = 7.0"))
     done = subprocess.run(
         [*LIMITED, *command("run", "long.toml", "--driver", "inprocess", "--out", "here")],
@@ -135,7 +135,7 @@ def test_a_run_without_room_for_its_record_breaks_in_one_line(tmp_path: Path) ->
         timeout=100,
     )
 
-    why = "here: cannot be written: File too large"
+    why = "here/IV/history.csv: cannot be written: File too large"
     assert done.returncode == 3
     assert done.stderr == f"gridpeers: the run broke: {why}\ngridpeers: what came until then is in here/\n"
     here = tmp_path / "here"

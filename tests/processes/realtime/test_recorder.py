@@ -6,9 +6,11 @@ import json
 import os
 import signal
 from pathlib import Path
+from time import monotonic, sleep
 
 import pytest
 
+from gridpeers.scenarios.record.record_reader import RunRecord
 from tests.processes.terminals import Desk, children_of, wait_for
 
 SCENARIO = """
@@ -52,7 +54,10 @@ def test_a_recorder_that_stood_still_has_every_row(desk: Desk) -> None:
     wait_for(log, "is out of reach; what it misses is kept for a while")
     os.kill(command.pid, signal.SIGCONT)
     wait_for(log, "is back")
-    wait_for(here / "IV" / "history.partial.csv", "\n8.")  # the recorder may be back later than the scenario's end
+    deadline = monotonic() + 60.0
+    while RunRecord.open(here / "IV").t_end < 8.0:  # the recorder may be back later than the scenario's end
+        assert monotonic() < deadline
+        sleep(0.1)
     assert desk.type("down")[0] == 0
 
     assert command.end() == 0, command.text

@@ -112,7 +112,7 @@ def test_a_run_into_a_folder_is_the_commands_folder_and_is_judged(scenario: gp.S
 def test_a_file_of_a_run_that_was_spoilt_is_named(run: gp.Result, tmp_path: Path) -> None:
     """Removed, or bytes that are no text: one line with the file, whenever it is asked for."""
     folder = Path(shutil.copytree(run.folder, tmp_path / "run"))
-    for name in ("IV/history.csv", "IV/events.csv", "report.txt"):
+    for name in ("IV/run.mcap", "report.txt"):
         whole = (folder / name).read_bytes()
         for spoilt in (b"\xff\x00\n", None):
             (folder / name).unlink()

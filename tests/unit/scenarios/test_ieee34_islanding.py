@@ -18,9 +18,10 @@ def shown(case: str) -> Shown:
     scenario, feeder = load_scenario("ieee34-islanding")
     recorder = Recorder()
     run_inprocess(*configs(scenario, feeder, case), recorder)
+    history = recorder.finish(scenario.time.end_s, scenario.time.record_s).history
     closed = {e.subject: e.t for e in recorder.events if e.kind == "switch" and "closed" in e.text}
     warnings = [event.text for event in recorder.events if event.kind in ("warning", "trip")]
-    last = np.array(recorder.rows[-1][1:]).reshape(-1, 6)
+    last = history.table[-1, 1:].reshape(-1, 6).copy()
     last[:, [1, 2, 4]] /= np.array([row.P_rated for row in feeder.inverters])[:, None]
     last[:, 3] /= [row.V_nom for row in feeder.inverters]
     return last, closed, warnings

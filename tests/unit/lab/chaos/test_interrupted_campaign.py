@@ -14,6 +14,8 @@ from gridpeers.lab.chaos import campaign as campaigns
 from gridpeers.lab.chaos import chaos_run
 from gridpeers.lab.chaos.campaign import Campaign, shrink_number
 from gridpeers.lab.chaos.chaos_run import MachineError, run_scenario
+from gridpeers.scenarios.record import record_writer
+from gridpeers.scenarios.record.record_writer import Recording
 from gridpeers.scenarios.run import run_case
 from tests.command_line import invoke
 from tests.unit.lab.chaos.bases import base_in
@@ -115,16 +117,21 @@ def test_without_room_for_the_first_run_the_scenario_is_not_blamed(
 
 
 def test_a_run_whose_record_ends_early_is_not_judged(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A disk that is nearly full ends the record first: checks of messages would find less, and pass."""
-
-    def cut_off(*words: Any) -> Any:
-        recorded, outcome = run_case(*words)
-        return replace(recorded, record_failure="the record run.mcap ends at 0.50 s: its disk is full"), outcome
-
+    """A disk that is nearly full ends the record and so the run: that is the machine's, not the scenario's."""
     base = base_in(small(elsewhere))
-    monkeypatch.setattr(chaos_run, "run_case", cut_off)
 
-    with pytest.raises(MachineError, match=r"the record run.mcap ends at 0.50 s: its disk is full"):
+    def no_room(*_: object) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    begun = Recording.__call__
+
+    def then_full(recording: Recording, message: Any) -> None:
+        begun(recording, message)
+        monkeypatch.setattr(record_writer.os, "write", no_room)
+
+    monkeypatch.setattr(Recording, "__call__", then_full)
+
+    with pytest.raises(MachineError, match=r"No space left on device: .*run\.mcap"):
         run_scenario(base)
 
 

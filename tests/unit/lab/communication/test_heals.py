@@ -7,8 +7,9 @@ from typing import Any
 
 import pytest
 
-from gridpeers.lab.communication.accounts import Heal, Heals
+from gridpeers.lab.communication.accounts import Heals
 from gridpeers.lab.communication.sent_states import NeighbourUse, SentState, SentStates, StateWindow, Uses
+from gridpeers.netem.fault_schedule import Heal
 from gridpeers.netem.ledger import LinkTrace
 
 T_C = 0.02

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from gridpeers.scenarios.live.live_report import live_drawing, write_report
 from gridpeers.scenarios.results.findings import find
 from gridpeers.scenarios.results.history import History, Window, windows
 from gridpeers.scenarios.results.metrics_file import RunMetrics, metrics_json
-from gridpeers.scenarios.results.record import Recorded, Recorder
+from gridpeers.scenarios.results.record import Recorded, Recorder, canonical
 from gridpeers.scenarios.results.report import plain
 from gridpeers.scenarios.schema import ScenarioModel, load_scenario
 from gridpeers.scenarios.schema.configs import configs
@@ -186,9 +187,9 @@ def account(folder: Path, recorded: Recorded, until: float) -> tuple[dict[str, A
     """metrics.json and report of a live run that ended then (s)."""
     scenario, feeder = one_case("islanding")
     ran = RunMetrics(scenario=scenario, feeder=feeder, driver="live", folder=folder, clock="wall")
-    rows = [row for row in recorded.rows if row[0] <= until]
+    rows = [row for row in recorded.history.table.tolist() if row[0] <= until]
     events = tuple(event for event in recorded.events if event.t <= until)
-    whole = msgspec.structs.replace(recorded, rows=rows, ended=rows[-1][0], events=events)
+    whole = replace(recorded, table=canonical(rows), ended=rows[-1][0], events=events)
     report = write_report(ran, whole, None, figures=False)
     return json.loads((folder / "metrics.json").read_text()), plain(report)
 
@@ -199,7 +200,7 @@ def test_a_live_run_that_was_left_alone_has_the_numbers_of_its_case(tmp_path: Pa
     plant, agents = configs(scenario, feeder, "IV")
     recorder = Recorder()
     run_inprocess(plant, agents, recorder)
-    history = History.of(tuple(row.name for row in feeder.inverters), recorder.rows)
+    history = recorder.finish(7.0, plant.record_step).history
     came = windows([("event1", 1.0), ("event2", 4.0)], 7.0)
     found = find({"IV": case_of(history, came, recorder.events)})
     ran = RunMetrics(scenario=scenario, feeder=feeder, driver="inprocess", folder=tmp_path)
@@ -222,8 +223,8 @@ def test_rows_that_are_missing_flag_their_windows(
 ) -> None:
     """A window with a hole is measured but not clean; one without rows at its end has no numbers. Both are told."""
     before, after = missing
-    rows = [row for row in recorded.rows if not before < row[0] < after]
-    holed = msgspec.structs.replace(recorded, rows=rows, missing=(missing,))
+    rows = [row for row in recorded.history.table.tolist() if not before < row[0] < after]
+    holed = replace(recorded, table=canonical(rows), missing=(missing,))
     metrics, report = account(tmp_path, holed, 8.0)
 
     assert [name for name in metrics["cases"]["IV"] if name.startswith("event")] == measured
@@ -277,8 +278,7 @@ def test_what_people_switched_is_measured_as_a_scenario_with_the_same_events_is(
     """The same numbers as if the scenario had had their events; the report says whose they are."""
     scenario, feeder = one_case("islanding")
     came = [("event1", 1.0), ("live at 2.5 s", 2.5), ("event2", 4.0), ("live at 7.5 s", 7.5)]
-    history = History.of(switched.inverters, switched.rows)
-    whole = case_of(history, windows(came, 8.5), switched.events)
+    whole = case_of(switched.history, windows(came, 8.5), switched.events)
     ran = RunMetrics(scenario=scenario, feeder=feeder, driver="inprocess", folder=tmp_path)
     expected = json.loads(metrics_json(ran, find({"IV": whole}), {"IV": {}}))["cases"]["IV"]
     metrics, report = account(tmp_path, switched, 8.5)

@@ -3,21 +3,26 @@
 import csv
 import json
 import tracemalloc
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from msgspec.structs import replace
 
-from gridpeers.netem.ledger import LinkCounts
+from gridpeers.netem.ledger import LinkCounts, LinkTrace
 from gridpeers.netem.models.medium import Corrupt, Duplicate
 from gridpeers.netem.receiver import Receiver
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.scenarios.emulation.link_data import report_data
-from gridpeers.scenarios.results.link_record import COLUMNS, LinkRecord
+from gridpeers.scenarios.results import tables
+from gridpeers.scenarios.results.history import History
+from gridpeers.scenarios.results.link_record import LinkRecord
 from gridpeers.scenarios.results.record import Recorder
+from gridpeers.scenarios.results.tables import LINKS, write_tables
 from gridpeers.wire.messages import LinkReport, Telemetry
-from tests.toy.toy_runs import by_link
+
+NO_ROWS = History.of((), b"")
 
 
 def test_every_row_of_links_csv_has_the_header_s_columns_whatever_befell_the_message(tmp_path: Path) -> None:
@@ -29,15 +34,15 @@ def test_every_row_of_links_csv_has_the_header_s_columns_whatever_befell_the_mes
     record = LinkRecord()
     for data in report_data(receiver.take_trace(), receiver.counts(), receiver.trace_sha256):
         record(LinkReport(sender="inv2", epoch=1, seq=0, t=1.2, data=data))
-    record.write(tmp_path)
+    write_tables(tmp_path, NO_ROWS, (), record.traces)
 
     with (tmp_path / "links.csv").open(newline="") as file:
         rows = list(csv.DictReader(file, strict=True))
-    assert tuple(rows[0]) == COLUMNS
-    assert {len(row) for row in rows} == {len(COLUMNS)}  # DictReader keeps what is too much under the key None
+    assert tuple(rows[0]) == LINKS
+    assert {len(row) for row in rows} == {len(LINKS)}  # DictReader keeps what is too much under the key None
     found = {(int(row["seq"]), row["delay_s"], row["fate"]) for row in rows}
     expected = set()
-    for trace in record.traces():
+    for trace in record.traces:
         for seq, outcome in zip(trace.seq, trace.outcome, strict=True):
             if isinstance(outcome, str):
                 expected.add((seq, "", outcome))
@@ -51,9 +56,8 @@ def test_every_row_of_links_csv_has_the_header_s_columns_whatever_befell_the_mes
     assert any("copy, bit" in row["fate"] for row in rows)
 
 
-@pytest.mark.parametrize("finished", [True, False])
-def test_the_recorder_of_a_case_writes_the_files_of_its_links(tmp_path: Path, finished: bool) -> None:
-    """Telemetry and link reports go into one record; a case that broke keeps the fates of its messages too."""
+def test_the_recorder_of_a_case_writes_the_files_of_its_links(tmp_path: Path) -> None:
+    """Telemetry and link reports go into one record."""
     receiver = Receiver("inv2", Netem(seed=3, links=(Fault(on="* -> inv2", loss=0.2),)), {"inv1": "MG1", "inv2": "MG1"})
     receiver.offer("inv1", 0, 0.0, 0.0, b"state")
     telemetry = Telemetry(
@@ -72,12 +76,12 @@ def test_the_recorder_of_a_case_writes_the_files_of_its_links(tmp_path: Path, fi
         recorder(telemetry)
         for data in report_data(receiver.take_trace(), receiver.counts(), receiver.trace_sha256):
             recorder(LinkReport(sender="inv2", epoch=1, seq=0, t=0.0, data=data))
-        recorded = recorder.finish(0.0, 0.02) if finished else None
+        recorded = recorder.finish(0.0, 0.02)
 
     files = {path.name for path in (tmp_path / "IV").iterdir()}
-    assert files == {"history.csv" if finished else "history.partial.csv", "events.csv", "links.csv", "links.json"}
+    assert files == {"history.csv", "events.csv", "links.csv", "links.json"}
     assert json.loads((tmp_path / "IV" / "links.json").read_text())["accounts"][0]["sent"] == 1
-    assert recorded is None or recorded.link_lines[0].startswith("emulated links: 1 messages over 1 links")
+    assert next(recorded.links.lines()).startswith("emulated links: 1 messages over 1 links")
 
 
 def test_the_line_of_the_report_says_whose_states_were_false(tmp_path: Path) -> None:
@@ -89,7 +93,8 @@ def test_the_line_of_the_report_says_whose_states_were_false(tmp_path: Path) -> 
         for data in report_data((), of, ""):
             record(LinkReport(sender=receiver, epoch=1, seq=0, t=0.0, data=data))
 
-    (line,) = record.write(tmp_path)
+    record.write(tmp_path)
+    (line,) = record.lines()
     assert line == (
         "emulated links: 200 messages over 4 links, dropped: none, false states: 42 of inv2 (links.json, links.csv)"
     )
@@ -97,33 +102,34 @@ def test_the_line_of_the_report_says_whose_states_were_false(tmp_path: Path) -> 
     assert [each.get("lies") for each in accounts] == [20, 22, None, None]
 
 
-def test_verdicts_on_disk_are_those_in_memory_and_take_no_memory(tmp_path: Path) -> None:
-    """A run of hours with faults has millions of verdicts: they are read back once it has ended, and give way then."""
-    receiver = Receiver("inv2", Netem(seed=3, links=(Fault(on="* -> inv2", loss=0.2),)), {"inv1": "MG1", "inv2": "MG1"})
-    in_memory, on_disk = LinkRecord(), LinkRecord(tmp_path)
+def test_verdicts_are_sorted_by_link_and_take_no_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run of hours with faults has millions of them, reported as they come; equal runs give equal files."""
+    monkeypatch.setattr(tables, "_SPOOL", 10_000)
+
+    def reported() -> Iterator[LinkTrace]:
+        for first in range(0, 20_000, 100):
+            for link in (("inv3", "inv1"), ("inv1", "inv2")):
+                seq = tuple(range(first, first + 100))
+                yield LinkTrace(*link, seq, tuple(0.02 * k for k in seq), ("loss", *[0.01] * 99))
+
     tracemalloc.start()
-    for first in range(0, 20_000, 100):
-        for k in range(first, first + 100):
-            receiver.offer("inv1", k, 0.02 * k, 0.02 * k, b"state")
-            receiver.due(0.02 * k)
-        for data in report_data(receiver.take_trace(), receiver.counts(), receiver.trace_sha256):
-            on_disk(LinkReport(sender="inv2", epoch=1, seq=0, t=1.2, data=data))
-            if first < 5_000:
-                in_memory(LinkReport(sender="inv2", epoch=1, seq=0, t=1.2, data=data))
-            elif first == 5_000:
-                before, _ = tracemalloc.get_traced_memory()
-    grown = tracemalloc.get_traced_memory()[0] - before
-    tracemalloc.stop()
-    (mine,), (theirs,) = by_link(on_disk).values(), by_link(in_memory).values()
-    tracemalloc.start()
-    on_disk.write(tmp_path)
+    write_tables(tmp_path, NO_ROWS, (), reported())
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     with (tmp_path / "links.csv").open(newline="") as file:
-        written = [int(row["seq"]) for row in csv.DictReader(file)]
+        written = [(row["src"], row["dst"], int(row["seq"])) for row in csv.DictReader(file)]
 
-    assert max(grown, peak) < 300_000
-    assert written == list(range(20_000))
-    assert mine.outcome[:5_000] == theirs.outcome
-    assert mine.seq == tuple(range(20_000))
-    assert {path.name for path in tmp_path.iterdir()} == {"links.csv", "links.json"}
+    assert peak < 300_000
+    assert written == [("inv1", "inv2", k) for k in range(20_000)] + [("inv3", "inv1", k) for k in range(20_000)]
+    assert {path.name for path in tmp_path.iterdir()} == {"history.csv", "events.csv", "links.csv"}
+
+
+def test_without_keeping_there_are_counts_and_no_verdicts() -> None:
+    """Where a record has the verdicts, none is in memory."""
+    receiver = Receiver("inv2", Netem(seed=3, links=(Fault(on="* -> inv2", loss=0.2),)), {"inv1": "MG1", "inv2": "MG1"})
+    receiver.offer("inv1", 0, 0.0, 0.0, b"state")
+    record = LinkRecord(keep=False)
+    for data in report_data(receiver.take_trace(), receiver.counts(), receiver.trace_sha256):
+        record(LinkReport(sender="inv2", epoch=1, seq=0, t=0.0, data=data))
+
+    assert (record.sent, record.traces) == (1, [])

@@ -1,5 +1,6 @@
-"""What a case leaves on disk: bytes that are equal when the run is, whole files or none."""
+"""What a case leaves on disk: bytes that are equal when the run is, one record, and whole tables of it or none."""
 
+import errno
 import hashlib
 import tracemalloc
 from pathlib import Path
@@ -9,9 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from gridpeers.scenarios.results.history import history_of, read_history
-from gridpeers.scenarios.results.record import PARTIAL, Recorder, RecordError
+from gridpeers.scenarios.record import record_writer
+from gridpeers.scenarios.record.record_info import RecordInfo
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.results.record import Recorder, RecordError
 from gridpeers.wire.messages import PlantEvent, Telemetry
+from tests.toy.toy_configs import toy_configs
 
 Rows = tuple[tuple[float, ...], ...]
 
@@ -37,6 +41,15 @@ def row(t: float, x: float = 0.1) -> tuple[float, ...]:
     return (t, 60.0, 388200.0, x, 2401.7771198288433, 388200.0, 2401.7771198288433)
 
 
+def info_of(*inverters: str) -> RecordInfo:
+    """What a record says about a run of the toy plant, in one process."""
+    plant, agents = toy_configs(1)
+    return RecordInfo(
+        level="physics", scenario="toy", case="I", toml="", seed=1, driver="inprocess", versions={},
+        inverters=inverters, plant=plant, agents=agents,
+    )  # fmt: skip
+
+
 def test_the_hash_is_that_of_the_bytes_however_they_came(tmp_path: Path) -> None:
     """How rows are spread over messages leaves no trace in the file."""
     with Recorder(tmp_path / "a") as one:
@@ -58,24 +71,46 @@ def test_every_number_reads_back_to_the_same_bits(
 ) -> None:
     """The shortest text that reads back to a float is what is written."""
     folder = tmp_path_factory.mktemp("record") / "case"
-    with Recorder(folder) as recorder:
+    with Recorder(folder, record=info_of("inv1")) as recorder:
         recorder(telemetry(((0.0, *numbers),)))
-        recorder.finish(0.0, 1.0)
+        recorded = recorder.finish(0.0, 1.0)
 
-    history = read_history(folder / "history.csv")
+    text = (folder / "history.csv").read_text(encoding="ascii")
+    written = [float(number) for number in text.splitlines()[1].split(",")]
+    of_record = recorded.history.table[0].tolist()
+    assert list(map(repr, written)) == list(map(repr, of_record)) == list(map(repr, [0.0, *numbers]))
 
-    quantities = (history.f, history.P, history.Q, history.V, history.P_set, history.V_set)
-    assert [quantity[0, 0] for quantity in quantities] == numbers
 
-
-def test_a_case_that_was_not_finished_has_no_history_under_its_name(tmp_path: Path) -> None:
-    """The files of a broken case can be read, and cannot be taken for the whole."""
+def test_a_case_that_was_not_finished_has_its_record_alone(tmp_path: Path) -> None:
+    """What came of a broken case can be read, and cannot be taken for the whole."""
     event = PlantEvent(t=0.0, kind="roster", subject="inv3", text="inv3 died, says the plant")
-    with Recorder(tmp_path / "I") as recorder:
+    with Recorder(tmp_path / "I", record=info_of("inv1")) as recorder:
         recorder(telemetry((row(0.0),), (event,)))
 
-    assert sorted(path.name for path in (tmp_path / "I").iterdir()) == ["events.csv", PARTIAL]
-    assert (tmp_path / "I" / "events.csv").read_text().splitlines()[1] == '0.0,roster,inv3,"inv3 died, says the plant"'
+    assert [path.name for path in (tmp_path / "I").iterdir()] == ["run.mcap"]
+    record = RunRecord.open(tmp_path / "I")
+    assert (record.events(), record.physics().table.tolist()) == ((event,), [list(row(0.0))])
+
+
+def test_a_disk_that_takes_no_more_is_an_error_at_once_and_again_at_the_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """There is no other account, so no case ends well without its record."""
+    with Recorder(tmp_path / "I", record=info_of("inv1")) as recorder:
+        recorder(telemetry((row(0.0),)))
+        monkeypatch.setattr(record_writer, "PERIOD", -1.0)
+        monkeypatch.setattr(record_writer.os, "write", no_room)
+        for act in (lambda: recorder(telemetry((row(0.5),))), lambda: recorder.finish(0.5, 0.5)):
+            with pytest.raises(OSError, match="No space left") as caught:
+                act()
+            assert caught.value.filename == str(tmp_path / "I" / "run.mcap")
+
+    assert RunRecord.open(tmp_path / "I").t_end == 0.0
+
+
+def no_room(*_: object) -> int:
+    """Stand for a full disk."""
+    raise OSError(errno.ENOSPC, "No space left on device")
 
 
 def test_a_history_with_a_gap_is_no_history(tmp_path: Path) -> None:
@@ -93,7 +128,7 @@ def test_a_gap_that_is_allowed_is_known_by_its_times(tmp_path: Path) -> None:
         recorded = recorder.finish(4.0, recorder.record_step)
 
     assert recorded.missing == ((1.0, 3.5),)
-    assert (recorded.ended, history_of(recorded).t.tolist()) == (4.0, [0.0, 0.5, 1.0, 3.5, 4.0])
+    assert (recorded.ended, recorded.history.t.tolist()) == (4.0, [0.0, 0.5, 1.0, 3.5, 4.0])
 
 
 def test_a_recorder_keeps_no_rows(tmp_path: Path) -> None:
@@ -102,9 +137,10 @@ def test_a_recorder_keeps_no_rows(tmp_path: Path) -> None:
 
     def message(first: int) -> Telemetry:
         rows = tuple((0.01 * k, *numbers) for k in range(first, first + 10))
-        return replace(telemetry(()), inverters=tuple(f"inv{i}" for i in range(10)), rows=rows)
+        return replace(telemetry(()), t=rows[-1][0], inverters=inverters, rows=rows)
 
-    with Recorder(tmp_path / "I") as recorder:
+    inverters = tuple(f"inv{i}" for i in range(10))
+    with Recorder(tmp_path / "I", record=info_of(*inverters)) as recorder:
         for first in range(0, 1_000, 10):
             recorder(message(first))
         tracemalloc.start()
@@ -113,7 +149,7 @@ def test_a_recorder_keeps_no_rows(tmp_path: Path) -> None:
         grown, _ = tracemalloc.get_traced_memory()
         tracemalloc.stop()
         recorded = recorder.finish(0.01 * 5_999, 0.01)
-    history = history_of(recorded)
+    history = recorded.history
 
-    assert grown < 50_000
+    assert grown < 300_000  # a chunk that waits
     assert (len(history.t), history.V_set[-1, -1]) == (6_000, 59.0)
