@@ -70,7 +70,7 @@ def check_name(what: str, name: str) -> None:
 
 def _of_one(kind: str) -> Callable[[Keys, str], str]:
     """Return the method for keys of a kind that end in a name: the inverter's, of `answer` the asker's."""
-    return lambda keys, name: f"{keys.prefix}{kind}/{name}"
+    return lru_cache(maxsize=4096)(lambda keys, name: f"{keys.prefix}{kind}/{name}")
 
 
 def _of_process(kind: str) -> Callable[[Keys, str, str], str]:
