@@ -49,6 +49,10 @@ class Stream:
         state.update(_ROW(seq, index))
         return ((int.from_bytes(state.digest(), "little") >> 12) + 0.5) * 2.0**-52
 
+    def chance(self, p: float, seq: int) -> bool:
+        """Return whether something of probability p happens to a message."""
+        return self.uniform(seq) < p
+
     def normal(self, seq: int, index: int = 0) -> float:
         """Return a standard normal number, by the inverse of its distribution function."""
         return _STANDARD.inv_cdf(self.uniform(seq, index))

@@ -8,7 +8,7 @@ from hashlib import sha256
 
 import msgspec
 
-from gridpeers.netem.channel import DROPPED, Fate
+from gridpeers.netem.channel import DROPPED
 from gridpeers.wire.messages import Count, Label, Name, Time
 
 Outcome = float | str | tuple[tuple[float, Count | None], ...]
@@ -80,31 +80,16 @@ class LinkCounts(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 class Ledger:
     """The verdicts and counts of one link; without `keep` only the hash of the verdicts is kept."""
 
-    __slots__ = ("_keep", "_kept", "_new", "_sha", "corrupted", "delivered", "dropped", "duplicated", "sent")
+    __slots__ = ("_keep", "_kept", "_sha", "corrupted", "delivered", "dropped", "duplicated", "new", "sent")
 
     def __init__(self, *, keep: bool) -> None:
         self.sent = self.duplicated = self.delivered = self.corrupted = 0
         self.dropped: Counter[str] = Counter()
         self._keep = keep
-        self._new: list[tuple[int, float, Outcome]] = []
+        self.new: list[tuple[int, float, Outcome]] = []
+        """The latest verdicts; whoever appends one calls `fold` at `BATCH` of them."""
         self._kept: list[tuple[int, float, Outcome]] = []
         self._sha = sha256()
-
-    def note(self, seq: int, t: float, fate: Fate) -> None:
-        """Add a verdict."""
-        deliveries = fate.deliveries
-        outcome: Outcome
-        if not deliveries:
-            self.dropped[fate.reason] += 1
-            outcome = fate.reason
-        elif len(deliveries) == 1 and deliveries[0][1] is None:
-            outcome = deliveries[0][0]
-        else:
-            self.duplicated += len(deliveries) - 1
-            outcome = deliveries
-        self._new.append((seq, t, outcome))
-        if len(self._new) >= _BATCH:
-            self._fold()
 
     def counts(self, in_flight: int) -> LinkCounts:
         """Return the counts; the caller has counted the messages in flight."""
@@ -119,7 +104,7 @@ class Ledger:
 
     def take(self, src: str, dst: str) -> LinkTrace | None:
         """Return the verdicts since the last call, None if there are none."""
-        self._fold()
+        self.fold()
         rows, self._kept = self._kept, []
         if not rows:
             return None
@@ -128,15 +113,15 @@ class Ledger:
 
     def digest(self) -> bytes:
         """Return the hash of all verdicts so far; empty if there are none."""
-        self._fold()
+        self.fold()
         return self._sha.digest() if self._sha.digest() != _NOTHING else b""
 
-    def _fold(self) -> None:
+    def fold(self) -> None:
         """Hash the new verdicts row by row, so that the times of these calls do not matter."""
-        self._sha.update(b"".join(map(_encode, self._new)))
+        self._sha.update(b"".join(map(_encode, self.new)))
         if self._keep:
-            self._kept += self._new
-        self._new.clear()
+            self._kept += self.new
+        self.new.clear()
 
 
 def combined(digests: Mapping[str, str] | Iterable[tuple[str, str]]) -> str:
@@ -150,7 +135,7 @@ def combined(digests: Mapping[str, str] | Iterable[tuple[str, str]]) -> str:
     return sha256(_encode(sorted(dict(digests).items()))).hexdigest()
 
 
-_BATCH = 512
+BATCH = 512
 """Verdicts that are hashed at once."""
 
 _NOTHING = sha256().digest()

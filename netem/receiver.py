@@ -13,7 +13,7 @@ from zlib import crc32
 
 from gridpeers.netem.channel import FOREVER, NEVER, Channel
 from gridpeers.netem.fault_schedule import Change, changed, schedule_of
-from gridpeers.netem.ledger import Ledger, LinkCounts, LinkTrace, combined
+from gridpeers.netem.ledger import BATCH, Ledger, LinkCounts, LinkTrace, Outcome, combined
 from gridpeers.netem.models import INSTANT
 from gridpeers.netem.models.medium import flip
 from gridpeers.netem.schema.fault import Span
@@ -27,6 +27,10 @@ MOST_FAILURES = 8
 
 NANO = 1e9
 """Arrivals are ordered by whole nanoseconds: so t_k + d and t_j meet where their decimals do, whatever binary does."""
+
+
+AT_ONCE: tuple[tuple[float, int | None], ...] = ((0.0, None),)
+"""Deliveries of a link without faults."""
 
 
 class _Special(NamedTuple):
@@ -107,10 +111,7 @@ class Receiver:
         """
         inbound = self._links.get(src) or self._link(src)
         inbound.ledger.sent += 1
-        if inbound.is_clear:
-            self._wait(inbound, src, seq, t, at, (payload, message), 0.0, None)
-        else:
-            self._judge(inbound, src, seq, t, at, (payload, message))
+        self._judge(inbound, src, seq, t, at, (payload, message))
 
     def due(self, now: float) -> list[Arrival]:
         """Return the messages that have arrived by `now` (s of run time), by arrival, then number and sender."""
@@ -154,9 +155,10 @@ class Receiver:
                 kept = self._take_kept(src, change.from_s)
                 inbound.begins = min(inbound.begins, schedule.begins)
                 channel.reschedule(schedule if kept else schedule.lately(change.from_s), rewind=bool(kept))
-                inbound.is_clear = channel.is_clear
+                inbound.is_clear = False  # what is judged anew is noted, by a link without faults too
                 for seq, content, special in kept:
                     self._judge(inbound, src, seq, special.t, special.at, content)
+                inbound.is_clear = channel.is_clear
         return tuple(concerned)
 
     def _take_kept(self, src: str, t: float) -> list[tuple[int, _Content, _Special]]:
@@ -217,40 +219,41 @@ class Receiver:
         return inbound
 
     def _judge(self, inbound: _Inbound, src: str, seq: int, t: float, at: float, content: _Content) -> None:
-        channel = inbound.channel
-        fate = channel.judge(seq, t, len(content[0]))
-        inbound.ledger.note(seq, t, fate)
-        held_until, checksum, copy = fate.held_until, channel.checksum, 0
-        for delay, bit in fate.deliveries:
-            plain = copy == 0 and bit is None and held_until == NEVER
-            special = None if plain else _Special(copy, bit, checksum, t, at, held_until)
-            self._wait(inbound, src, seq, t, at, content, delay, special)
-            copy += 1  # noqa: SIM113  enumerate costs a tenth of a message
-
-    def _wait(
-        self,
-        inbound: _Inbound,
-        src: str,
-        seq: int,
-        t: float,
-        at: float,
-        content: _Content,
-        delay: float,
-        special: _Special | None,
-    ) -> None:
-        """Keep a copy until it is due.
+        """Judge a message, and keep its copies until they are due.
 
         Messages that the faults leave in order stay so: the way to this process, part of a wall-clock `at`, never
         makes one message overtake another.
         """
-        self._number += 1
-        if delay == FOREVER:
-            self._kept.append((FOREVER, seq, src, self._number, content, delay, special))
-            return
-        due: float = round((at + delay) * NANO)
-        story = t + delay
-        if story >= inbound.story and (special is None or special.copy == 0):
-            if due < inbound.due:
-                due = inbound.due
-            inbound.story, inbound.due = story, due
-        heappush(self._heap, (due, seq, src, self._number, content, delay, special))
+        if inbound.is_clear:
+            deliveries, held_until, checksum = AT_ONCE, NEVER, False
+        else:
+            deliveries, reason, held_until = inbound.channel.judge(seq, t, len(content[0]))
+            checksum = inbound.channel.checksum
+            ledger = inbound.ledger
+            outcome: Outcome = reason
+            if not deliveries:
+                ledger.dropped[reason] += 1
+            elif len(deliveries) == 1 and deliveries[0][1] is None:
+                outcome = deliveries[0][0]
+            else:
+                ledger.duplicated += len(deliveries) - 1
+                outcome = deliveries
+            ledger.new.append((seq, t, outcome))
+            if len(ledger.new) >= BATCH:
+                ledger.fold()
+        copy = 0
+        for delay, bit in deliveries:
+            plain = copy == 0 and bit is None and held_until == NEVER
+            special = None if plain else _Special(copy, bit, checksum, t, at, held_until)
+            self._number += 1
+            if delay == FOREVER:
+                self._kept.append((FOREVER, seq, src, self._number, content, delay, special))
+            else:
+                due: float = round((at + delay) * NANO)
+                story = t + delay
+                if copy == 0 and story >= inbound.story:
+                    if due < inbound.due:
+                        due = inbound.due
+                    inbound.story, inbound.due = story, due
+                heappush(self._heap, (due, seq, src, self._number, content, delay, special))
+            copy += 1  # noqa: SIM113  enumerate costs a tenth of a message

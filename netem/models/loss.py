@@ -7,6 +7,7 @@ With transition matrix P (rows sum to 1), stationary law pi and loss probabiliti
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from itertools import accumulate
 from typing import Annotated
 
@@ -86,8 +87,7 @@ class Bernoulli(LossModel, frozen=True, kw_only=True, tag="bernoulli"):
         return (self.p,)
 
     def sampler(self, stream: Stream) -> Lost:
-        uniform, p = stream.uniform, self.p
-        return lambda seq: uniform(seq) < p
+        return partial(stream.chance, self.p)
 
 
 class GilbertElliott(LossModel, frozen=True, kw_only=True, tag="gilbert-elliott"):

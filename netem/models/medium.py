@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Annotated
 
 import msgspec
@@ -128,8 +129,7 @@ class Duplicate(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """How much later the copy arrives (s)."""
 
     def sampler(self, stream: Stream) -> Callable[[int], bool]:
-        uniform, p = stream.uniform, self.p
-        return lambda seq: uniform(seq) < p
+        return partial(stream.chance, self.p)
 
 
 class Corrupt(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

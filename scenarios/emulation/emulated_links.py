@@ -43,6 +43,8 @@ class EmulatedLinks:
         self._senders = tuple(src for src in (*config.microgrids, PLANT) if src != name)
         self.clear: set[str] = set()
         """Senders whose messages `offer` is known not to take."""
+        self._faulty: set[str] = set()
+        """Senders whose messages `offer` is known to take."""
         self._dropped_before = 0
         self._lies: Counter[str] = Counter()
         """States that say something else here than their sender has decided, by sender."""
@@ -57,10 +59,12 @@ class EmulatedLinks:
     def offer(self, message: State | Measurement, payload: bytes, at: float) -> bool:
         """Take a message off the wire and return True; return False if no fault ever acts on its link."""
         src, t = message.sender, message.t
-        known = src in self._intervals or self._name in self._intervals or src in self._liars
-        if not (known or self._receiver.touched(src)):
-            self.clear.add(src)
-            return False
+        if src not in self._faulty:
+            known = src in self._intervals or self._name in self._intervals or src in self._liars
+            if not (known or self._receiver.touched(src)):
+                self.clear.add(src)
+                return False
+            self._faulty.add(src)
         for interval in self._intervals.get(src, ()):
             if interval.holds(t):
                 if math.isinf(interval.slow):  # a paused agent sends nothing: only the lock-step needed its message
@@ -99,6 +103,7 @@ class EmulatedLinks:
         senders = [link.src for link in links if link.dst == self._name]
         self._receiver.apply(change)
         self._schedules.apply(change)
+        self._faulty.clear()
         if senders:
             self.clear.clear()
         return CommandEffect(
@@ -131,6 +136,7 @@ class EmulatedLinks:
     def _begin(self) -> None:
         config = self._config
         self.clear.clear()
+        self._faulty.clear()
         self._receiver = Receiver(self._name, config.netem, config.microgrids, keep_trace=config.keep_trace)
         self._schedules = LinkSchedules(config.netem, config.microgrids)
         self._lies.clear()
