@@ -13,8 +13,8 @@ from gridpeers.agents.agent import Agent
 from gridpeers.agents.agent_config import AgentConfig, check_nameplate
 from gridpeers.agents.laws.law import Law
 from gridpeers.wire.codec import RejectedError, encode
-from gridpeers.wire.links import Links, arrived, is_usable
-from gridpeers.wire.membership import Membership
+from gridpeers.wire.links import Links
+from gridpeers.wire.membership import Membership, arrived, is_usable
 from gridpeers.wire.messages import PLANT, Measurement, Nameplate, State, Stop
 from gridpeers.wire.post import FollowedPlant, Post, Route
 

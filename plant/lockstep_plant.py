@@ -31,7 +31,8 @@ from gridpeers.plant.plant_node import CLOSING, STAYS, PlantNode, TickActions
 from gridpeers.plant.telemetry_reporter import UnacknowledgedTelemetry, measurement_of
 from gridpeers.wire.codec import RejectedError, encode
 from gridpeers.wire.journal import TickTraffic
-from gridpeers.wire.links import REPORT_TICKS, Links, is_usable
+from gridpeers.wire.links import REPORT_TICKS, Links
+from gridpeers.wire.membership import is_usable
 from gridpeers.wire.messages import (
     PLANT,
     Answer,

@@ -15,7 +15,8 @@ from gridpeers.plant.telemetry_reporter import Reporter
 from gridpeers.wire.codec import encode
 from gridpeers.wire.journal import JournalBuffer
 from gridpeers.wire.keys import check_name
-from gridpeers.wire.links import Links, arrived
+from gridpeers.wire.links import Links
+from gridpeers.wire.membership import arrived
 from gridpeers.wire.messages import PLANT, Journal, LinkReport, Nameplate, PlantEvent, State, Stop, Telemetry
 from gridpeers.wire.post import Post
 from gridpeers.wire.timing import ticks_until, time_of

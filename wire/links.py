@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Mapping, Sequence, Set
 from typing import Any, NamedTuple, Protocol
 
-from gridpeers.wire.codec import RejectedError, RejectedMessages, decode
-from gridpeers.wire.membership import Admission
 from gridpeers.wire.messages import AnyMessage, Measurement, State
 
 REPORT_TICKS = 100
@@ -65,37 +63,3 @@ class Links(Protocol):
 
     def report(self, *, last: bool = False) -> tuple[bytes, ...]:
         """Take out the links' account since the last report, for the record; the last report is never empty."""
-
-
-def is_usable(links: Links | None, message: State | Measurement, payload: bytes, at: float, who: Admission) -> bool:
-    """Return whether a message off the wire is of use at once; if not, `arrived` may yield it later.
-
-    An emulated link takes the message if it came over one. The state of a paused agent only keeps the lock-step going:
-    no link carries it, and no node uses it. `at` is the run time (s) on the receiver's clock.
-    """
-    if type(message) is State and message.idle:
-        return False
-    if links is not None and message.sender not in links.clear and links.offer(message, payload, at):
-        return False
-    return who.passes(message)
-
-
-def arrived(links: Links | None, now: float, rejects: RejectedMessages, admission: Admission) -> Iterator[AnyMessage]:
-    """Yield the messages that the links have let through by now (s of run time) and that are of use.
-
-    A corrupted message is decoded again; its CRC-32 fails, so it is counted and dropped.
-    """
-    if links is None:
-        return
-    for arrival in links.due(now):
-        message = arrival.message
-        if message is None:
-            try:
-                message = decode(arrival.payload)
-                if message.sender != arrival.src:
-                    raise RejectedError("foreign", f"sender {message.sender}")
-            except RejectedError as rejected:
-                rejects.add(rejected.kind, f"the link from {arrival.src}", rejected.text)
-                continue
-        if admission.passes(message):
-            yield message

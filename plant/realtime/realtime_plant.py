@@ -30,7 +30,8 @@ from gridpeers.plant.telemetry_reporter import measurement_of
 from gridpeers.wire.codec import RejectedError, encode
 from gridpeers.wire.journal import TimedTraffic
 from gridpeers.wire.keys import READING
-from gridpeers.wire.links import REPORT_TICKS, Links, is_usable
+from gridpeers.wire.links import REPORT_TICKS, Links
+from gridpeers.wire.membership import is_usable
 from gridpeers.wire.messages import (
     PLANT,
     AgentStatus,
