@@ -107,11 +107,45 @@ class Receiver:
     def offer(self, src: str, seq: int, t: float, at: float, payload: bytes, message: AnyMessage | None = None) -> None:
         """Judge a message, sent at `t` (s of run time) and here without faults at `at` (s, on the receiver's clock).
 
-        `due` hands on the decoded `message` where there is one, so that nobody decodes it again.
+        `due` hands on the decoded `message` where there is one, so that nobody decodes it again. Messages that the
+        faults leave in order stay so: the way to this process, part of a wall-clock `at`, never makes one message
+        overtake another.
         """
         inbound = self._links.get(src) or self._link(src)
-        inbound.ledger.sent += 1
-        self._judge(inbound, src, seq, t, at, (payload, message))
+        ledger, content = inbound.ledger, (payload, message)
+        ledger.sent += 1
+        if inbound.is_clear:
+            deliveries, held_until, checksum = AT_ONCE, NEVER, False
+        else:
+            deliveries, reason, held_until = inbound.channel.judge(seq, t, len(payload))
+            checksum = inbound.channel.checksum
+            outcome: Outcome = reason
+            if not deliveries:
+                ledger.dropped[reason] += 1
+            elif len(deliveries) == 1 and deliveries[0][1] is None:
+                outcome = deliveries[0][0]
+            else:
+                ledger.duplicated += len(deliveries) - 1
+                outcome = deliveries
+            ledger.new.append((seq, t, outcome))
+            if len(ledger.new) >= BATCH:
+                ledger.fold()
+        copy = 0
+        for delay, bit in deliveries:
+            plain = copy == 0 and bit is None and held_until == NEVER
+            special = None if plain else _Special(copy, bit, checksum, t, at, held_until)
+            self._number += 1
+            if delay == FOREVER:
+                self._kept.append((FOREVER, seq, src, self._number, content, delay, special))
+            else:
+                due: float = round((at + delay) * NANO)
+                story = t + delay
+                if copy == 0 and story >= inbound.story:
+                    if due < inbound.due:
+                        due = inbound.due
+                    inbound.story, inbound.due = story, due
+                heappush(self._heap, (due, seq, src, self._number, content, delay, special))
+            copy += 1  # noqa: SIM113  enumerate costs a tenth of a message
 
     def due(self, now: float) -> list[Arrival]:
         """Return the messages that have arrived by `now` (s of run time), by arrival, then number and sender."""
@@ -156,8 +190,9 @@ class Receiver:
                 inbound.begins = min(inbound.begins, schedule.begins)
                 channel.reschedule(schedule if kept else schedule.lately(change.from_s), rewind=bool(kept))
                 inbound.is_clear = False  # what is judged anew is noted, by a link without faults too
+                inbound.ledger.sent -= len(kept)
                 for seq, content, special in kept:
-                    self._judge(inbound, src, seq, special.t, special.at, content)
+                    self.offer(src, seq, special.t, special.at, *content)
                 inbound.is_clear = channel.is_clear
         return tuple(concerned)
 
@@ -217,43 +252,3 @@ class Receiver:
             inbound = _Inbound(Channel(link, schedule.spans, self._netem.seed), keep=self._keep)
             self._links[src] = inbound
         return inbound
-
-    def _judge(self, inbound: _Inbound, src: str, seq: int, t: float, at: float, content: _Content) -> None:
-        """Judge a message, and keep its copies until they are due.
-
-        Messages that the faults leave in order stay so: the way to this process, part of a wall-clock `at`, never
-        makes one message overtake another.
-        """
-        if inbound.is_clear:
-            deliveries, held_until, checksum = AT_ONCE, NEVER, False
-        else:
-            deliveries, reason, held_until = inbound.channel.judge(seq, t, len(content[0]))
-            checksum = inbound.channel.checksum
-            ledger = inbound.ledger
-            outcome: Outcome = reason
-            if not deliveries:
-                ledger.dropped[reason] += 1
-            elif len(deliveries) == 1 and deliveries[0][1] is None:
-                outcome = deliveries[0][0]
-            else:
-                ledger.duplicated += len(deliveries) - 1
-                outcome = deliveries
-            ledger.new.append((seq, t, outcome))
-            if len(ledger.new) >= BATCH:
-                ledger.fold()
-        copy = 0
-        for delay, bit in deliveries:
-            plain = copy == 0 and bit is None and held_until == NEVER
-            special = None if plain else _Special(copy, bit, checksum, t, at, held_until)
-            self._number += 1
-            if delay == FOREVER:
-                self._kept.append((FOREVER, seq, src, self._number, content, delay, special))
-            else:
-                due: float = round((at + delay) * NANO)
-                story = t + delay
-                if copy == 0 and story >= inbound.story:
-                    if due < inbound.due:
-                        due = inbound.due
-                    inbound.story, inbound.due = story, due
-                heappush(self._heap, (due, seq, src, self._number, content, delay, special))
-            copy += 1  # noqa: SIM113  enumerate costs a tenth of a message
