@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gridpeers.plant.equipment import Feeder, InverterRow
-from gridpeers.scenarios.results.tables import QUANTITIES, history_csv
+from gridpeers.scenarios.results.tables import QUANTITIES
 from gridpeers.scenarios.schema.participants import with_agent
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.wire.messages import PlantEvent
@@ -124,8 +124,8 @@ class History:
 
     @property
     def sha256(self) -> str:
-        """Of the bytes of history.csv."""
-        return sha256("".join(history_csv(self)).encode("ascii")).hexdigest()
+        """Fingerprint of the rows, see `gridpeers.scenarios.results.record.canonical`."""
+        return sha256(self.table.astype("<f8").tobytes()).hexdigest()
 
     @classmethod
     def of(cls, inverters: tuple[str, ...], rows: Sequence[Sequence[float]] | Floats | bytes) -> History:

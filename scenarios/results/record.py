@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from gridpeers.netem.ledger import LinkTrace
 from gridpeers.scenarios.results.link_record import LinkRecord
-from gridpeers.scenarios.results.tables import header, write_tables
+from gridpeers.scenarios.results.tables import write_tables
 from gridpeers.wire.messages import Journal, LinkReport, LinkRequest, PlantEvent, Telemetry
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ class RecordError(RuntimeError):
 
 
 def canonical(rows: Iterable[Sequence[float]]) -> bytes:
-    """Return the bytes of rows: float64, little-endian, row by row."""
+    """Return the bytes of rows, float64, little-endian, row by row: their SHA-256 is the fingerprint of a run."""
     return b"".join([pack(f"<{len(row)}d", *row) for row in rows])
 
 
@@ -52,7 +52,7 @@ class Recorded:
     """Run time (s), and number of states of that tick that were not sent to the neighbours."""
     links: LinkRecord
     sha256: str
-    """Of the bytes of history.csv."""
+    """Fingerprint: of the `canonical` bytes of the rows."""
     reproducible: bool
     """True if the same scenario and seed give the same bytes again."""
 
@@ -116,9 +116,7 @@ class Recorder:
             _require(self._file)
 
     def _take(self, telemetry: Telemetry) -> None:
-        if not self._inverters:
-            self._inverters = telemetry.inverters
-            self._hash.update((",".join(header(telemetry.inverters)) + "\n").encode("ascii"))
+        self._inverters = self._inverters or telemetry.inverters
         for row in telemetry.rows:
             if self.count and row[0] <= self.ended:
                 raise RecordError(f"telemetry: a row of {row[0]:g} s came after that of {self.ended:g} s")
@@ -128,9 +126,10 @@ class Recorder:
                 self.missing.append((self.ended, row[0]))
             self.ended = row[0]
             self.count += 1
-        self._hash.update("".join([",".join(map(repr, row)) + "\n" for row in telemetry.rows]).encode("ascii"))
+        rows = canonical(telemetry.rows)
+        self._hash.update(rows)
         if self._file is None:
-            self._table += canonical(telemetry.rows)
+            self._table += rows
         self.events += telemetry.events
         self._quiet += telemetry.quiet
         self.reproducible = self.reproducible and telemetry.reproducible

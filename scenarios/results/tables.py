@@ -36,7 +36,7 @@ def write_tables(
     folder: Path, history: History, events: Iterable[PlantEvent], traces: Iterable[LinkTrace] | None
 ) -> list[Path]:
     """Write the tables of a case, that of its links if there are `traces`; return their paths."""
-    texts = {"history.csv": history_csv(history), "events.csv": [csv_text([EVENTS, *event_rows(events)])]}
+    texts = {"history.csv": _history_csv(history), "events.csv": [csv_text([EVENTS, *event_rows(events)])]}
     if traces is not None:
         texts["links.csv"] = chain([csv_text([LINKS])], _by_link(traces, folder))
     for name, parts in texts.items():
@@ -44,7 +44,7 @@ def write_tables(
     return [folder / name for name in texts]
 
 
-def history_csv(history: History) -> Iterator[str]:
+def _history_csv(history: History) -> Iterator[str]:
     yield ",".join(header(history.inverters)) + "\n"
     table = history.table
     for first in range(0, len(table), _ROWS):  # `repr` reads back to the same bits

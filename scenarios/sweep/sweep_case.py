@@ -42,7 +42,7 @@ class SweepRow(JournalRow, frozen=True, kw_only=True):
     "law_failed" off: then the status is "ran"."""
     why: str = ""
     history_sha256: str = ""
-    """Of the bytes that history.csv would have."""
+    """Fingerprint of its rows, as `gridpeers run` has it."""
     links_sha256: str = ""
     """Of all verdicts of the emulated links; "" without."""
     trips: str = ""

@@ -27,7 +27,7 @@ from tests.golden.catalogue.pins import (  # noqa: E402
 OTHERWISE = "--otherwise"
 
 HEADER = (
-    "# SHA-256 of history.csv of every case of the catalogue, and the last row of its first inverter:\n"
+    "# SHA-256 of the rows (float64) of every case of the catalogue, and the last row of its first inverter:\n"
     f"# {', '.join(QUANTITIES)}. Written by tests/golden/catalogue/pin.py; see README.md beside it.\n"
 )
 
@@ -50,7 +50,7 @@ def main(reason: str) -> None:
     if reason == OTHERWISE:
         here = pinned.otherwise.get(vector_level(), {}) | {key: pin for key, pin in new.items() if key in changed}
         pinned.otherwise[vector_level()] = here
-        _write(pinned)
+        write(pinned)
         return
     scenarios = " ".join(sorted({name for name, _ in changed}))
     pinned.moved.append({"date": datetime.now(UTC).date().isoformat(), "scenarios": scenarios, "reason": reason})
@@ -58,7 +58,7 @@ def main(reason: str) -> None:
     otherwise = {
         level: {key: pin for key, pin in pins.items() if key in stay} for level, pins in pinned.otherwise.items()
     }
-    _write(Pinned(new | stay, otherwise, environment(), pinned.moved))
+    write(Pinned(new | stay, otherwise, environment(), pinned.moved))
 
 
 def _difference(before: Pin, after: Pin) -> str:
@@ -66,7 +66,7 @@ def _difference(before: Pin, after: Pin) -> str:
     return ", ".join(f"{name} {old:.6g} -> {new:.6g}" for name, old, new in pairs)
 
 
-def _write(pinned: Pinned) -> None:
+def write(pinned: Pinned) -> None:
     lines = [HEADER, "[environment]", *(f'{key} = "{value}"' for key, value in pinned.environment.items())]
     for entry in pinned.moved:
         lines += ["", "[[moved]]", *(f"{key} = {_quoted(value)}" for key, value in entry.items())]

@@ -30,7 +30,7 @@ class Pin(NamedTuple):
     """Result of one case."""
 
     sha256: str
-    """Fingerprint of its rows."""
+    """Fingerprint of its rows; empty where it is not known yet."""
     last: tuple[float, ...]
     """Last row of the first inverter, in the order of `QUANTITIES`."""
 
