@@ -87,7 +87,7 @@ def test_check_says_that_a_file_can_be_run(elsewhere: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["run"], "SCENARIO is missing"),
+        (["run"], "missing argument 'SCENARIO'"),
         (["run", "islandin"], 'no scenario "islandin"; did you mean "islanding"?'),
         (["run", "nowhere.toml"], "nowhere.toml: there is no such file"),
         (["check", "a" * 300], "cannot be read: File name too long"),
@@ -100,13 +100,13 @@ def test_check_says_that_a_file_can_be_run(elsewhere: Path) -> None:
             "gridpeers: INVERTER: inv1 is given twice; one agent controls an inverter\n",
         ),
         (
-            ["bridge", "helics", "islanding", "--broker", "foo bar"],
+            ["run", "islanding", "--case", "IV", "--plant", "helics", "--broker", "foo bar"],
             'gridpeers: --broker: must be like tcp://127.0.0.1:23404, got "foo bar"\n',
         ),
         (["run", "bad.toml"], "bad.toml:15: time.T_c_s: 20 s is not plausible"),
         (["check", "bad.toml"], "2 problems:"),
         (["run", "used.toml"], "cannot be listened on: address already in use"),
-        (["doc", "everything"], 'TOPIC: there is no "everything"; the choices are keys, messages, scenario'),
+        (["doc", "everything"], "invalid value for 'TOPIC': 'everything' is not one of 'keys', 'messages'"),
     ],
 )
 def test_bad_input_is_told_and_leaves_nothing(elsewhere: Path, words: list[str], said: str) -> None:
