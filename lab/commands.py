@@ -49,8 +49,6 @@ def predict(
     Nothing is run but the plant on droop alone, to learn the load of each event and how vars answer to V_set.
     docs/theory.md has the equations, and how far they met the plant.
 
-    Exit code: 0 all is well, 2 bad usage or a bad file, 3 the plant has no solution.
-
     Example:  gridpeers predict islanding --case IV
     """
     spec, feeder = load(scenario)
@@ -82,8 +80,6 @@ def why(
 
     That is what it measured, whom it heard and whom not and why, each term of its law, and the limits, from the record
     of the run. docs/why.md has examples.
-
-    Exit code: 0 it was explained, 2 bad usage, no record, or nothing in it for this agent and time.
 
     Example:  gridpeers why runs/islanding/latest/IV inv4 4.3
     """
@@ -122,8 +118,6 @@ def trace(
 
     https://ui.perfetto.dev opens it: tracks of agents and links, an arrow for each message, losses and cuts, and f, P
     and MPSI on the same axis.
-
-    Exit code: 0 the file is written, 2 bad usage, no record, or the file cannot be written.
 
     Example:  gridpeers trace runs/islanding/latest/IV
     """
@@ -178,10 +172,6 @@ def replay(
 
     The cores get again what they got, when they got it, and must decide the same within 1e-9. With a change, the loop
     is closed on our plant from then on. docs/replay.md explains both.
-
-    Exit code: 0 all that was compared is the same (notes say what was not), or what would have been is written,
-    1 something differs from the record, or a law failed in what would have been, 2 bad usage, no record, or nothing in
-    it to be replayed, 130 Ctrl-C, 143 SIGTERM.
 
     Example:  gridpeers replay runs/islanding/latest/IV --without "inv4 <-> inv7" --from 2
     """

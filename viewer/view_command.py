@@ -51,8 +51,6 @@ def view(
     Of a live run it shows the present, of a RECORD any time, and how an agent decided then. Ctrl-C ends the page, and
     not the run.
 
-    Exit code: 2 bad usage, no record, or nobody there, 130 Ctrl-C, 143 SIGTERM.
-
     Example:  gridpeers view --control
     """
     require_page()

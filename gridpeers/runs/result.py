@@ -41,7 +41,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from gridpeers.lab.explanation.explanation import Explanation
-    from gridpeers.lab.replay.replay import ReplayedRun
     from gridpeers.scenarios.record.record_reader import RunRecord
 
 T = TypeVar("T")
@@ -236,15 +235,6 @@ class Result(_FromFolder):
         RecordFileError if the run was not recorded, there was no such agent, or it had not decided by then.
         """
         found: Explanation = ROOMS.resolve("explain")(self.run_record, agent, t)
-        return found
-
-    def replay(self) -> ReplayedRun:
-        """Give the cores again what they got, and compare what they decide, as `gridpeers replay` does.
-
-        RecordFileError if the run was not recorded; ReplayError if its record does not have what the cores got, or its
-        law, graph or feeder is not here.
-        """
-        found: ReplayedRun = ROOMS.resolve("replay")(self.run_record)
         return found
 
     @cached_property

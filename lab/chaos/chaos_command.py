@@ -54,9 +54,6 @@ def chaos(
     Once the last of it has ended, the checks judge the run (docs/chaos.md). Each kind of failure becomes a scenario
     file with few disturbances, for `gridpeers run`.
 
-    Exit code: 0 no run violated anything, 1 some did, 2 bad usage or a bad file, 3 the workers went, or the machine
-    lacks what a run needs, such as room in TMPDIR, 130 Ctrl-C, 143 SIGTERM: what came until then is written.
-
     Example:  gridpeers chaos islanding --runs 200
     """
     spec, feeder = load(scenario)

@@ -44,8 +44,6 @@ def experiment(
     It writes its figure and table, with theory beside.
     A sweep that was interrupted goes on by the same command. docs/experiments.md tells what was found.
 
-    Exit code: 0 done, 1 a law failed, 2 bad usage or a bad file, 3 a run broke, 130 interrupted by Ctrl-C.
-
     Example:  gridpeers experiment delay
     """
     from gridpeers.papers.singhal2022.experiments import EXPERIMENTS

@@ -63,7 +63,7 @@ def _few_figures(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
 
 def test_a_replay_gives_the_run(run: Result) -> None:
     """Rows of the plant and states of every agent are the same within 1e-9."""
-    done = run.replay()
+    done = gp.replay(run)
 
     assert done.difference is None
     assert [part.name for part in done.parts] == ["plant", *(f"inv{k}" for k in range(1, 10))]

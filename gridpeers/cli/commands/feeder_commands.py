@@ -71,8 +71,6 @@ def import_(
 ) -> None:
     """Read a feeder that was written for OpenDSS or GridLAB-D, and write it as tables that a scenario can name.
 
-    Exit code: 0 it was written, 2 something in it cannot be read or represented; every such element is named.
-
     Example:  gridpeers feeder import Master.dss --out my-feeder
     """
     feeder = read_script(str(file), switch or [], leave_out or [])
@@ -93,8 +91,6 @@ def import_(
 @app.command()
 def check(feeder: FeederName, load_set: LoadSet = None, switch: Switches = None, leave_out: LeaveOut = None) -> None:
     """Check a feeder; say what it has, and what opening each switch would cut off.
-
-    Exit code: 0 it is sound, 2 it has problems; all of them are named.
 
     Example:  gridpeers feeder check microgrid123
     """
@@ -125,8 +121,6 @@ def solve(
     leave_out: LeaveOut = None,
 ) -> None:
     """Solve the power flow from the substation, without inverters; show the lowest and highest voltages.
-
-    Exit code: 0 it is solved, 2 it cannot be.
 
     Example:  gridpeers feeder solve microgrid123 --open 13-152
     """
@@ -167,8 +161,6 @@ def plot(
 ) -> None:
     """Draw a feeder's one-line diagram, on its coordinates or as a tree.
 
-    Exit code: 0 it was drawn, 2 it cannot be.
-
     Example:  gridpeers feeder plot microgrid123 --out map.svg
     """
     tables = _read(feeder, load_set, switch, leave_out)
@@ -193,8 +185,6 @@ def glm(
     seconds: Annotated[int, typer.Option(min=1, max=50, help="Length of the run (s).")] = 5,
 ) -> None:
     """Write a feeder as a model that GridLAB-D runs by itself: in delta mode if it has inverters.
-
-    Exit code: 0 it was written, 2 it cannot be; all reasons are named.
 
     Example:  gridpeers feeder glm microgrid123 --scenario islanding --out islanding.glm
     """

@@ -40,8 +40,6 @@ def init(
 
     Without --feeder it has a law, a scenario and a test; with it, the feeder's tables, inverters and a scenario.
 
-    Exit code: 0 it was made, 2 the folder or the feeder cannot be used.
-
     Example:  gridpeers init my-study --feeder Master.dss
     """
     try:

@@ -12,8 +12,7 @@ from gridpeers.cli.usage import BROKEN, fail
 from gridpeers.scenarios.live.run_address import UsageError
 
 if TYPE_CHECKING:
-    from gridpeers.agents.agent_config import AgentConfig
-    from gridpeers.scenarios.emulation.link_data import LinkCommand
+    pass
 
 link = typer.Typer(
     cls=Commands,
@@ -52,8 +51,6 @@ def set_(
 ) -> None:
     """Give links faults. What is set takes the place of what the link had of the same kind.
 
-    Exit code: 0 every receiver concerned has taken it, 2 bad usage or nobody there, 3 somebody has not answered.
-
     Example:  gridpeers link set inv1 inv4 --delay 0.1 --loss 0.2 --for 10
     """
     given = {"loss": loss, "duplicate": duplicate, "corrupt": corrupt, "rate": rate}
@@ -77,8 +74,6 @@ def cut(
 ) -> None:
     """Cut links, between two names both ways.
 
-    Exit code: 0 every receiver concerned has taken it, 2 bad usage or nobody there, 3 somebody has not answered.
-
     Example:  gridpeers link cut inv4 inv7 --for 5
     """
     from gridpeers.netem.models.medium import Cut
@@ -98,8 +93,6 @@ def heal(
     """End what holds on links.
 
     What the scenario has for later still comes.
-
-    Exit code: 0 every receiver concerned has taken it, 2 bad usage or nobody there, 3 somebody has not answered.
 
     Example:  gridpeers link heal inv4 inv7
     """
@@ -150,7 +143,7 @@ def _give(links: list[str], arrow: str, fault: dict[str, Any] | None, duration: 
     )
     check_link_command(command, None)
     with live.client(acts=True) as client:
-        setup, agent = links_of_run(client)
+        setup = links_of_run(client)[0]
         check_link_command(command, setup)
         result = command_links(client, command)
     typer.echo(result.text)
@@ -158,20 +151,5 @@ def _give(links: list[str], arrow: str, fault: dict[str, Any] | None, duration: 
         typer.echo(f"acknowledged: {', '.join(result.acknowledged)}")
     if result.absent:
         typer.echo(f"no agent yet, told when it comes: {', '.join(result.absent)}")
-    _note_age(command, agent)
     if result.failures:
         fail(result.failures, BROKEN)
-
-
-def _note_age(command: LinkCommand, agent: AgentConfig) -> None:
-    """Print a note if agents will ignore states for their age."""
-    from gridpeers.netem.models.delay import Constant, RandomDelay
-
-    delay = command.fault.models().get("delay") if command.fault is not None else None
-    limit = agent.control.degraded_communication.max_age or agent.max_age
-    usual = delay.delay_s if isinstance(delay, Constant) else 0.0
-    if isinstance(delay, RandomDelay):
-        usual = delay.quantile(0.5)
-    if usual >= limit:
-        ignored = f"note: a state {usual:g} s old is ignored, as agents use none older than {limit:g} s"
-        typer.echo(f"{ignored}; see [degraded_communication] max_age_s")

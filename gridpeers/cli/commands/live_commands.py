@@ -58,8 +58,6 @@ def agent(
 ) -> None:
     """Run the agent of an inverter, or of several, in this terminal. Ctrl-C leaves properly: they are switched off.
 
-    Exit code: 0 it has left, 2 no plant or no such inverter, 3 it could not go on, 130 Ctrl-C.
-
     Example:  gridpeers agent inv2 --keys lab --connect tls/192.168.1.10:7447
     """
     from gridpeers.scenarios.live.live_processes import agent_here
@@ -115,8 +113,6 @@ def stop(
 
     The others take over.
 
-    Exit code: 0 it has left, 2 there is no such agent, 3 it has not left.
-
     Example:  gridpeers stop inv2
     """
     with live.client(acts=True) as client:
@@ -135,8 +131,6 @@ def event(
     ] = False,
 ) -> None:
     """Open or close a switch of a running plant.
-
-    Exit code: 0 it was done, 2 there is no such switch, or its sides are not in step.
 
     Example:  gridpeers event close 13-152 --synchronised
     """
@@ -167,8 +161,6 @@ def load(
     It takes the power from the next step on, in all its phases in proportion; of --P and --Q the one that is left out
     stays as it is. In a scenario, load = { 48 = { factor = 1.5 } } in an [[event]] does the same at a time.
 
-    Exit code: 0 it was done, 2 there is no such load, or the number makes no sense.
-
     Example:  gridpeers load 48 --factor 1.5
     """
     setting = load_setting(factor, P, Q)
@@ -179,8 +171,6 @@ def load(
 @of_live_run
 def down(live: LiveRun) -> None:
     """End a run: its agents leave, its plant ends.
-
-    Exit code: 0 all have gone, 2 there is no such run, 3 somebody has stayed.
 
     Example:  gridpeers down --run lab
     """

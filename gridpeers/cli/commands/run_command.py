@@ -87,10 +87,6 @@ def run(
 ) -> None:
     """Run a scenario and show its results, beside published ones.
 
-    Exit code: 0 no claim failed (a known miss is shown, with its reason, and is no failure), 1 a claim or a law failed
-    (with --require-checks a check, too; one that cannot be judged, or is off, has not failed), 2 bad usage or a bad
-    file, 3 the run broke.
-
     Example:  gridpeers run islanding --case IV --driver inprocess
     """
     changes = {"plant.simulator": plant, "plant.helics.broker": broker}

@@ -36,8 +36,6 @@ def check(
     All problems come at once. A file without any is tried: whether its feeder has an operating point to start from.
     Notes tell what its events de-energise, and where a graph bears fewer liars than its law should.
 
-    Exit code: 0 it can be run, 2 it has problems.
-
     Example:  gridpeers check my-islanding.toml
     """
     spec, feeder = load(file)
@@ -90,8 +88,6 @@ def compare(
 ) -> None:
     """Compare two runs: scenarios, metrics, and one figure of both.
 
-    Exit code: 0 they were compared, 2 bad usage, or no folder of a run.
-
     Example:  gridpeers compare runs/islanding/latest runs/mine/latest
     """
     kinds = (".png", ".pdf", ".svg")
@@ -139,8 +135,6 @@ def metrics(
 
     It shows what the report of a run shows, up to the end of the record, and says what is not measured. A run that came
     to its end has the same numbers in its report.txt.
-
-    Exit code: 0 it was measured, 2 bad usage, no record, or nothing in it that can be measured.
 
     Example:  gridpeers metrics runs/islanding/latest/IV
     """

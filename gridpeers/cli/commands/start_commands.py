@@ -148,8 +148,6 @@ def _start(start: Start, *, agents: bool) -> None:
 def plant(live: Start) -> None:
     """Run the plant of a scenario in this terminal, in real time. Agents come from others.
 
-    Exit code: 0 it was ended, 1 a law failed, 2 bad usage, 3 it broke, 130 Ctrl-C.
-
     Example:  gridpeers plant islanding --keys lab --listen tls/0.0.0.0:7447
     """
     _start(live, agents=False)
@@ -160,8 +158,6 @@ def up(live: Start) -> None:
     """Run the plant and all its agents at once, in real time.
 
     It runs until `gridpeers down` or Ctrl-C.
-
-    Exit code: 0 it was ended, 1 a law failed, 2 bad usage, 3 it broke, 130 Ctrl-C.
 
     Example:  gridpeers up islanding --speed 0.5
     """

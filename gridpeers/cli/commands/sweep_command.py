@@ -46,9 +46,6 @@ def sweep(
 
     What comes of it is one table with plots. The same command resumes it.
 
-    Exit code: 0 done (broken runs are rows of the table), 1 a law failed, 2 bad usage or a bad file, 3 all runs broke
-    or the workers went, 130 interrupted by Ctrl-C: what is done is kept.
-
     Example:  gridpeers sweep topology --jobs 2
     """
     plan = read(file)

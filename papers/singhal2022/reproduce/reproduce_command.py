@@ -51,9 +51,6 @@ def reproduce(
 
     Every table, figure and claim of ours stands beside the paper's.
 
-    Exit code: 0 no claim failed (a known miss is shown, with its reason, and is no failure), 1 a claim failed,
-    2 bad usage, 3 a run broke.
-
     Example:  gridpeers reproduce --driver inprocess
     """
     from gridpeers.papers.singhal2022.paper_benchmarks import headline

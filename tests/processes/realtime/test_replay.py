@@ -44,7 +44,7 @@ def run() -> Result:
 
 def test_a_replay_gives_the_set_points_of_the_run(run: Result) -> None:
     """Every state of every process, and every row of the plant, is the same within 1e-9."""
-    done = run.replay()
+    done = gp.replay(run)
 
     assert (done.difference, done.notes) == (None, ())
     plant, *agents = done.parts
