@@ -15,9 +15,12 @@ from gridpeers.cli.usage import (
     BROKEN,
     CLAIM_FAILED,
     ScenarioName,
+    argument,
     chosen,
     fail,
+    flag,
     load,
+    option,
     refuse,
     require,
     terminal,
@@ -27,21 +30,15 @@ if TYPE_CHECKING:
     from gridpeers.lab.replay.changes import Changes
     from gridpeers.scenarios.record.record_reader import RunRecord
 
-RecordedRun = Annotated[
-    Path, typer.Argument(metavar="RUN", help="Folder of a case, e.g. runs/islanding/latest/IV, or its run.mcap.")
-]
+RecordedRun = Annotated[Path, argument("RUN", "Folder of a case, e.g. runs/islanding/latest/IV, or its run.mcap.")]
 
-CaseOfRun = Annotated[str, typer.Option(metavar="NAME", help="Case of the run, if RUN has several.")]
+CaseOfRun = Annotated[str, option("NAME", "Case of the run, if RUN has several.")]
 
 
 def predict(
     scenario: ScenarioName,
-    case: Annotated[
-        str | None, typer.Option(metavar="NAMES", help="Cases to predict, e.g. III,IV; all when left out.")
-    ] = None,
-    vars_: Annotated[
-        bool, typer.Option("--vars/--no-vars", help="Modes of voltage and vars, which take a second or two.")
-    ] = True,
+    case: Annotated[str | None, option("NAMES", "Cases to predict, e.g. III,IV; all when left out.")] = None,
+    vars_: Annotated[bool, flag("Modes of voltage and vars, which take a second or two.", "--vars/--no-vars")] = True,
 ) -> None:
     """Predict from theory how a scenario will go.
 
@@ -72,8 +69,8 @@ def predict(
 
 def why(
     run: RecordedRun,
-    agent: Annotated[str, typer.Argument(metavar="AGENT", help="Name of the inverter, e.g. inv4.")],
-    t: Annotated[float, typer.Argument(metavar="TIME", help="Run time (s): the decision in force then is explained.")],
+    agent: Annotated[str, argument("AGENT", "Name of the inverter, e.g. inv4.")],
+    t: Annotated[float, argument("TIME", "Run time (s): the decision in force then is explained.")],
     case: CaseOfRun = "",
 ) -> None:
     """Explain why an agent decided as it did.
@@ -109,9 +106,7 @@ def _tell_notes(notes: Iterable[str]) -> None:
 
 def trace(
     run: RecordedRun,
-    out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="The trace; trace.pftrace beside the record when left out.")
-    ] = None,
+    out: Annotated[Path | None, option("FILE", "The trace; trace.pftrace beside the record when left out.")] = None,
     case: CaseOfRun = "",
 ) -> None:
     """Write a run's messages as a Perfetto trace.
@@ -150,22 +145,16 @@ def replay(
     run: RecordedRun,
     case: CaseOfRun = "",
     without: Annotated[
-        list[str] | None,
-        typer.Option(metavar="LINKS", help='Cut links: "inv4 -> inv7", "inv4 <-> inv7"; can be repeated.'),
+        list[str] | None, option("LINKS", 'Cut links: "inv4 -> inv7", "inv4 <-> inv7"; can be repeated.')
     ] = None,
-    law: Annotated[str, typer.Option(metavar="KEY", help="Another law: a name, or module:Class.")] = "",
+    law: Annotated[str, option("KEY", "Another law: a name, or module:Class.")] = "",
     values: Annotated[
         list[str] | None,
-        typer.Option(
-            "--set", metavar="KEY=VALUE", help="A key of agents or links, e.g. gains.k_p=0.001; can be repeated."
-        ),
+        option("KEY=VALUE", "A key of agents or links, e.g. gains.k_p=0.001; can be repeated.", "--set"),
     ] = None,
-    since: Annotated[
-        float, typer.Option("--from", metavar="T", help="Run time (s) from which on; up to it all is as it was.")
-    ] = 0.0,
+    since: Annotated[float, option("T", "Run time (s) from which on; up to it all is as it was.", "--from")] = 0.0,
     out: Annotated[
-        Path | None,
-        typer.Option("--out", metavar="DIR", help="New folder for what would have been; in runs/ when left out."),
+        Path | None, option("DIR", "New folder for what would have been; in runs/ when left out.", "--out")
     ] = None,
 ) -> None:
     """Replay a recorded run, or show what would have been.

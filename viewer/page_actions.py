@@ -98,7 +98,7 @@ class ActionClient:
             if action.kind != "heal all":
                 check_name("LINKS", name)
         command = action.link_command()
-        check_link_command(command, links_of_run(client)[0])
+        check_link_command(command, links_of_run(client))
         result = command_links(client, command)
         if result.failures:
             raise UsageError("; ".join([result.text, *result.failures]))

@@ -23,9 +23,23 @@ if TYPE_CHECKING:
     from gridpeers.plant.tables import FeederError
     from gridpeers.scenarios.schema import ScenarioError, ScenarioModel
 
-ScenarioName = Annotated[
-    str, typer.Argument(metavar="SCENARIO", help="A name that `gridpeers list` shows, or the path of a file.")
-]
+
+def option(metavar: str, help: str, *names: str, **more: Any) -> Any:
+    """Return an option with a value: its word in the help, what it is, and its names if not those of the parameter."""
+    return typer.Option(*names, metavar=metavar, help=help, **more)
+
+
+def flag(help: str, *names: str) -> Any:
+    """Return an option without a value: what it does, and its names."""
+    return typer.Option(*names, help=help)
+
+
+def argument(metavar: str, help: str) -> Any:
+    """Return an argument: its word in the help, and what it is."""
+    return typer.Argument(metavar=metavar, help=help)
+
+
+ScenarioName = Annotated[str, argument("SCENARIO", "A name that `gridpeers list` shows, or the path of a file.")]
 
 PASSED, CLAIM_FAILED, BAD_INPUT, BROKEN, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 130, 143
 

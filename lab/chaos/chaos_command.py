@@ -19,6 +19,7 @@ from gridpeers.cli.usage import (
     chosen,
     fail,
     load,
+    option,
     require,
     terminal,
 )
@@ -33,19 +34,16 @@ _PACKAGES = {"hypothesis": "the schedules", "joblib": "the runs over all cores"}
 
 def chaos(
     scenario: ScenarioName,
-    runs: Annotated[int, typer.Option(min=1, metavar="N", help="Number of runs.")] = 100,
+    runs: Annotated[int, option("N", "Number of runs.", min=1)] = 100,
     driver: Annotated[
         Literal["inprocess", "processes"],
         typer.Option(help="inprocess: each run in one process; processes: one per agent, beside the same in one."),
     ] = "inprocess",
-    seed: Annotated[int, typer.Option(min=0, max=10**9, metavar="S", help="Seed of all that is drawn.")] = 1,
-    case: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Case to disturb; the last one of the file when left out.")
-    ] = None,
-    jobs: Annotated[int | None, typer.Option(min=1, metavar="N", help="Processes; one per core when left out.")] = None,
+    seed: Annotated[int, option("S", "Seed of all that is drawn.", min=0, max=10**9)] = 1,
+    case: Annotated[str | None, option("NAME", "Case to disturb; the last one of the file when left out.")] = None,
+    jobs: Annotated[int | None, option("N", "Processes; one per core when left out.", min=1)] = None,
     out: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Folder for the results, new or empty; runs/SCENARIO-chaos/TIME if left out."),
+        Path | None, option("DIR", "Folder for the results, new or empty; runs/SCENARIO-chaos/TIME if left out.")
     ] = None,
 ) -> None:
     """Disturb a scenario at random; judge and shrink what fails.

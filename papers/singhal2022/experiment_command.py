@@ -15,9 +15,11 @@ from gridpeers.cli.usage import (
     BAD_INPUT,
     BROKEN,
     CLAIM_FAILED,
+    argument,
     check_choice,
     ended_by_signals,
     fail,
+    option,
     terminal,
 )
 from gridpeers.output_folders import RUNS, refusal, shown
@@ -28,16 +30,11 @@ if TYPE_CHECKING:
 
 
 def experiment(
-    name: Annotated[
-        str, typer.Argument(metavar="NAME", help="An experiment; `list`, or nothing, shows all of them.")
-    ] = "list",
+    name: Annotated[str, argument("NAME", "An experiment; `list`, or nothing, shows all of them.")] = "list",
     out: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Folder, new or this experiment's; runs/experiments/NAME when left out."),
+        Path | None, option("DIR", "Folder, new or this experiment's; runs/experiments/NAME when left out.")
     ] = None,
-    jobs: Annotated[
-        int | None, typer.Option(min=1, metavar="N", help="Processes of a sweep; one per core when left out.")
-    ] = None,
+    jobs: Annotated[int | None, option("N", "Processes of a sweep; one per core when left out.", min=1)] = None,
 ) -> None:
     """Run an experiment on late, lossy or broken links.
 

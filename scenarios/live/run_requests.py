@@ -249,11 +249,11 @@ class LinkCommandResult(NamedTuple):
     """Sentences on receivers that refused, or that take part and have not answered in time."""
 
 
-def links_of_run(client: RunClient) -> tuple[EmulationConfig, AgentConfig]:
-    """Return the emulated links of a run, and the configuration of one agent; NobodyError if none can be changed."""
+def links_of_run(client: RunClient) -> EmulationConfig:
+    """Return the emulated links of a run; NobodyError if none can be changed."""
     for config in configurations(client).values():
         if config.links:
-            return EmulationConfig.of_tree(config.links), config
+            return EmulationConfig.of_tree(config.links)
     raise NobodyError(
         f"{client.where} has no emulated links that could be changed; runs started by gridpeers plant or up have"
     )

@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from gridpeers.cli.usage import BAD_INPUT, check_choice, fail, load, refuse
+from gridpeers.cli.usage import BAD_INPUT, argument, check_choice, fail, flag, load, option, refuse
 from gridpeers.feeder import Feeder, reader_of
 from gridpeers.output_folders import FolderError, refusal, shown, whole_folder, write_whole
 from gridpeers.plant.equipment.connectivity import Connectivity
@@ -25,22 +25,15 @@ from gridpeers.wire.wording import counted
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Import, check, solve, draw and export feeders.")
 
 FeederName = Annotated[
-    str,
-    typer.Argument(
-        metavar="FEEDER", help="A feeder that comes with gridpeers, a folder of tables, or a .dss or .glm file."
-    ),
+    str, argument("FEEDER", "A feeder that comes with gridpeers, a folder of tables, or a .dss or .glm file.")
 ]
 Switches = Annotated[
-    list[str] | None,
-    typer.Option("--switch", metavar="LINE", help="A line to make a switch, beside the script's own; repeat it."),
+    list[str] | None, option("LINE", "A line to make a switch, beside the script's own; repeat it.", "--switch")
 ]
 LeaveOut = Annotated[
-    list[str] | None,
-    typer.Option("--leave-out", metavar="ELEMENT", help='Do without Class.name, * for any: "PVSystem.*"; repeat it.'),
+    list[str] | None, option("ELEMENT", 'Do without Class.name, * for any: "PVSystem.*"; repeat it.', "--leave-out")
 ]
-LoadSet = Annotated[
-    str | None, typer.Option("--load-set", metavar="NAME", help="Load table of a folder of tables; main if left out.")
-]
+LoadSet = Annotated[str | None, option("NAME", "Load table of a folder of tables; main if left out.", "--load-set")]
 SHOWN = 12
 """Notes that are shown."""
 
@@ -62,9 +55,7 @@ def _problems_told(feeder: str, file: Path | str) -> Iterator[None]:
 
 @app.command("import")
 def import_(
-    file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="Script for OpenDSS (.dss) or model for GridLAB-D (.glm).")
-    ],
+    file: Annotated[Path, argument("FILE", "Script for OpenDSS (.dss) or model for GridLAB-D (.glm).")],
     out: Annotated[Path | None, typer.Option(help="Folder for its tables; else the feeder's name.")] = None,
     switch: Switches = None,
     leave_out: LeaveOut = None,
@@ -112,9 +103,7 @@ def check(feeder: FeederName, load_set: LoadSet = None, switch: Switches = None,
 @app.command()
 def solve(
     feeder: FeederName,
-    open_: Annotated[
-        list[str] | None, typer.Option("--open", metavar="SWITCH", help="Open it first; repeat it.")
-    ] = None,
+    open_: Annotated[list[str] | None, option("SWITCH", "Open it first; repeat it.", "--open")] = None,
     csv: Annotated[Path | None, typer.Option(help="File for all voltages.")] = None,
     load_set: LoadSet = None,
     switch: Switches = None,
@@ -154,7 +143,7 @@ def solve(
 def plot(
     feeder: FeederName,
     out: Annotated[Path, typer.Option(help="File of the figure: .png, .svg or .pdf.")] = Path("feeder.png"),
-    voltages: Annotated[bool, typer.Option("--voltages", help="Colour by voltage instead of by microgrid.")] = False,
+    voltages: Annotated[bool, flag("Colour by voltage instead of by microgrid.", "--voltages")] = False,
     load_set: LoadSet = None,
     switch: Switches = None,
     leave_out: LeaveOut = None,
@@ -173,9 +162,7 @@ def plot(
 
 @app.command()
 def glm(
-    feeder: Annotated[
-        str, typer.Argument(metavar="FEEDER", help="A feeder that comes with gridpeers, or a folder of tables.")
-    ],
+    feeder: Annotated[str, argument("FEEDER", "A feeder that comes with gridpeers, or a folder of tables.")],
     out: Annotated[Path | None, typer.Option(help="File of the model; else FEEDER.glm here.")] = None,
     load_set: Annotated[str | None, typer.Option(help="Load table; else main, or the scenario's.")] = None,
     scenario: Annotated[

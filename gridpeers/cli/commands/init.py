@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from gridpeers.cli.usage import BAD_INPUT, fail
+from gridpeers.cli.usage import BAD_INPUT, argument, fail, option
 from gridpeers.output_folders import FolderError, shown, whole_folder
 from gridpeers.rooms import ROOMS
 from gridpeers.wire.driver.command_line import command_line
@@ -20,20 +20,15 @@ TEMPLATE = Path(__file__).parents[1] / "template"
 
 
 def init(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of the project, new or empty.")],
+    folder: Annotated[Path, argument("DIR", "Folder of the project, new or empty.")],
     feeder: Annotated[
-        Path | None,
-        typer.Option(
-            "--feeder", metavar="FILE", help="Island this feeder, a .dss or .glm file: a scenario is proposed."
-        ),
+        Path | None, option("FILE", "Island this feeder, a .dss or .glm file: a scenario is proposed.", "--feeder")
     ] = None,
     switch: Annotated[
-        list[str] | None,
-        typer.Option("--switch", metavar="LINE", help="With --feeder: a line to make a switch; repeat it."),
+        list[str] | None, option("LINE", "With --feeder: a line to make a switch; repeat it.", "--switch")
     ] = None,
     leave_out: Annotated[
-        list[str] | None,
-        typer.Option("--leave-out", metavar="ELEMENT", help="With --feeder: do without Class.name; repeat it."),
+        list[str] | None, option("ELEMENT", "With --feeder: do without Class.name; repeat it.", "--leave-out")
     ] = None,
 ) -> None:
     """Make a project of your own, or an islanding of your feeder.

@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from gridpeers.cli.suggestions import Commands
-from gridpeers.cli.usage import BAD_INPUT, fail, require
+from gridpeers.cli.usage import BAD_INPUT, argument, fail, flag, option, require
 from gridpeers.wire.keys import Role
 from gridpeers.wire.trust import site_authority
 from gridpeers.wire.trust.credentials import DATE_AND_TIME
@@ -27,15 +27,13 @@ app = typer.Typer(
     "Example:  gridpeers keys init lab",
 )
 
-_Keys = Annotated[Path, typer.Option(metavar="DIR", help="Folder of the site; the present one if left out.")]
-_Days = Annotated[float, typer.Option(metavar="N", help="Life of the certificates (days).")]
+_Keys = Annotated[Path, option("DIR", "Folder of the site; the present one if left out.")]
+_Days = Annotated[float, option("N", "Life of the certificates (days).")]
 
 
 @app.command()
 def init(
-    site: Annotated[
-        Path, typer.Argument(metavar="SITE", help="New folder for the certificates; its name is the site's.")
-    ],
+    site: Annotated[Path, argument("SITE", "New folder for the certificates; its name is the site's.")],
     days: _Days = 365.0,
 ) -> None:
     """Make a site: an authority, and certificates of a plant, an operator and a viewer.
@@ -53,10 +51,9 @@ def init(
 
 @app.command()
 def issue(
-    names: Annotated[list[str], typer.Argument(metavar="NAME...", help="Names; of agents those of their inverters.")],
+    names: Annotated[list[str], argument("NAME...", "Names; of agents those of their inverters.")],
     role: Annotated[
-        Role | None,
-        typer.Option("--role", help="What its holder may do; a name keeps its role, a new one is an agent."),
+        Role | None, flag("What its holder may do; a name keeps its role, a new one is an agent.", "--role")
     ] = None,
     keys: _Keys = Path(),
     days: _Days = 365.0,
@@ -77,7 +74,7 @@ def issue(
 
 @app.command()
 def revoke(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Name; of an agent that of its inverter, e.g. inv4.")],
+    name: Annotated[str, argument("NAME", "Name; of an agent that of its inverter, e.g. inv4.")],
     keys: _Keys = Path(),
 ) -> None:
     """Revoke a certificate: processes that start from now on with the new list keep its holder out.

@@ -8,7 +8,7 @@ import typer
 
 from gridpeers.cli.commands.options import LiveRun, of_live_run
 from gridpeers.cli.suggestions import Commands
-from gridpeers.cli.usage import BROKEN, fail
+from gridpeers.cli.usage import BROKEN, argument, fail, flag, option
 from gridpeers.scenarios.live.run_address import UsageError
 
 if TYPE_CHECKING:
@@ -24,13 +24,8 @@ link = typer.Typer(
     'Example:  gridpeers link set "inv1 -> inv4" --delay 0.1 --jitter 0.02 --loss 0.2',
 )
 
-_Ends = Annotated[
-    list[str],
-    typer.Argument(metavar="LINKS", help='A pattern such as "inv1 -> inv4", or two names: sender and receiver.'),
-]
-_For = Annotated[
-    float | None, typer.Option("--for", metavar="SECONDS", help="Run time after which it ends; healed if left out.")
-]
+_Ends = Annotated[list[str], argument("LINKS", 'A pattern such as "inv1 -> inv4", or two names: sender and receiver.')]
+_For = Annotated[float | None, option("SECONDS", "Run time after which it ends; healed if left out.", "--for")]
 
 
 @link.command("set")
@@ -38,15 +33,13 @@ _For = Annotated[
 def set_(
     links: _Ends,
     live: LiveRun,
-    delay: Annotated[float | None, typer.Option(metavar="SECONDS", help="Delay of every message.")] = None,
-    jitter: Annotated[
-        float | None, typer.Option(metavar="SECONDS", help="Delays are uniform, --delay plus or minus this.")
-    ] = None,
-    loss: Annotated[float | None, typer.Option(metavar="P", help="Probability that a message is lost.")] = None,
-    duplicate: Annotated[float | None, typer.Option(metavar="P", help="Probability of a second copy.")] = None,
-    corrupt: Annotated[float | None, typer.Option(metavar="P", help="Probability of a flipped bit.")] = None,
-    rate: Annotated[float | None, typer.Option(metavar="BYTES", help="Bytes per second that the link sends.")] = None,
-    profile: Annotated[str, typer.Option(metavar="NAME", help="A named link, e.g. lte; see docs/netem.md.")] = "",
+    delay: Annotated[float | None, option("SECONDS", "Delay of every message.")] = None,
+    jitter: Annotated[float | None, option("SECONDS", "Delays are uniform, --delay plus or minus this.")] = None,
+    loss: Annotated[float | None, option("P", "Probability that a message is lost.")] = None,
+    duplicate: Annotated[float | None, option("P", "Probability of a second copy.")] = None,
+    corrupt: Annotated[float | None, option("P", "Probability of a flipped bit.")] = None,
+    rate: Annotated[float | None, option("BYTES", "Bytes per second that the link sends.")] = None,
+    profile: Annotated[str, option("NAME", "A named link, e.g. lte; see docs/netem.md.")] = "",
     duration: _For = None,
 ) -> None:
     """Give links faults. What is set takes the place of what the link had of the same kind.
@@ -66,10 +59,8 @@ def set_(
 def cut(
     links: _Ends,
     live: LiveRun,
-    one_way: Annotated[bool, typer.Option("--one-way", help="With two names: only from the first.")] = False,
-    hold: Annotated[
-        bool, typer.Option("--hold", help="Keep messages and let them go when the link is healed.")
-    ] = False,
+    one_way: Annotated[bool, flag("With two names: only from the first.", "--one-way")] = False,
+    hold: Annotated[bool, flag("Keep messages and let them go when the link is healed.", "--hold")] = False,
     duration: _For = None,
 ) -> None:
     """Cut links, between two names both ways.
@@ -86,8 +77,7 @@ def cut(
 def heal(
     live: LiveRun,
     links: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="[LINKS]", help="A pattern, or two names (both ways); all links if none."),
+        list[str] | None, argument("[LINKS]", "A pattern, or two names (both ways); all links if none.")
     ] = None,
 ) -> None:
     """End what holds on links.
@@ -143,7 +133,7 @@ def _give(links: list[str], arrow: str, fault: dict[str, Any] | None, duration: 
     )
     check_link_command(command, None)
     with live.client(acts=True) as client:
-        setup = links_of_run(client)[0]
+        setup = links_of_run(client)
         check_link_command(command, setup)
         result = command_links(client, command)
     typer.echo(result.text)

@@ -22,7 +22,7 @@ from gridpeers.cli.commands.options import (
     of_live_run,
     usage_errors,
 )
-from gridpeers.cli.usage import BAD_INPUT, BROKEN, fail, terminal
+from gridpeers.cli.usage import BAD_INPUT, BROKEN, argument, fail, flag, option, terminal
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
 from gridpeers.scenarios.live.run_address import (
     RUN,
@@ -39,21 +39,17 @@ from gridpeers.wire.driver.ending import watch_readers
 
 @usage_errors()
 def agent(
-    inverters: Annotated[
-        list[str], typer.Argument(metavar="INVERTER", help="Names of their inverters, e.g. inv2; spare ones too.")
-    ],
+    inverters: Annotated[list[str], argument("INVERTER", "Names of their inverters, e.g. inv2; spare ones too.")],
     run: Run = RUN,
     connect: Connect = None,
     listen: Annotated[
-        list[str] | None,
-        typer.Option(metavar="ENDPOINT", help="Where other agents connect; any free port if left out."),
+        list[str] | None, option("ENDPOINT", "Where other agents connect; any free port if left out.")
     ] = None,
     wait: Wait = 60.0,
     keys: Keys = None,
     insecure: Insecure = False,
     own_code: Annotated[
-        bool,
-        typer.Option("--own-code", help="Run a law, graph or link fault that only the plant, on another host, names."),
+        bool, flag("Run a law, graph or link fault that only the plant, on another host, names.", "--own-code")
     ] = False,
 ) -> None:
     """Run the agent of an inverter, or of several, in this terminal. Ctrl-C leaves properly: they are switched off.
@@ -89,9 +85,7 @@ def status(live: LiveRun) -> None:
 @of_live_run
 def watch(
     live: LiveRun,
-    duration: Annotated[
-        float | None, typer.Option("--for", metavar="SECONDS", help="Stop after so long; at Ctrl-C if left out.")
-    ] = None,
+    duration: Annotated[float | None, option("SECONDS", "Stop after so long; at Ctrl-C if left out.", "--for")] = None,
 ) -> None:
     """Watch a run as a live table, until Ctrl-C. Where the output is no terminal, a text every second.
 
@@ -106,7 +100,7 @@ def watch(
 
 @of_live_run
 def stop(
-    inverter: Annotated[str, typer.Argument(metavar="INVERTER", help="Name of its inverter, e.g. inv2.")],
+    inverter: Annotated[str, argument("INVERTER", "Name of its inverter, e.g. inv2.")],
     live: LiveRun,
 ) -> None:
     """Have an agent leave properly: its inverter is switched off.
@@ -123,11 +117,11 @@ def stop(
 
 @of_live_run
 def event(
-    action: Annotated[str, typer.Argument(metavar="open|close", help="What to do with the switch.")],
-    switch: Annotated[str, typer.Argument(metavar="SWITCH", help='Its name, e.g. "13-152" or "sw1_2".')],
+    action: Annotated[str, argument("open|close", "What to do with the switch.")],
+    switch: Annotated[str, argument("SWITCH", 'Its name, e.g. "13-152" or "sw1_2".')],
     live: LiveRun,
     synchronised: Annotated[
-        bool, typer.Option("--synchronised", help="Close only if both sides are in step (IEEE 1547, Table 5).")
+        bool, flag("Close only if both sides are in step (IEEE 1547, Table 5).", "--synchronised")
     ] = False,
 ) -> None:
     """Open or close a switch of a running plant.
@@ -144,17 +138,11 @@ def event(
 
 @of_live_run
 def load(
-    name: Annotated[
-        str,
-        typer.Argument(metavar="LOAD", help='Its bus, e.g. "48"; in an imported feeder its name.'),
-    ],
+    name: Annotated[str, argument("LOAD", 'Its bus, e.g. "48"; in an imported feeder its name.')],
     live: LiveRun,
-    factor: Annotated[
-        float | None,
-        typer.Option(metavar="X", help="Times the power of the feeder's table; 1 is as before."),
-    ] = None,
-    P: Annotated[float | None, typer.Option("--P", metavar="KW", help="Real power at nominal voltage.")] = None,
-    Q: Annotated[float | None, typer.Option("--Q", metavar="KVAR", help="Reactive power at nominal voltage.")] = None,
+    factor: Annotated[float | None, option("X", "Times the power of the feeder's table; 1 is as before.")] = None,
+    P: Annotated[float | None, option("KW", "Real power at nominal voltage.", "--P")] = None,
+    Q: Annotated[float | None, option("KVAR", "Reactive power at nominal voltage.", "--Q")] = None,
 ) -> None:
     """Set a load of a running plant.
 

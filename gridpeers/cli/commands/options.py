@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gridpeers.cli.usage import BAD_INPUT, BROKEN, CLAIM_FAILED, INTERRUPTED, TERMINATED, fail
+from gridpeers.cli.usage import BAD_INPUT, BROKEN, CLAIM_FAILED, INTERRUPTED, TERMINATED, fail, flag, option
 from gridpeers.scenarios.live.run_address import (
     ENDPOINT,
     RUN,
@@ -32,21 +32,15 @@ if TYPE_CHECKING:
     from gridpeers.scenarios.live.live_processes import ProcessOutcome
     from gridpeers.scenarios.live.run_client import RunClient
 
-Run = Annotated[str, typer.Option(metavar="NAME", help="Name of the run; runs of other names do not meet.")]
+Run = Annotated[str, option("NAME", "Name of the run; runs of other names do not meet.")]
 Connect = Annotated[
-    list[str] | None,
-    typer.Option(metavar="ENDPOINT", help=f"Where the plant listens, {ENDPOINT} if left out; repeatable."),
+    list[str] | None, option("ENDPOINT", f"Where the plant listens, {ENDPOINT} if left out; repeatable.")
 ]
-Wait = Annotated[float, typer.Option(metavar="SECONDS", help="Longest wait for the plant.")]
-Keys = Annotated[
-    Path | None,
-    typer.Option(metavar="DIR", help="With certificates from here, links are TLS (docs/security.md)."),
-]
-As = Annotated[
-    str, typer.Option("--as", metavar="NAME", help="With --keys: whose certificate; the operator's if left out.")
-]
+Wait = Annotated[float, option("SECONDS", "Longest wait for the plant.")]
+Keys = Annotated[Path | None, option("DIR", "With certificates from here, links are TLS (docs/security.md).")]
+As = Annotated[str, option("NAME", "With --keys: whose certificate; the operator's if left out.", "--as")]
 Insecure = Annotated[
-    bool, typer.Option("--insecure", help="Let an endpoint be open to everybody who reaches it, beyond the loopback.")
+    bool, flag("Let an endpoint be open to everybody who reaches it, beyond the loopback.", "--insecure")
 ]
 
 

@@ -21,7 +21,9 @@ from gridpeers.cli.usage import (
     chosen,
     ended_by_signals,
     fail,
+    flag,
     load,
+    option,
     refuse,
     require_loadable,
     terminal,
@@ -45,45 +47,27 @@ def run(
         Literal["simulated", "wall"],
         typer.Option(help="simulated: in lock-step, the same result every time; wall: real time, agents run freely."),
     ] = "simulated",
-    speed: Annotated[
-        float, typer.Option(metavar="X", help="With --clock wall: seconds of the run per second of real time.")
-    ] = 1.0,
-    strict: Annotated[
-        bool, typer.Option("--strict", help="With --clock wall: break the run when it cannot keep pace.")
-    ] = False,
+    speed: Annotated[float, option("X", "With --clock wall: seconds of the run per second of real time.")] = 1.0,
+    strict: Annotated[bool, flag("With --clock wall: break the run when it cannot keep pace.", "--strict")] = False,
     plant: Annotated[
         str | None,
-        typer.Option(
-            metavar="NAME", help="What simulates the plant: gridpeers, gridlabd or helics; else as the scenario says."
-        ),
+        option("NAME", "What simulates the plant: gridpeers, gridlabd or helics; else as the scenario says."),
     ] = None,
-    processes: Annotated[
-        int, typer.Option(metavar="N", help="Processes that the agents share; one an agent when left out.")
-    ] = 0,
+    processes: Annotated[int, option("N", "Processes that the agents share; one an agent when left out.")] = 0,
     keys: Keys = None,
-    broker: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="With --plant helics: the broker, tcp://127.0.0.1:23404.")
-    ] = None,
-    case: Annotated[
-        str | None, typer.Option(help="Cases to run, e.g. I,IV; all when left out.", metavar="NAMES")
-    ] = None,
-    seed: Annotated[
-        int | None, typer.Option(min=0, metavar="N", help="Seed instead of the one in the scenario.")
-    ] = None,
+    broker: Annotated[str | None, option("ADDRESS", "With --plant helics: the broker, tcp://127.0.0.1:23404.")] = None,
+    case: Annotated[str | None, option("NAMES", "Cases to run, e.g. I,IV; all when left out.")] = None,
+    seed: Annotated[int | None, option("N", "Seed instead of the one in the scenario.", min=0)] = None,
     require_checks: Annotated[
-        bool,
-        typer.Option("--require-checks", help="Exit code 1 also if a check fails; one that is not judged has not."),
+        bool, flag("Exit code 1 also if a check fails; one that is not judged has not.", "--require-checks")
     ] = False,
     out: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Folder for the results, new or empty; runs/SCENARIO/TIME when left out."),
+        Path | None, option("DIR", "Folder for the results, new or empty; runs/SCENARIO/TIME when left out.")
     ] = None,
     view: Annotated[
-        bool, typer.Option("--view", help="Follow the run in the browser; the page stays until Ctrl-C (extra view).")
+        bool, flag("Follow the run in the browser; the page stays until Ctrl-C (extra view).", "--view")
     ] = False,
-    port: Annotated[
-        int | None, typer.Option(metavar="N", help="With --view: port of the page, 8123 if left out; 0 takes any.")
-    ] = None,
+    port: Annotated[int | None, option("N", "With --view: port of the page, 8123 if left out; 0 takes any.")] = None,
 ) -> None:
     """Run a scenario and show its results, beside published ones.
 

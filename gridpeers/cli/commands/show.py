@@ -9,7 +9,7 @@ from typing import Annotated, Literal, get_args
 
 import typer
 
-from gridpeers.cli.usage import BAD_INPUT, fail, load, refuse, terminal
+from gridpeers.cli.usage import BAD_INPUT, argument, fail, load, option, refuse, terminal
 from gridpeers.wire.wording import counted, printable
 
 Topic = Literal["keys", "messages", "scenario", "feeder", "laws", "metrics", "claims", "checks", "faults", "graphs"]
@@ -29,7 +29,7 @@ def list_() -> None:
 
 
 def check(
-    file: Annotated[str, typer.Argument(metavar="FILE", help="Path of a scenario file, or a name from the catalogue.")],
+    file: Annotated[str, argument("FILE", "Path of a scenario file, or a name from the catalogue.")],
 ) -> None:
     """Check a scenario file and its feeder for problems.
 
@@ -62,7 +62,7 @@ def check(
 
 
 def doc(
-    topic: Annotated[Topic, typer.Argument(metavar="TOPIC", help=f"What to print: {', '.join(get_args(Topic))}.")],
+    topic: Annotated[Topic, argument("TOPIC", f"What to print: {', '.join(get_args(Topic))}.")],
 ) -> None:
     """Print a reference page that is made from the code.
 
@@ -76,15 +76,15 @@ def doc(
     typer.echo(page(topic), nl=False)
 
 
-_Run = Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run, e.g. runs/islanding/latest.")]
+_Run = Annotated[Path, argument("RUN", "Folder of a run, e.g. runs/islanding/latest.")]
 
 
 def compare(
     first: _Run,
     second: _Run,
-    out: Annotated[
-        Path, typer.Option(metavar="FILE", help="Figure, as .png, .pdf or .svg; runs/comparison.png when left out.")
-    ] = Path("runs/comparison.png"),
+    out: Annotated[Path, option("FILE", "Figure, as .png, .pdf or .svg; runs/comparison.png when left out.")] = Path(
+        "runs/comparison.png"
+    ),
 ) -> None:
     """Compare two runs: scenarios, metrics, and one figure of both.
 
@@ -126,10 +126,8 @@ def _names(first: Path, second: Path) -> tuple[str, str]:
 
 
 def metrics(
-    run: Annotated[
-        Path, typer.Argument(metavar="RUN", help="Folder of a case, e.g. runs/islanding/latest/IV, or its run.mcap.")
-    ],
-    case: Annotated[str, typer.Option(metavar="NAME", help="Case of the run, if RUN has several.")] = "",
+    run: Annotated[Path, argument("RUN", "Folder of a case, e.g. runs/islanding/latest/IV, or its run.mcap.")],
+    case: Annotated[str, option("NAME", "Case of the run, if RUN has several.")] = "",
 ) -> None:
     """Measure a run from its record, also one that was killed.
 

@@ -20,7 +20,7 @@ from gridpeers.cli.commands.options import (
     of_live_run,
     opened,
 )
-from gridpeers.cli.usage import ScenarioName, chosen, load
+from gridpeers.cli.usage import ScenarioName, chosen, flag, load, option
 from gridpeers.scenarios.live.run_address import (
     ENDPOINT,
     RUN,
@@ -39,33 +39,19 @@ class Start:
     """The options of a live run, as typed."""
 
     scenario: ScenarioName
-    case: Annotated[str, typer.Option(metavar="NAME", help="Case of the scenario; its last when left out.")] = ""
+    case: Annotated[str, option("NAME", "Case of the scenario; its last when left out.")] = ""
     run: Run = RUN
     listen: Annotated[
-        str,
-        typer.Option(
-            "--listen",
-            metavar="ENDPOINT",
-            help="Where the others connect; with --keys tls/0.0.0.0:7447 for other hosts.",
-        ),
+        str, option("ENDPOINT", "Where the others connect; with --keys tls/0.0.0.0:7447 for other hosts.", "--listen")
     ] = ENDPOINT
     connect: Annotated[
-        list[str] | None,
-        typer.Option(metavar="ENDPOINT", help="What the plant connects to itself, e.g. a Zenoh router."),
+        list[str] | None, option("ENDPOINT", "What the plant connects to itself, e.g. a Zenoh router.")
     ] = None
-    speed: Annotated[float, typer.Option(metavar="X", help="Run time per wall time, 0.1 to 50; 1 is real.")] = 1.0
-    wait: Annotated[
-        float,
-        typer.Option(metavar="SECONDS", help="How long the plant waits for its agents before it starts."),
-    ] = 30.0
-    duration: Annotated[
-        float | None, typer.Option("--for", metavar="SECONDS", help="Run time to end at; no end if left out.")
-    ] = None
-    strict: Annotated[bool, typer.Option("--strict", help="End with exit code 3 when pace cannot be kept.")] = False
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Record the run in a new folder, and measure it at its end."),
-    ] = None
+    speed: Annotated[float, option("X", "Run time per wall time, 0.1 to 50; 1 is real.")] = 1.0
+    wait: Annotated[float, option("SECONDS", "How long the plant waits for its agents before it starts.")] = 30.0
+    duration: Annotated[float | None, option("SECONDS", "Run time to end at; no end if left out.", "--for")] = None
+    strict: Annotated[bool, flag("End with exit code 3 when pace cannot be kept.", "--strict")] = False
+    out: Annotated[Path | None, option("DIR", "Record the run in a new folder, and measure it at its end.")] = None
     keys: Keys = None
     insecure: Insecure = False
 
@@ -79,8 +65,8 @@ def _start(start: Start, *, agents: bool) -> None:
     credentials = opened(access := Access(keys=start.keys, insecure=start.insecure), ("plant",))
     beyond = tuple(check_endpoint("--connect", text) for text in start.connect or ())
     listen = with_protocol(check_endpoint("--listen", start.listen), keys=start.keys is not None, default=ENDPOINT)
-    for option, text in (("--listen", listen), *(("--connect", text) for text in beyond)):
-        check_open(option, text, access)
+    for name, text in (("--listen", listen), *(("--connect", text) for text in beyond)):
+        check_open(name, text, access)
     endpoint = endpoint_for_run(listen, credentials, access)
     check_alone(run, beyond, credentials, access)
 

@@ -14,9 +14,12 @@ from gridpeers.cli.usage import (
     BROKEN,
     CLAIM_FAILED,
     PASSED,
+    argument,
     exit_code,
     fail,
+    flag,
     interruptible,
+    option,
     refuse,
     require,
     terminal,
@@ -32,15 +35,12 @@ if TYPE_CHECKING:
 
 
 def sweep(
-    file: Annotated[str, typer.Argument(metavar="FILE", help="Path of a sweep file, or a name, e.g. gains, topology.")],
+    file: Annotated[str, argument("FILE", "Path of a sweep file, or a name, e.g. gains, topology.")],
     out: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Folder, new or this sweep's from before; runs/sweeps/NAME when left out."),
+        Path | None, option("DIR", "Folder, new or this sweep's from before; runs/sweeps/NAME when left out.")
     ] = None,
-    jobs: Annotated[int | None, typer.Option(min=1, metavar="N", help="Processes; one per core when left out.")] = None,
-    dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Check everything, tell the size, and run nothing.")
-    ] = False,
+    jobs: Annotated[int | None, option("N", "Processes; one per core when left out.", min=1)] = None,
+    dry_run: Annotated[bool, flag("Check everything, tell the size, and run nothing.", "--dry-run")] = False,
 ) -> None:
     """Run a scenario many times over values of its keys.
 

@@ -19,6 +19,7 @@ from gridpeers.cli.usage import (
     exit_code,
     fail,
     interruptible,
+    option,
     refuse,
     terminal,
 )
@@ -32,19 +33,14 @@ def reproduce(
     ] = "processes",
     only: Annotated[
         str | None,
-        typer.Option(
-            metavar="WHAT", help="tables: what has tables, without figures; figures; or a part by its scenario's name."
-        ),
+        option("WHAT", "tables: what has tables, without figures; figures; or a part by its scenario's name."),
     ] = None,
     seed: Annotated[
-        int | None, typer.Option(min=0, metavar="N", help="Seed instead of the scenarios' own, also of random graphs.")
+        int | None, option("N", "Seed instead of the scenarios' own, also of random graphs.", min=0)
     ] = None,
-    jobs: Annotated[
-        int | None, typer.Option(min=1, metavar="N", help="Random graphs at a time; one per core when left out.")
-    ] = None,
+    jobs: Annotated[int | None, option("N", "Random graphs at a time; one per core when left out.", min=1)] = None,
     out: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Folder for the report, new or empty; runs/reproduce/TIME when left out."),
+        Path | None, option("DIR", "Folder for the report, new or empty; runs/reproduce/TIME when left out.")
     ] = None,
 ) -> None:
     """Run all experiments of the paper, and write one report.
