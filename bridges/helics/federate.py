@@ -99,7 +99,7 @@ class HelicsFederate:
             missing = f"{USER} needs the package helics; install it: pip install 'gridpeers[helics]'"
             raise HelicsError(damaged("helics", ready["not_importable"], USER) if ready["installed"] else missing)
         host, port = endpoint(settings.broker)
-        request = {"do": "join", "name": settings.name, "host": host, "port": port, "federates": settings.federates}
+        request = {"do": "join", "name": settings.name, "host": host, "port": port}
         late = f"{settings.broker} did not answer as a HELICS broker of core type ZMQ within {deadline:g} s"
         self._ask(request | {"wait": 0.9 * deadline}, late, deadline + LATER)
 
@@ -109,8 +109,7 @@ class HelicsFederate:
         Return the names of the `others`, and the keys of the subscriptions that nobody publishes (`missing`).
         """
         settings = self._settings
-        wanted = f"the broker waits for {settings.federates} federates" if settings.federates else "are all started?"
-        late = f"the federation at {settings.broker} did not begin within {settings.wait:g} s ({wanted})"
+        late = f"the federation at {settings.broker} did not begin within {settings.wait:g} s (are all started?)"
         request = {"do": "begin", "publications": publications, "subscriptions": subscriptions}
         federation = self._ask(request, late, settings.wait)
         self._others = " or ".join(federation["others"]) or "the broker"

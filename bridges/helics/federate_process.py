@@ -1,11 +1,11 @@
-"""One HELICS federate, and its broker if asked for: the only file that knows the package `helics`.
+"""One HELICS federate: the only file that knows the package `helics`.
 
 It is a process of its own, because HELICS writes to the terminal from its own threads, and because a wait inside its
 library cannot be ended from Python: a process can. `gridpeers.bridges.helics.federate` starts it as a script, so it
 imports nothing of ours. Each line of standard input is a JSON object with a request, each line of standard output its
 answer; what HELICS prints goes to standard error.
 
-    {"do": "join", "name", "host", "port", "federates", "wait"}
+    {"do": "join", "name", "host", "port", "wait"}
     {"do": "begin", "publications": [[key, type, unit]], "subscriptions": [...]}
     {"do": "step", "publish": {key: value}, "time"}     publish, go to a time (s), return the values that came
     {"do": "end"}                                       leave the federation, end
@@ -26,7 +26,6 @@ import time
 from typing import Any
 
 GLOBAL_ERROR = 1  # HELICS's error code of a federation that we end
-BROKER_LEAVES = 3000  # longest time (ms) that an own broker waits for the others after the end
 FAREWELL = 0.3  # time (s) for the word of an abort to reach the others
 NOBODY = "any"  # type of a topic that nobody publishes
 PROBE = 0.1  # time (s) between two attempts to reach a broker
@@ -45,7 +44,6 @@ class Federate:
 
         self.helics: Any = helics
         self.fed: Any = None
-        self.broker: Any = None
         self.name = ""
         self.publications: dict[str, tuple[Any, str]] = {}
         self.subscriptions: dict[str, tuple[Any, str]] = {}
@@ -54,14 +52,7 @@ class Federate:
     def join(self, request: dict[str, Any]) -> dict[str, Any]:
         helics, host, port = self.helics, request["host"], request["port"]
         self.name = request["name"]
-        if request["federates"]:
-            _require_free(host, port)
-            options = f"-f {request['federates']} --loglevel=no_print --localinterface=tcp://{host}:{port}"
-            self.broker = helics.helicsCreateBroker("zmq", f"{self.name}-broker", options)
-            if not helics.helicsBrokerIsConnected(self.broker):
-                raise _RefusedError(f"cannot start a broker at tcp://{host}:{port}")
-        else:
-            _reach(host, port, request["wait"])
+        _reach(host, port, request["wait"])
         info = helics.helicsCreateFederateInfo()
         helics.helicsFederateInfoSetCoreTypeFromString(info, "zmq")
         options = f"--federates=1 --loglevel=no_print --broker_address=tcp://{host}:{port}"
@@ -116,10 +107,7 @@ class Federate:
         return {"values": values, "gone": gone}
 
     def end(self, _request: dict[str, Any]) -> dict[str, Any]:
-        """Leave the federation; an own broker stays until the others have left, or for a while."""
         self.helics.helicsFederateDisconnect(self.fed)
-        if self.broker is not None:
-            self.helics.helicsBrokerWaitForDisconnect(self.broker, BROKER_LEAVES)
         return {}
 
     def abort(self, reason: str) -> None:
@@ -164,18 +152,6 @@ class Federate:
             return self.helics.helicsQueryExecute(query, self.fed)
         finally:
             self.helics.helicsQueryFree(query)
-
-
-def _require_free(host: str, port: int) -> None:
-    """Refuse a port in use: HELICS itself would wait for it for a long time. A broker of type ZMQ has two ports."""
-    for each in (port, port + 1):
-        with socket.socket() as probe:
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            try:
-                probe.bind((host, each))
-            except OSError as error:
-                text = f"cannot start a broker at tcp://{host}:{port}: port {each}: {error.strerror}"
-                raise _RefusedError(f"{text}; end what has it, or choose another port") from None
 
 
 def _reach(host: str, port: int, wait: float) -> None:

@@ -19,7 +19,7 @@ _ADDRESS = re.compile(r"(tcp://)?([A-Za-z0-9_.-]+)(:(?P<port>\d{1,5}))?")
 
 
 class HelicsSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The federate of a run, and its broker."""
+    """The federate of a run, and the broker of its federation."""
 
     broker: Annotated[str, Example('"tcp://10.0.0.5:23404"')] = BROKER
     """Address of the broker, of HELICS's core type ZMQ."""
@@ -29,9 +29,6 @@ class HelicsSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
     """First part of every topic: "grid" gives grid/inv1/P."""
     wait: Annotated[float, Unit("s"), Plausible("a wait for federates", 0.1, 3600.0)] = 180.0
     """Longest wait (s of real time) for the other federates to begin: some are started by hand, or compile first."""
-    federates: Annotated[int, Plausible("a number of federates", 0, 1000)] = 0
-    """Above 0, the run starts the broker itself, and the federation waits for so many federates, this one included;
-    at 0 there must be a broker."""
 
     def relations(self) -> list[Problem]:
         """Return what is wrong with the values.
@@ -47,9 +44,6 @@ class HelicsSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
             value = getattr(self, key)
             if not re.fullmatch(NAME, value):
                 found.append(Problem(key, f'must be up to 64 letters, digits, "_", "-" or ".", got "{value}"'))
-        if self.federates == 1:
-            text = "must be at least 2, this one and an outside one, or 0 to start no broker; got 1"
-            found.append(Problem("federates", text))
         return found
 
 

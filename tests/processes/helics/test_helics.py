@@ -32,17 +32,33 @@ EXAMPLE = Path(__file__).parents[3] / "examples" / "helics_federate.py"
 STRANGE = HERE / "strange_federate.py"
 
 
+BROKER = (  # A broker that prints its warnings, as `helics_broker` does
+    "import sys, helics\n"
+    "broker = helics.helicsCreateBroker('zmq', '', f'-f {sys.argv[2]} --localinterface={sys.argv[1]}')\n"
+    "helics.helicsBrokerWaitForDisconnect(broker, 60000)\n"
+)
+
+
 def free_broker() -> str:
     """Address at which a broker can be started."""
     return free_endpoint("tcp/127.0.0.1:0").replace("/", "://")
 
 
 def short(end: float, broker: str, deadline: float = 30.0, wait: float = 30.0, **changes: Any) -> Scenario:
-    """The islanding scenario, sooner and shorter; the broker is the run's, which waits so long (s) for the begin."""
+    """The islanding scenario on a grid outside, sooner and shorter, which waits so long (s) for the begin."""
     events = [{"label": "islanding", "t_s": 0.1, "open": ["13-152"]}]
-    helics = {"broker": broker, "federates": 2, "wait_s": wait}
-    common = {"time.end_s": end, "event": events, "paper": "", "processes.deadline_s": deadline, "plant.helics": helics}
-    return gridpeers.load("islanding").replace(common | changes)
+    helics = {"broker": broker, "wait_s": wait}
+    common = {"time.end_s": end, "event": events, "paper": "", "processes.deadline_s": deadline}
+    plant = {"plant.simulator": "helics", "plant.helics": helics}
+    return gridpeers.load("islanding").replace(common | plant | changes)
+
+
+@contextmanager
+def broker_for(federates: int) -> Iterator[str]:
+    """A broker that waits for so many federates; yields its address."""
+    address = free_broker()
+    with federate("-c", BROKER, address, str(federates)):
+        yield address
 
 
 @contextmanager
@@ -66,10 +82,8 @@ def test_our_agents_control_a_grid_of_somebody_else_alike_under_both_drivers() -
     """A federate that imports helics alone: sharing is equal at the end, and the bytes are the same."""
     results = []
     for driver in ("inprocess", "processes"):
-        broker = free_broker()
-        scenario = short(1.5, broker, **{"plant.simulator": "helics", "event[0].t_s": 1.0})
-        with federate(EXAMPLE, broker, "1.5") as grid:
-            results.append(scenario.run("IV", driver=driver))
+        with broker_for(2) as broker, federate(EXAMPLE, broker, "1.5") as grid:
+            results.append(short(1.5, broker, **{"event[0].t_s": 1.0}).run("IV", driver=driver))
             assert grid.wait(timeout=100) == 0
 
     assert results[0].sha256 == results[1].sha256
@@ -82,18 +96,15 @@ def test_our_agents_control_a_grid_of_somebody_else_alike_under_both_drivers() -
     [
         ("error", "t = 0.09 s: the federation ended: no solution of my power flow", 30.0, 30.0),
         ("hangs", "strange did not let time go on to 0.1 s within 2 s: strange stands at t = 0.1 s", 2.0, 30.0),
-        ("not beginning", "did not begin within 1 s (the broker waits for 2 federates)", 30.0, 1.0),
+        ("not beginning", "did not begin within 1 s (are all started?)", 30.0, 1.0),
     ],
 )
 def test_a_federate_of_others_that_fails_ends_the_run_with_one_line(
     what: str, said: str, deadline: float, wait: float
 ) -> None:
     """It names the topic or the federate and the time, within the deadline of the scenario; nothing hangs."""
-    broker = free_broker()
-    scenario = short(0.2, broker, deadline, wait, **{"plant.simulator": "helics"})
-
-    with federate(STRANGE, broker, what), pytest.raises(BrokenRunError) as error:
-        scenario.run("IV")
+    with broker_for(2) as broker, federate(STRANGE, broker, what), pytest.raises(BrokenRunError) as error:
+        short(0.2, broker, deadline, wait).run("IV")
 
     assert said in str(error.value)
     assert "\n" not in str(error.value)
@@ -102,30 +113,21 @@ def test_a_federate_of_others_that_fails_ends_the_run_with_one_line(
 
 def test_one_of_two_plants_that_leaves_ends_the_run_too() -> None:
     """Its inverters would stand still for ever, while those of the other move on."""
-    broker = free_broker()
-    helics = {"broker": broker, "federates": 3}
-    scenario = short(0.2, broker, **{"plant.simulator": "helics", "plant.helics": helics})
-    north = STRANGE, broker, "good", "north", "1", "4"
-    south = STRANGE, broker, "leaves", "south", "5", "9"
-
-    with federate(*north), federate(*south), pytest.raises(BrokenRunError, match="s: south left the federation"):
-        scenario.run("IV")
+    with (
+        broker_for(3) as broker,
+        federate(STRANGE, broker, "good", "north", "1", "4"),
+        federate(STRANGE, broker, "leaves", "south", "5", "9"),
+        pytest.raises(BrokenRunError, match="s: south left the federation"),
+    ):
+        short(0.2, broker).run("IV")
 
 
 def test_a_broker_that_is_missing_is_one_line() -> None:
     """The line has its address, and the command that starts one."""
     broker = free_broker()
-    scenario = short(0.2, broker, 1.0, **{"plant.simulator": "helics", "plant.helics": {"broker": broker}})
 
     with pytest.raises(BrokenRunError, match=f"no broker at {broker} within 0.9 s .*helics_broker -f 2"):
-        scenario.run("IV")
-
-
-BROKER = (  # A broker that prints its warnings, as `helics_broker` does
-    "import sys, helics\n"
-    "broker = helics.helicsCreateBroker('zmq', '', f'-f {sys.argv[2]} --localinterface={sys.argv[1]}')\n"
-    "helics.helicsBrokerWaitForDisconnect(broker, 30000)\n"
-)
+        short(0.2, broker, 1.0).run("IV")
 
 
 def test_a_broker_of_others_warns_of_no_topic_that_may_be_missing() -> None:
