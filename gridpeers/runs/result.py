@@ -255,13 +255,14 @@ class Result(_FromFolder):
     @cached_property
     def checked_case(self) -> CheckedCase:
         """The case as metrics and checks see it: what a check of one's own is called with."""
-        measured = frames.windows_of(self._whole)
+        measured = frames.windows_of(self._whole)  # a live run need not reach all events
+        came = windows(as_they_came(self.spec, self.plant_events), self.spec.time.end_s)
         return CheckedCase(
             scenario=self.spec,
             feeder=self._feeder,
             case=self.case,
             history=self.record,
-            windows=windows(as_they_came(self.spec, self.plant_events), self.spec.time.end_s),
+            windows=[window for window in came if window.label in measured],
             events=self.plant_events,
             messages_saved={label: of["messages_saved"] for label, of in measured.items() if of.get("messages_saved")},
             folder=self.folder / self.case,

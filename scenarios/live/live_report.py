@@ -8,10 +8,8 @@ from dataclasses import replace
 import msgspec
 
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.checks.judging import JudgingStop
 from gridpeers.scenarios.console import terminal
 from gridpeers.scenarios.live.departures import Departures, compare, few
-from gridpeers.scenarios.live.live_files import ended_scenario, write_scenario
 from gridpeers.scenarios.live.live_processes import ProcessOutcome
 from gridpeers.scenarios.measured_run import write_measures
 from gridpeers.scenarios.results.history import as_they_came, late_moves
@@ -49,24 +47,21 @@ def write_report(metrics: RunMetrics, recorded: Recorded, pacing: Pacing | None,
     """Measure the record of a live run of one case; write metrics.json, report.txt and figures into its folder.
 
     It judges no claim of the paper, as people may have changed the run. StoppedError or KeyboardInterrupt if a signal
-    ends it: the report says then what checks did not judge.
+    ends it.
     """
     scenario, feeder, (case,) = metrics.scenario, metrics.feeder, metrics.scenario.cases
     departures = compare(scenario, feeder, recorded.events, recorded.ended, recorded.missing)
     whole = CheckedCase.of(scenario, feeder, case, recorded, metrics.folder / case, departures.measured)
     taken = replace(whole, history=taken_part(scenario, feeder, whole.history))
-    stop = JudgingStop(StoppedError, KeyboardInterrupt)
     report = write_measures(
         metrics,
         {case: taken},
         {case: case_facts(recorded, pacing)},
         [f"case {case}: {note}" for note in _notes(scenario, recorded, departures)],
-        stop,
         place=shown(metrics.folder) + "/",
         disturbed=bool(departures.disturbed),
         live=_live_table(recorded, departures),
     )
-    stop.end()
     if figures:
         from gridpeers.scenarios.results.plots.run_figures import draw_all  # matplotlib takes longest to import
 
@@ -120,8 +115,6 @@ def conclude(outcome: ProcessOutcome, metrics: RunMetrics) -> ProcessOutcome:
         set_broken(folder, outcome.broke or "no whole record")
         return outcome
     try:
-        # first: a signal may end what follows
-        write_scenario(folder, *ended_scenario(metrics.scenario, recorded.ended))
         show(write_report(metrics, recorded, outcome.pacing), terminal())
         set_complete(folder)
     except (StoppedError, KeyboardInterrupt) as stop:
