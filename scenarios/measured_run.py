@@ -8,7 +8,7 @@ from typing import Any
 
 from gridpeers.scenarios.checks.check_verdict import FILE, verdicts_json
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.checks.judging import JudgingStop, judge_case
+from gridpeers.scenarios.checks.judging import judge_case
 from gridpeers.scenarios.results.claims import NO_BENCHMARK, benchmark_of, judge, judged
 from gridpeers.scenarios.results.findings import find
 from gridpeers.scenarios.results.metrics_file import RunMetrics, metrics_json
@@ -23,14 +23,13 @@ def write_measures(
     cases: Mapping[str, CheckedCase],
     facts: Mapping[str, Mapping[str, Any]],
     notes: Sequence[str],
-    stop: JudgingStop,
     *,
     place: str,
     disturbed: bool = False,
     live: Mapping[str, Any] = MappingProxyType({}),
     claims: bool = False,
 ) -> RunReport:
-    """Measure and judge the cases, and write the files; `stop` has a request that came meanwhile, for the caller.
+    """Measure and judge the cases, and write the files.
 
     `facts` and `live` are further entries of metrics.json, `place` is the folder as the report names it. A run that was
     `disturbed` has no published numbers beside its own; of others `claims` says whether they are judged.
@@ -38,7 +37,7 @@ def write_measures(
     scenario, findings = run.scenario, find(cases)
     benchmark, own = (NO_BENCHMARK, []) if disturbed else (benchmark_of(scenario.paper), claims_of(scenario))
     write_whole(run.folder / "metrics.json", metrics_json(run, findings, facts, live))
-    checks = {name: judge_case(case, stop) for name, case in cases.items()}
+    checks = {name: judge_case(case) for name, case in cases.items()}
     write_whole(run.folder / FILE, verdicts_json(checks))
     report = RunReport(
         scenario=scenario.name,

@@ -103,7 +103,6 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
             flush=True,
         )
     from gridpeers.scenarios.checks.checked_case import CheckedCase
-    from gridpeers.scenarios.checks.judging import JudgingStop
     from gridpeers.scenarios.measured_run import write_measures
 
     cases = {
@@ -131,9 +130,8 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
         facts[case] = case_facts(record, pacing.get(case), **unlike)
 
     disturbed = any(one.disturbed for one in compared.values())
-    stop, where = JudgingStop(), place + "/" if request.lasting else ""
-    report = write_measures(request, cases, facts, notes, stop, place=where, disturbed=disturbed, claims=True)
-    stop.end()
+    where = place + "/" if request.lasting else ""
+    report = write_measures(request, cases, facts, notes, place=where, disturbed=disturbed, claims=True)
     if request.lasting:
         from gridpeers.scenarios.results.history import as_they_came
         from gridpeers.scenarios.results.plots.drawing import drawing_of

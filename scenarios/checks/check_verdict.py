@@ -19,7 +19,6 @@ CheckStatus = Literal["passed", "failed", "not judged", "off"]  # Off: the scena
 
 SHOWN_VIOLATIONS = 20  # Most violations that a verdict keeps; it counts up to `MOST_VIOLATIONS`
 MOST_VIOLATIONS = 1_000_000  # After so many a check is asked for no more: one that never ends yields ever more
-INTERRUPTED = "interrupted"  # Reason of a check that was not judged because somebody ended the run before
 
 
 class NotJudgedError(Exception):
@@ -86,9 +85,7 @@ def summary(verdicts: tuple[CheckVerdict, ...]) -> str:
     idle = len(verdicts) - passed - len(failed) - len(off)
     line = f"{passed} of {passed + len(failed)} checks passed" + (f", {idle} not judged" if idle else "")
     line += f", {', '.join(off)} switched off" if off else ""
-    ended = [verdict.check for verdict in verdicts if verdict.status == "not judged" and verdict.reason == INTERRUPTED]
-    late = [f"{', '.join(ended)} not judged: {INTERRUPTED}"] if ended else []
-    return "; ".join([line, *late, *(verdict.sentence for verdict in failed)])
+    return "; ".join([line, *(verdict.sentence for verdict in failed)])
 
 
 FILE = "checks.json"  # Name of the file in the run folder

@@ -11,7 +11,6 @@ import numpy as np
 
 from gridpeers.scenarios.checks.check_registry import CHECKS, chosen_checks, switched_off
 from gridpeers.scenarios.checks.check_verdict import (
-    INTERRUPTED,
     MOST_VIOLATIONS,
     SHOWN_VIOLATIONS,
     CheckStatus,
@@ -25,47 +24,21 @@ from gridpeers.wire.plugins.registry import ANYTHING, PluginError, named
 from gridpeers.wire.wording import printable
 
 
-class JudgingStop:
-    """Takes a request to end while cases are judged, for a caller that writes what is judged by then before it ends."""
-
-    def __init__(self, *requests: type[BaseException]) -> None:
-        self.requests = requests or (KeyboardInterrupt,)
-        self.raised: BaseException | None = None
-        """The request, for the caller to raise again; None if there was none."""
-
-    def end(self) -> None:
-        if self.raised is not None:
-            raise self.raised
-
-
-def judge_case(case: CheckedCase, stop: JudgingStop | None = None) -> tuple[CheckVerdict, ...]:
+def judge_case(case: CheckedCase) -> tuple[CheckVerdict, ...]:
     """Return the verdict of each check of the scenario on a case; those that it switches off come last."""
     entries, why = case.scenario.checks, "switched off by the scenario"
     off = (CheckVerdict(check=name, status="off", reason=why) for name in switched_off(entries))
-    return *judge_by(chosen_checks(entries), case, stop), *off
+    return *judge_by(chosen_checks(entries), case), *off
 
 
-def judge_by(
-    checks: Mapping[str, Plugin], case: CheckedCase, stop: JudgingStop | None = None
-) -> tuple[CheckVerdict, ...]:
+def judge_by(checks: Mapping[str, Plugin], case: CheckedCase) -> tuple[CheckVerdict, ...]:
     """Return the verdict of each of some checks on a case.
 
     A check that raises an error has failed, with the error as its reason: nothing is taken for right unjudged. What it
-    has yielded before counts, whatever it raises then, also `NotJudgedError`. A `stop` takes a request to end: this
-    check and all further ones are not judged; without it the request goes through.
+    has yielded before counts, whatever it raises then, also `NotJudgedError`.
     """
-    found, requests = [], stop.requests if stop else ()
-    for name, plugin in checks.items():
-        verdict = CheckVerdict(check=name, status="not judged", reason=INTERRUPTED)
-        if stop is None or stop.raised is None:
-            try:
-                with np.errstate(all="ignore"):  # a value that is no number is within no limit
-                    verdict = _verdict(name, plugin, case)
-            except requests as request:
-                assert stop is not None
-                stop.raised = request
-        found.append(verdict)
-    return tuple(found)
+    with np.errstate(all="ignore"):  # a value that is no number is within no limit
+        return tuple(_verdict(name, plugin, case) for name, plugin in checks.items())
 
 
 def _verdict(name: str, plugin: Plugin, case: CheckedCase) -> CheckVerdict:

@@ -10,7 +10,6 @@ from threading import Event
 from typing import Annotated, Any
 
 import pytest
-from msgspec.structs import replace
 
 import gridpeers as gp
 from gridpeers.scenarios.checks import judging
@@ -24,11 +23,7 @@ from gridpeers.scenarios.checks.check_verdict import (
     summary,
 )
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.checks.judging import JudgingStop, judge_by
-from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.scenarios.run import run
-from gridpeers.scenarios.run_request import Request
-from gridpeers.scenarios.schema import load_scenario
+from gridpeers.scenarios.checks.judging import judge_by
 from gridpeers.wire.plugins.plugin import Plugin, plugin_problems
 from tests.unit.scenarios.checks.cases import ran
 
@@ -98,48 +93,6 @@ def test_a_check_that_yields_without_end_is_asked_for_no_more(monkeypatch: pytes
 
     assert (found.status, found.count, found.violations[-1].text) == ("failed", 1000, f"x{SHOWN_VIOLATIONS - 1}")
     assert next(numbers) == 1000
-
-
-def interrupted(case: CheckedCase) -> tuple[()]:
-    """A check that a person ends by Ctrl-C."""
-    raise KeyboardInterrupt
-
-
-def test_a_request_to_end_leaves_the_rest_not_judged() -> None:
-    """For whoever writes what is judged by then; for all others it goes through."""
-    checks = {"frequency": Plugin(use="frequency"), "mine": Plugin(use=f"{HERE}:interrupted")}
-    checks["steady"] = Plugin(use="steady")
-    stop = JudgingStop()
-    found = judge_by(checks, ran().checked_case, stop)
-
-    assert [verdict.sentence for verdict in found] == [
-        "frequency passed", "mine not judged: interrupted", "steady not judged: interrupted",
-    ]  # fmt: skip
-    assert summary(found) == "1 of 1 checks passed, 2 not judged; mine, steady not judged: interrupted"
-    assert isinstance(stop.raised, KeyboardInterrupt)
-    with pytest.raises(KeyboardInterrupt):
-        stop.end()
-    with pytest.raises(KeyboardInterrupt):
-        judge_by(checks, ran().checked_case)
-
-
-def test_ctrl_c_while_a_check_judges_ends_the_run_with_record_and_verdicts(tmp_path: Path) -> None:
-    """The folder says that it is not whole; what is recorded, measured and judged by then is in it."""
-    scenario, feeder = load_scenario("islanding")
-    own = [{"use": f"{HERE}:interrupted"}]
-    scenario = replace(scenario, cases={"IV": scenario.cases["IV"]}, checks=own)
-    request = Request(scenario=scenario, feeder=feeder, driver="inprocess", folder=tmp_path)
-    with pytest.raises(KeyboardInterrupt):
-        run(request, lambda case, t, end: None)
-
-    verdicts = {verdict.check: verdict for verdict in read_verdicts(tmp_path / "checks.json")["IV"]}
-    assert verdicts["frequency"].status == "passed"
-    assert verdicts["interrupted"].sentence == "interrupted not judged: interrupted"
-    assert "interrupted not judged: interrupted" in (tmp_path / "report.txt").read_text()
-    assert RunRecord.open(tmp_path / "IV").complete
-    assert (tmp_path / "metrics.json").exists()
-    assert (tmp_path / "status.txt").read_text() == "broken: interrupted from the keyboard\n"
-    assert not (tmp_path / "plots").exists()
 
 
 def test_a_scenario_names_checks_of_its_own_and_other_limits() -> None:
