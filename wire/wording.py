@@ -125,8 +125,8 @@ def requirement(module: str) -> str:
 
     Examples
     --------
-    >>> requirement("zenoh").startswith("'eclipse-zenoh"), requirement("pyarrow"), requirement("torch")
-    (True, "'gridpeers[sweep]'", 'torch')
+    >>> requirement("zenoh").startswith("'eclipse-zenoh"), requirement("perfetto"), requirement("torch")
+    (True, "'gridpeers[trace]'", 'torch')
     """
     from importlib import metadata  # it brings a mail reader; starts need none of this
 

@@ -74,7 +74,8 @@ def _from_sweep(source: Experiment, folder: Path, jobs: int | None, again: Seque
         fail(failure_lines(summary), CLAIM_FAILED)
     if summary.broke:
         fail([f"{count} runs broke: {why}" for why, count in summary.broke.items()], BROKEN)
-    return source.make(SweepData(rows=pd.read_parquet(summary.table), base=plan.base, window=plan.base.events[0].label))
+    rows = pd.read_csv(summary.table, float_precision="round_trip")
+    return source.make(SweepData(rows=rows, base=plan.base, window=plan.base.events[0].label))
 
 
 def _from_scenario(source: Experiment, folder: Path) -> ExperimentResult:

@@ -29,7 +29,7 @@ from gridpeers.scenarios.results.run_files import (
 from gridpeers.scenarios.schema.scenario_writing import to_toml
 from gridpeers.scenarios.sweep.sweep_case import SweepRow, run_one
 from gridpeers.scenarios.sweep.sweep_reading import Plan
-from gridpeers.scenarios.sweep.sweep_table import as_written, results_frame, write_table
+from gridpeers.scenarios.sweep.sweep_table import results_frame, write_table
 from gridpeers.scenarios.sweep.workers import on_workers
 from gridpeers.scenarios.versions import versions
 
@@ -154,7 +154,7 @@ def study(plan: Plan, folder: SweepFolder, tell: Callable[[int], None], *, jobs:
                     tell(len(folder.done))
         from gridpeers.scenarios.sweep import sweep_plots  # matplotlib takes longer to import than a run
 
-        frame = as_written(results_frame(plan, folder.done), plan)
+        frame = results_frame(plan, folder.done)
         path = write_table(frame, plan, folder.path)
         figures = sweep_plots.draw_all(frame, folder.path / "plots")
         set_status(folder.path, "complete")

@@ -12,11 +12,10 @@ from typing import Any
 import msgspec
 import pandas as pd
 
+from gridpeers.scenarios.results.run_files import write_whole
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
-from gridpeers.scenarios.schema.scenario_writing import to_toml
 from gridpeers.scenarios.sweep.sweep_case import FATE, SweepRow
 from gridpeers.scenarios.sweep.sweep_reading import Plan
-from gridpeers.scenarios.versions import versions
 from gridpeers.wire.schema.table_schema import INLINE, Field, fields_of
 
 _SUFFIXES = ("s", "Hz", "pu", "W", "var", "V")
@@ -53,7 +52,7 @@ def _struct_in(annotation: Any) -> type[msgspec.Struct] | None:
     return next((found for part in typing.get_args(annotation) if (found := _struct_in(part))), None)
 
 
-FILE = "results.parquet"
+FILE = "results.csv"
 
 
 def results_frame(plan: Plan, done: Mapping[int, SweepRow]) -> pd.DataFrame:
@@ -77,28 +76,9 @@ def results_frame(plan: Plan, done: Mapping[int, SweepRow]) -> pd.DataFrame:
     return pd.concat([pd.DataFrame(columns), measures], axis=1)
 
 
-def as_written(frame: pd.DataFrame, plan: Plan) -> pd.DataFrame:
-    mixed = [name for name in plan.parameters if frame[name].dtype == object]
-    return frame.assign(**{name: [json.dumps(value, default=str) for value in frame[name]] for name in mixed})
-
-
 def write_table(frame: pd.DataFrame, plan: Plan, folder: Path) -> Path:
-    """Write a table at once or not at all; its metadata has units, sweep file, base scenario and versions."""
-    import pyarrow as pa  # of the extra `sweep`; a sweep in Python does without
-    import pyarrow.parquet as pq
-
-    types = {name: pa.from_numpy_dtype(of) if of.kind in "bif" else pa.string() for name, of in frame.dtypes.items()}
-    units = {name: {"unit": unit_of(name)} if unit_of(name) else None for name in frame}
-    schema = pa.schema([pa.field(name, types[name], metadata=units[name]) for name in frame])
-    about = {
-        "gridpeers.sweep": plan.text,
-        "gridpeers.scenario": to_toml(plan.base, {}),
-        "gridpeers.fingerprint": plan.fingerprint,
-        "gridpeers.versions": json.dumps(versions()),
-    }
-    path = folder / FILE
-    partial = path.with_name(FILE + ".partial")
-    table = pa.Table.from_pandas(frame, schema=schema, preserve_index=False).replace_schema_metadata(about)
-    pq.write_table(table, partial)
-    partial.replace(path)
-    return path
+    """Write a table at once or not at all; a parameter whose values are no numbers alone is JSON."""
+    mixed = [name for name in plan.parameters if frame[name].dtype == object]
+    written = frame.assign(**{name: [json.dumps(value, default=str) for value in frame[name]] for name in mixed})
+    write_whole(folder / FILE, written.to_csv(index=False))
+    return folder / FILE

@@ -79,8 +79,7 @@ def read(file: str) -> Plan:
         plan = read_sweep(file)
     except ScenarioError as error:
         refuse(error)
-    modules = {"joblib": "the runs over all cores", "pyarrow": "the table"}
-    require(modules, "install what sweeps need: pip install 'gridpeers[sweep]'")
+    require({"joblib": "the runs over all cores"}, "install what sweeps need: pip install 'gridpeers[sweep]'")
     return plan
 
 

@@ -20,7 +20,7 @@ TEXT = README.read_text(encoding="utf-8")
 BLOCKS = re.findall(r"^```(\w*)\n(.*?)^```", TEXT, re.S | re.M)
 SNIPPETS = [block for language, block in BLOCKS if not language and re.search(r"^\[\[?[a-z]", block, re.M)]
 ROWS = [line for line in TEXT.splitlines() if line.startswith("| ") and "gridpeers" in line]
-SWEEP_EXTRA = ("joblib", "pyarrow")
+SWEEP_EXTRA = ("joblib",)
 """Modules that the extra `sweep` installs besides what everybody has."""
 
 

@@ -17,7 +17,7 @@ def error_of(folder: Path, statement: str) -> ImportError:
 
 
 @pytest.mark.parametrize(
-    ("package", "installs"), [("zenoh", "'eclipse-zenoh"), ("mcap", "'mcap"), ("pyarrow", "'gridpeers[sweep]'")]
+    ("package", "installs"), [("zenoh", "'eclipse-zenoh"), ("mcap", "'mcap"), ("joblib", "'gridpeers[sweep]'")]
 )
 def test_a_missing_package_is_named_with_what_to_install(
     package: str, installs: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -48,11 +48,11 @@ def test_a_bad_file_starts_and_writes_nothing(sweep_file: Write, tmp_path: Path)
 def test_what_is_missing_is_told_with_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without the extra, the command names the package and the line that installs it."""
     find = importlib.util.find_spec
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "pyarrow" else find(name))
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "joblib" else find(name))
 
     assert invoke("topology", "--dry-run") == (
         2,
-        "gridpeers: pyarrow is not installed; it is needed for the table\n"
+        "gridpeers: joblib is not installed; it is needed for the runs over all cores\n"
         "gridpeers: install what sweeps need: pip install 'gridpeers[sweep]'\n",
     )
     assert invoke("topologi")[1].startswith('gridpeers: no sweep "topologi"; '), "nothing to install for a wrong name"
@@ -73,7 +73,7 @@ def test_a_full_disk_ends_a_sweep_that_can_go_on(sweep_file: Write, tmp_path: Pa
     first, again = invoke("mine.toml", "--jobs", "1"), invoke("mine.toml", "--jobs", "1")
     assert first[0] == again[0] == 0
     assert "mine.toml: 2 runs (2 samples of islanding) over gains.k_p; 2 are done already\n" in again[1]
-    assert "2 runs reached their end\ntable: runs/sweeps/mine/results.parquet\n" in again[1]
+    assert "2 runs reached their end\ntable: runs/sweeps/mine/results.csv\n" in again[1]
     assert (folder / "status.txt").read_text() == "complete\n"
 
 
