@@ -1,4 +1,4 @@
-"""A sweep from its checked plan to its folder: the runs that are not done yet, the table, the plots."""
+"""A sweep from its checked plan to its folder: the runs that are not done yet, the table."""
 
 from __future__ import annotations
 
@@ -138,7 +138,6 @@ class Summary:
     law_failed: Counter[str]
     """In how many a law failed, by the first reason."""
     table: Path
-    plots: tuple[Path, ...]
 
 
 def study(plan: Plan, folder: SweepFolder, tell: Callable[[int], None], *, jobs: int) -> Summary:
@@ -152,11 +151,7 @@ def study(plan: Plan, folder: SweepFolder, tell: Callable[[int], None], *, jobs:
                 for row in results:
                     folder.add(row)
                     tell(len(folder.done))
-        from gridpeers.scenarios.sweep import sweep_plots  # matplotlib takes longer to import than a run
-
-        frame = results_frame(plan, folder.done)
-        path = write_table(frame, plan, folder.path)
-        figures = sweep_plots.draw_all(frame, folder.path / "plots")
+        path = write_table(results_frame(plan, folder.done), plan, folder.path)
         set_status(folder.path, "complete")
     except BaseException as error:
         why = refusal(folder.path, error) if isinstance(error, OSError) else str(error)
@@ -170,5 +165,4 @@ def study(plan: Plan, folder: SweepFolder, tell: Callable[[int], None], *, jobs:
         broke=Counter(row.why for row in rows if row.status == "broke"),
         law_failed=Counter(row.why for row in rows if row.status == "law failed"),
         table=path,
-        plots=figures,
     )

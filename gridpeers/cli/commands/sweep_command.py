@@ -44,7 +44,7 @@ def sweep(
 ) -> None:
     """Run a scenario many times over values of its keys.
 
-    What comes of it is one table with plots. The same command resumes it.
+    What comes of it is one table. The same command resumes it.
 
     Example:  gridpeers sweep topology --jobs 2
     """
@@ -66,8 +66,6 @@ def sweep(
     if len(summary.broke) > 3:
         typer.echo(f"  and for {len(summary.broke) - 3} more reasons: see the column why")
     typer.echo(f"table: {shown(summary.table)}")
-    if summary.plots:
-        typer.echo(f"plots: {shown(summary.plots[0].parent)}/ ({len(summary.plots)})")
     if broke == summary.runs:
         raise typer.Exit(BROKEN)
     raise typer.Exit(CLAIM_FAILED if summary.law_failed else PASSED)

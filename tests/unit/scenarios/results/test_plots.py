@@ -197,7 +197,7 @@ def test_a_curve_that_settles_beyond_the_frame_is_told() -> None:
 def test_figures_without_a_home_begin_with_no_warning() -> None:
     """Matplotlib says of a home that cannot be written what its user can do nothing about."""
     environment = {name: value for name, value in os.environ.items() if name not in ("MPLCONFIGDIR", "XDG_CONFIG_HOME")}
-    words = [sys.executable, "-c", "import gridpeers.scenarios.sweep.study, gridpeers.scenarios.sweep.sweep_plots"]
+    words = [sys.executable, "-c", "import gridpeers.scenarios.results.plots.run_figures"]
 
     done = subprocess.run(words, env=environment | {"HOME": "/proc/none"}, capture_output=True, text=True, check=True)
 

@@ -23,7 +23,7 @@ from gridpeers.scenarios.results.run_files import FolderError
 from gridpeers.scenarios.run_request import Outcome
 from gridpeers.scenarios.schema.configs import configs
 from gridpeers.scenarios.schema.loading import load_scenario
-from gridpeers.scenarios.sweep import sweep_case, sweep_plots
+from gridpeers.scenarios.sweep import sweep_case
 from gridpeers.scenarios.sweep.study import Summary, SweepFolder, study
 from gridpeers.scenarios.sweep.sweep_case import plant_at_start
 from gridpeers.scenarios.sweep.sweep_reading import read_sweep
@@ -39,12 +39,6 @@ BREAKING = """
 "plant.gfl.X_f_pu" = [0.15, 0.15, 0.001]
 """
 """The first is sound; then controllers are unstable and inverters trip; then the parameters contradict each other."""
-
-
-@pytest.fixture(autouse=True)
-def no_plots(monkeypatch: pytest.MonkeyPatch) -> None:
-    """They take longer than the runs, and have tests of their own."""
-    monkeypatch.setattr(sweep_plots, "draw_all", lambda *_: ())
 
 
 def done(path: Path, folder: Path, **how: object) -> Summary:
