@@ -8,7 +8,6 @@ import os
 import re
 import select
 import signal
-import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -19,7 +18,7 @@ import pytest
 
 from gridpeers.agents.agent_config import AgentConfig, Control, LawChoice
 from gridpeers.plant.plant_config import PlantConfig
-from gridpeers.scenarios.drivers.free_endpoint import ListenError, free_endpoint
+from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.results.recorded_events import law_failures
 from gridpeers.wire.codec import decode
@@ -169,40 +168,6 @@ def test_a_plant_that_cannot_start_ends_the_run_at_once(tmp_path: Path) -> None:
 
     assert outcome.broke.startswith("plant exited with status 2 before t = 0. Its last lines:")
     assert "end: must be a positive multiple of the control period 0.02 s, got 0.41 s" in outcome.broke
-
-
-def test_a_second_agent_of_a_name_is_refused_by_name(tmp_path: Path) -> None:
-    """A namesake started in mid-run leaves with status 3 and a word why; the run does not notice."""
-    endpoint = free_endpoint()
-    plant, agents = toy_configs(3, end=LONG)
-    run, refused = ProcessRun(msgspec.structs.replace(plant, listen=(endpoint,)), agents, tmp_path), []
-
-    def start_namesake() -> None:
-        config = msgspec.structs.replace(agent_config("inv2"), connect=(endpoint,))
-        namesake = [sys.executable, "-P", "-m", "gridpeers.agents"]
-        refused.append(subprocess.run(namesake, input=msgspec.json.encode(config), capture_output=True, timeout=60))
-
-    run.at(0.2, start_namesake)
-    run.at(0.2, lambda: run.child("plant").signal(signal.SIGTERM))
-    outcome = run()
-
-    assert refused[0].returncode == 3
-    assert b"inv2: another agent of this name takes part in the run already" in refused[0].stderr
-    assert [event for event in outcome.events if event.kind == "roster"] == []
-    assert outcome.broke == "the plant was asked to leave: SIGTERM"
-
-
-def test_a_port_in_use_is_told_before_anything_starts(tmp_path: Path) -> None:
-    """The error names the endpoint and what to do; no process, no log."""
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        endpoint = f"tcp/127.0.0.1:{server.getsockname()[1]}"
-        plant, agents = toy_configs(2)
-        run = ProcessRun(msgspec.structs.replace(plant, listen=(endpoint,)), agents, tmp_path / "log")
-
-        with pytest.raises(ListenError, match=r"listen: tcp/127.* in use; .* choose another port, or 0"):
-            run()
-    assert run.children is None
-    assert not (tmp_path / "log").exists()
 
 
 PARENT = """

@@ -10,12 +10,9 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import MAX_AGE
 from tests.toy.town import Town
-from tests.toy.toy_configs import toy_configs
-from tests.toy.toy_runs import ProcessRun
 
 FOUR = ("inv1", "inv2", "inv3", "inv4")
 OTHERS = ("inv1", "inv3", "inv4")
@@ -179,13 +176,3 @@ def test_two_runs_side_by_side_do_not_meet(tmp_path: Path) -> None:
 
         b.together(("inv1", "inv2", "inv3"))
         assert [event for event in b.events if "left" in event.text or "died" in event.text] == []
-
-
-def test_a_strict_run_that_cannot_keep_pace_breaks(tmp_path: Path) -> None:
-    """At a speed that nothing can keep the plant ends with status 3, says how late it was and what to do."""
-    plant, agents = toy_configs(2, end=400.0)
-    plant = replace(plant, clock="wall", speed=1e6, strict=True)
-    outcome = ProcessRun(plant, [replace(agent, clock="wall") for agent in agents], tmp_path)()
-
-    assert outcome.broke.startswith("plant: cannot keep pace at speed 1e+06: ")
-    assert outcome.broke.endswith("give it a lower speed or more cores")
