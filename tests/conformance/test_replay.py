@@ -4,26 +4,17 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterator
-from functools import partial
 from pathlib import Path
 
-import numpy as np
 import pytest
-from mcap.reader import make_reader
-from msgspec.structs import replace
 
 import gridpeers as gp
 from gridpeers.lab.replay.recorded_process import ReplayError
-from gridpeers.lab.replay.replay import replay
 from gridpeers.runs.result import Result
-from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.results.plots import run_figures
-from gridpeers.scenarios.results.tables import QUANTITIES
 from gridpeers.wire.journal import RecordLevel
-from gridpeers.wire.messages import Telemetry
 from tests.command_line import invoke
-from tests.record.recorded_runs import recorded_in_chunks, recorded_run
+from tests.record.recorded_runs import recorded_run
 
 SHORT = """
 seed = 7
@@ -149,47 +140,6 @@ def test_a_record_without_arrivals_is_told(level: RecordLevel, tmp_path: Path) -
         gp.counterfactual(record)
 
 
-def test_a_difference_is_named(run: Result, tmp_path: Path) -> None:
-    """With another seed other messages are lost: the first row that differs is told."""
-    record = RunRecord.open(run.folder / "IV")
-    agents = tuple(
-        replace(agent, control=replace(agent.control, gains=replace(agent.control.gains, k_p=0.001)))
-        for agent in record.info.agents
-    )
-    record.info = replace(record.info, agents=agents)
-
-    found = gp.replay(record).difference
-
-    assert found is not None
-    assert found.quantity == "P_set"
-    assert not np.isclose(found.recorded, found.replayed, rtol=0.0, atol=1e-9)
-    assert str(found).endswith(" W in the replay")
-
-
-def test_a_row_that_was_tampered_with_is_named(run: Result, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The physics is compared too: a power 1 W too high in the record is told with inverter, quantity and unit."""
-    record = RunRecord.open(run.folder / "IV")
-    monkeypatch.setattr(record, "telemetry", partial(with_more_power, list(record.telemetry()), 0.5))
-
-    plant, *agents = gp.replay(record).parts
-
-    assert plant.difference is not None
-    assert plant.difference[:3] == ("inv1", 0.5, "P")
-    assert plant.difference.unit == "W"
-    assert plant.difference.recorded - plant.difference.replayed == pytest.approx(1.0, abs=1e-6)
-    assert [part.difference for part in agents] == [None] * 9
-
-
-def with_more_power(messages: list[Telemetry], t: float) -> Iterator[Telemetry]:
-    """Yield telemetry whose row at a time (s) has 1 W more at the first inverter."""
-    at = 1 + QUANTITIES.index("P_W")
-    for message in messages:
-        rows = tuple(
-            (*row[:at], row[at] + 1.0, *row[at + 1 :]) if abs(row[0] - t) < 1e-9 else row for row in message.rows
-        )
-        yield replace(message, rows=rows)
-
-
 def test_the_file_of_what_would_have_been_gives_it_again(run: Result, tmp_path: Path) -> None:
     """Cuts, losses and their times are in its scenario: run in simulated time, it is the same to the byte."""
     done = gp.counterfactual(run, without="inv4 <-> inv7", since=0.5, folder=tmp_path / "would")
@@ -211,55 +161,3 @@ def test_a_folder_of_what_would_have_been_says_so(run: Result, tmp_path: Path) -
     assert as_run["replayed"] == str((run.folder / "IV" / "run.mcap").resolve())
     assert (as_run["driver"], as_run["clock"]) == ("inprocess", "simulated")
     assert as_run["changes"] == "without * <-> *, from 0.5 s on"
-
-
-FAULTS = """
-[time]
-end_s = 4.0
-[[event]]
-label = "event1"
-t_s = 1.0
-open = ["13-152"]
-[case.IV]
-secondary = "all"
-graph = "full"
-[[case.IV.link]]
-on = "* <-> *"
-loss = 0.2
-"""
-
-
-@pytest.fixture(scope="module")
-def damaged(tmp_path_factory: pytest.TempPathFactory) -> tuple[RunRecord, RunRecord]:
-    """A record, and the same with one bit of a chunk in its middle flipped."""
-    folder = tmp_path_factory.mktemp("damaged")
-    whole = recorded_in_chunks(FAULTS, folder, "IV", chunk=40_000)
-    return whole, with_damage(whole, folder)
-
-
-def with_damage(whole: RunRecord, folder: Path) -> RunRecord:
-    """The same record with one bit of a chunk in its middle flipped."""
-    with whole.path.open("rb") as stream:
-        summary = make_reader(stream).get_summary()
-    assert summary is not None
-    chunks = summary.chunk_indexes
-    assert len(chunks) > 4
-    middle = chunks[len(chunks) // 2]
-    data = bytearray(whole.path.read_bytes())
-    data[middle.chunk_start_offset + middle.chunk_length // 2] ^= 1
-    other = folder / "flipped.mcap"
-    other.write_bytes(data)
-    return RunRecord.open(other)
-
-
-def test_a_replay_ends_at_the_damage_and_says_so(damaged: tuple[RunRecord, RunRecord]) -> None:
-    """No difference is claimed of what is not known; the record says where it is damaged."""
-    whole, flipped = damaged
-
-    found, complete = replay(flipped), replay(whole)
-
-    assert found.difference is None
-    assert ["the file is damaged after" in text for text in flipped.damage] == [True]
-    assert complete.notes == ()
-    counts, all_ = ({part.name: part.count for part in done.parts} for done in (found, complete))
-    assert 0 < counts["inv4"] < all_["inv4"]
