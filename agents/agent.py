@@ -15,8 +15,9 @@ from msgspec.structs import replace
 from gridpeers.agents.agent_config import AgentConfig, nameplate_of
 from gridpeers.agents.degraded_communication import IslandDetector, SaturationDetector, StalenessWeights, law_in_force
 from gridpeers.agents.graphs import GraphError, in_neighbours, rule_of
-from gridpeers.agents.laws.call import LawError, decide, failed_at, start_law
+from gridpeers.agents.laws.call import LawError, decide, failed_at, objection_to, start_law
 from gridpeers.agents.laws.law import NOTHING_SHARED, Law, Neighbour, Own
+from gridpeers.wire.codec import RejectedMessages
 from gridpeers.wire.messages import OFF, Measurement, Nameplate, State
 
 _converted: dict[str, tuple[State, Nameplate, float, float, Neighbour]] = {}
@@ -107,6 +108,9 @@ class Agent:
         self._reported_graph_error = ""
         self._rule = rule_of(config.control)
         self._law = law_in_force(config.control) if law is None else law
+        self._declared = {quantity.name: quantity for quantity in config.control.law.shared}
+        self.rejects = RejectedMessages(config.name)
+        """Counts the states that are dropped; those of its node, if it has one."""
         self._law_runs = False
         self._sent_at = 0.0
         self.nameplate = nameplate_of(config)
@@ -208,13 +212,20 @@ class Agent:
         self._neighbours = roster, neighbours
         return neighbours
 
-    def hear(self, state: State) -> None:
-        """Note the latest state of an agent with a nameplate; `gridpeers.wire.membership` has checked the sender."""
+    def hear(self, state: State) -> bool:
+        """Note the latest state of an agent with a nameplate; `gridpeers.wire.membership` has checked the sender.
+
+        Return False if it is dropped: a value that it shares is beyond the range that the law declares.
+        """
         if state.quiet:
-            return  # its law sends nothing: its last state stays valid
+            return True  # its law sends nothing: its last state stays valid
+        if state.shared and (wrong := objection_to(state.shared, self._declared)):
+            self.rejects.add("implausible", f"state/{state.sender}", f"it shares {wrong}")
+            return False
         self.heard[state.sender] = state
         if self.notes_arrivals:
             self._weights.arrived(state.sender)
+        return True
 
     def tick(
         self, measurement: Measurement, neighbours: Sequence[str] = (), ages: Mapping[str, float] | None = None
@@ -256,6 +267,8 @@ class Agent:
                     start_law(self._law, own)
                     self._law_runs = True
                 P_set, V_set, shared, send, _ = decide(self._law, own, around, config.T_c)
+                if shared and (wrong := objection_to(shared, self._declared)):
+                    raise LawError(f"step at t = {own.t:.6g} s shares {wrong}")
             except LawError as error:
                 law = config.control.law
                 self.fault = f"law {law.name}{failed_at(self._law, error, law.folder)}: {error}"

@@ -8,7 +8,7 @@ import msgspec
 
 from gridpeers.wire.codec import RejectedError, decode, encode
 from gridpeers.wire.journal import RecordLevel
-from gridpeers.wire.messages import Nameplate
+from gridpeers.wire.messages import SHARED_LIMIT, Nameplate
 from gridpeers.wire.plugins.plugin import Plugin
 from gridpeers.wire.schema.table_schema import NO_KEY, Below, Example, Plausible, Range, Unit
 from gridpeers.wire.trust.credentials import Credentials
@@ -92,6 +92,17 @@ GraphRule = Literal["full", "none", "GFM-only", "clustered", "ring", "links"]
 """How nameplates become neighbours; "links" takes the listed pairs."""
 
 
+class SharedQuantity(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A quantity that a law shares with its neighbours, beside set-points and vars; the record has it too."""
+
+    name: Annotated[str, Example('"Omega"')]
+    unit: str = ""
+    low: Annotated[float, Below("high", or_equal=True)] = -SHARED_LIMIT
+    """Lower end of its range, allowed: a neighbour's state beyond it is dropped, and the own law fails."""
+    high: float = SHARED_LIMIT
+    help: str = ""
+
+
 class LawChoice(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The control law of an agent, and its carrier: a Python class, a program, or an FMU."""
 
@@ -103,6 +114,8 @@ class LawChoice(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     """Path of an FMU, in place of a class."""
     parameters: Annotated[dict[str, float | int | bool | str], NO_KEY] = {}
     """Parameters that do not keep their default."""
+    shared: tuple[SharedQuantity, ...] = ()
+    """Quantities that a program shares; a class declares them itself, as fields, and an FMU as outputs shared_NAME."""
     folder: str = ""
     """Folder of the module, the program or the FMU."""
     time_limit: Annotated[float, Unit("s"), Range(0.001, 60.0)] = 1.0

@@ -97,6 +97,7 @@ class AgentNode:
         self.session_broken = False
         self._config, self._instance, self._links = config, instance, links
         self._agent = Agent(config, law)
+        self._agent.rejects = self.rejects
         self.states = NeighbourStates()
         self.routes[self.keys.stop_request(config.name, instance)] = Route(PLANT, (Stop,), self._on_stop_request)
         self.routes[self.keys.measurement(config.name)] = Route(PLANT, (Measurement,), self._on_own_measurement)
@@ -194,9 +195,8 @@ class AgentNode:
                 self._keep(message, at)
 
     def _keep(self, message: State | Measurement, at: float) -> None:
-        if type(message) is State:
-            self._agent.hear(message)
-        self.states.keep(message, at)
+        if type(message) is not State or self._agent.hear(message):
+            self.states.keep(message, at)
 
     def _report_links(self, *, final: bool = False) -> None:
         for part in self.post.take_link_reports(self._links, instance=self._instance, last=final):

@@ -46,6 +46,7 @@ from gridpeers.scenarios.run_request import BrokenRunError as BrokenRunError
 from gridpeers.scenarios.schema.loading import catalogue as catalogue
 from gridpeers.scenarios.schema.scenario_errors import ScenarioError as ScenarioError
 from gridpeers.scenarios.sweep import axes, sweep_reading
+from gridpeers.wire.schema.table_schema import SHARED as SHARED
 from gridpeers.wire.schema.table_schema import Plausible as Plausible
 from gridpeers.wire.schema.table_schema import Range as Range
 from gridpeers.wire.schema.table_schema import Unit as Unit

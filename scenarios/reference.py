@@ -24,7 +24,7 @@ from gridpeers.wire import keys, messages
 from gridpeers.wire.codec import KINDS
 from gridpeers.wire.plugins.registry import PluginError, Registry
 from gridpeers.wire.schema.table_reading import in_words, kinds_of, shown
-from gridpeers.wire.schema.table_schema import INLINE, NO_KEY, Field, NamedTables, OtherKeys, fields_of
+from gridpeers.wire.schema.table_schema import INLINE, NO_KEY, Field, NamedTables, OtherKeys, fields_of, shared_fields
 
 
 def field_docs(cls: type) -> dict[str, tuple[str, str]]:
@@ -251,3 +251,6 @@ def _entry(registry: Registry[Any], name: str) -> Iterator[str]:
         return
     if lines := list(field_table(it)):
         yield from ("", *lines)
+    if shared := shared_fields(it):
+        rows = ((f"`{of.name}`", of.unit, of.span, of.help) for of in shared)
+        yield from ("", *markdown_table(("shares", "unit", "range", "meaning"), rows))

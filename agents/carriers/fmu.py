@@ -27,10 +27,11 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
-from gridpeers.agents.agent_config import LawChoice
+from gridpeers.agents.agent_config import LawChoice, SharedQuantity
 from gridpeers.agents.carriers.program import ProgramLaw, ProgramReady
 from gridpeers.agents.laws.call import LawError, decide, start_law
 from gridpeers.agents.laws.law import LIMITS, NOTHING_SHARED, Law, Neighbour, Own, SetPoints, limits_in
+from gridpeers.wire.messages import SHARED_LIMIT
 from gridpeers.wire.plugins.registry import ANYTHING, named
 from gridpeers.wire.schema.table_reading import read_parameters
 from gridpeers.wire.wording import printable, suggestion
@@ -87,6 +88,27 @@ def fmu_problems(path: Path, parameters: Mapping[str, Any]) -> list[tuple[str, s
     ]
     found += read_parameters(Law, limits_in(parameters))[1]
     return found
+
+
+def shared_by_fmu(path: Path) -> tuple[SharedQuantity, ...]:
+    """Return the quantities that an FMU shares: its outputs shared_NAME; none if it cannot be read."""
+    try:
+        import fmpy
+
+        outputs = variables(fmpy.read_model_description(str(path)), "output")
+    except Exception:  # a file may be anything; `fmu_problems` tells it
+        return ()
+    return tuple(
+        SharedQuantity(
+            name=name.removeprefix("shared_"),
+            unit=it.unit or "",
+            low=-SHARED_LIMIT if it.min is None else float(it.min),
+            high=SHARED_LIMIT if it.max is None else float(it.max),
+            help=it.description or "",
+        )
+        for name, it in outputs.items()
+        if name.startswith("shared_")
+    )
 
 
 def is_fmi3(description: Any) -> bool:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from gridpeers.agents.agent_config import LawChoice
-from gridpeers.agents.carriers.law_registry import CARRIERS, KEYS, LAWS
+from gridpeers.agents.carriers.law_registry import CARRIERS, KEYS, LAWS, shared_by
 from gridpeers.agents.carriers.time_limit import make_limited
 from gridpeers.agents.laws.law import Law, limits_in
 from gridpeers.wire.plugins.plugin import scalar_objection
@@ -43,6 +43,8 @@ def executable_problem(file: Path) -> str:
 
 PAPER = LawChoice().use
 
+OF_PLANT = ("t", "f", "P", "Q", "V", "P_set", "V_set")  # a record has these beside what laws share
+
 
 def law_problems(table: Mapping[str, Any]) -> list[Problem]:
     """Return all that is wrong with the table `law` of a scenario, at its keys, or at "" for the whole."""
@@ -63,7 +65,12 @@ def law_problems(table: Mapping[str, Any]) -> list[Problem]:
         return found
     parameters = {key: value for key, value in rest.items() if key not in wrong}
     checks = {"use": _class_problems, "command": _program_problems, "fmu": _fmu_problems}
-    return found + checks[given[0]](choice, parameters)
+    found += checks[given[0]](choice, parameters)
+    if choice.shared and not choice.command:
+        found.append(Problem("shared", "is for a program; a class declares fields, an FMU outputs shared_NAME"))
+    elif taken := [it.name for it in shared_by(choice) if not found and it.name in OF_PLANT]:
+        found.append(Problem(given[0], f"shares {taken[0]}, a quantity of the plant; give it another name"))
+    return found
 
 
 def _command_problems(command: tuple[str, ...]) -> list[str]:

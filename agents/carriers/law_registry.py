@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
-from gridpeers.agents.agent_config import Control, LawChoice
+from gridpeers.agents.agent_config import Control, LawChoice, SharedQuantity
 from gridpeers.agents.carriers.time_limit import make_limited
 from gridpeers.agents.degraded_communication import law_in_force
 from gridpeers.agents.laws.law import Law
+from gridpeers.wire.messages import SHARED_LIMIT
 from gridpeers.wire.plugins.plugin import class_objection
-from gridpeers.wire.plugins.registry import Registry
+from gridpeers.wire.plugins.registry import PluginError, Registry
+from gridpeers.wire.schema.table_schema import Plausible, Range, shared_fields
 
 CARRIERS = ("use", "command", "fmu")
 """Keys of a scenario's table `law`, one of which says what the law is."""
 
-KEYS = (*CARRIERS, "folder", "time_limit_s")
+KEYS = (*CARRIERS, "shared", "folder", "time_limit_s")
 
 METHODS = ("start", "close")
 """Methods of a law that are called beside `step`; a law may leave them as they are in `Law`."""
@@ -60,6 +63,26 @@ def make_law(control: Control) -> Law:
         return make_limited(law, choice.parameters, choice.time_limit)
     except ValueError as error:
         raise ValueError(f"law {choice.use} {error}") from error
+
+
+def shared_by(choice: LawChoice) -> tuple[SharedQuantity, ...]:
+    """Return the quantities that a law declares, whatever carries it; none of a law that is not here."""
+    if choice.command:
+        return choice.shared
+    if choice.fmu:
+        from gridpeers.agents.carriers.fmu import shared_by_fmu
+
+        return shared_by_fmu(Path(choice.folder) / choice.fmu)
+    try:
+        fields = shared_fields(LAWS.resolve(choice.use, choice.folder))
+    except PluginError:  # told where the scenario is checked
+        return ()
+    found = []
+    for field in fields:
+        bounds = field.mark((Range, Plausible)) or Range()
+        low, high = max(bounds.low, -SHARED_LIMIT), min(bounds.high, SHARED_LIMIT)
+        found.append(SharedQuantity(name=field.name, unit=field.unit, low=low, high=high, help=field.help))
+    return tuple(found)
 
 
 def close_laws(laws: Iterable[Law]) -> None:

@@ -7,9 +7,11 @@ from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import Any
 
+from gridpeers.agents.agent_config import SharedQuantity
 from gridpeers.agents.laws.law import NOTHING_SHARED, Law, Neighbour, Own, SetPoints, Terms
 from gridpeers.wire.messages import MOST_SHARED, SHARED_LIMIT
 from gridpeers.wire.plugins.registry import ANYTHING, line_of, named
+from gridpeers.wire.schema.table_schema import Range
 from gridpeers.wire.wording import printable
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,31}")
@@ -114,6 +116,15 @@ def _checked(shared: Any, t: float) -> Mapping[str, float]:
         if abs(checked[name]) > SHARED_LIMIT:
             raise LawError(f"step at t = {t:.6g} s shares {name} = {value:g}; at most {SHARED_LIMIT:g} may travel")
     return checked
+
+
+def objection_to(shared: Mapping[str, float], declared: Mapping[str, SharedQuantity]) -> str:
+    """Return the first value that is beyond the range that a law declares, and the range; "" if none is."""
+    for name, value in shared.items():
+        it = declared.get(name)
+        if it is not None and not it.low <= value <= it.high:
+            return f"{name}, which {Range(it.low, it.high).objection(value, it.unit)}"
+    return ""
 
 
 def _shown(value: Any) -> str:

@@ -23,7 +23,7 @@ from functools import partial
 from typing import Annotated, Any
 
 from gridpeers.agents.laws.law import Law, Neighbour, Own, SetPoints, Term, Terms
-from gridpeers.wire.schema.table_schema import Range, Unit
+from gridpeers.wire.schema.table_schema import SHARED, Range, Unit
 
 
 class Centralised(Law):
@@ -36,6 +36,9 @@ class Centralised(Law):
     k_i: Annotated[float, Unit("1/s"), Range(0, 1e3), "Integral gain of frequency."] = 5.0
     k_pE: Annotated[float, Range(0, 100), "Proportional gain of voltage."] = 0.2
     k_iE: Annotated[float, Unit("1/s"), Range(0, 1e3), "Integral gain of voltage."] = 2.0
+
+    omega: Annotated[float, SHARED, Unit("pu"), "Correction of frequency, of the centre."]
+    E: Annotated[float, SHARED, Unit("pu"), "Correction of voltage, of the centre."]
 
     def __init__(self, **parameters: Any) -> None:
         super().__init__(**parameters)

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import Gains, GraphRule, LawChoice
 from gridpeers.agents.carriers.law_check import PAPER, law_problems
-from gridpeers.agents.carriers.law_registry import KEYS, LAWS
+from gridpeers.agents.carriers.law_registry import KEYS, LAWS, shared_by
 from gridpeers.agents.graphs import GRAPHS, check_graph, make_graph
 from gridpeers.netem.models.own_fault import FAULTS
 from gridpeers.netem.schema.netem import Netem
@@ -34,7 +34,8 @@ OUR_GRAPHS = get_args(GraphRule)
 def law_of(scenario: ScenarioModel, case: str) -> LawChoice:
     table = table_of(scenario.cases[case].law or scenario.law)
     choice, _ = read_table(LawChoice, {key: value for key, value in table.items() if key in KEYS})
-    return replace(choice, parameters={key: value for key, value in table.items() if key not in KEYS})
+    parameters = {key: value for key, value in table.items() if key not in KEYS}
+    return replace(choice, parameters=parameters, shared=shared_by(choice))
 
 
 def graph_of(case: Case) -> tuple[str, Plugin | None]:

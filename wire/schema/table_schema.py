@@ -226,6 +226,9 @@ INLINE = Flag("inline")
 NO_KEY = Flag("no key")
 """Annotation of a field that no file gives."""
 
+SHARED = Flag("shared")
+"""Annotation of a field of a law that is no parameter: a value that the law shares (`shared_fields`)."""
+
 INHERITED = Flag("inherited")
 """Annotation of a table that takes what it leaves out from the table of the same name at the top of the file."""
 
@@ -291,7 +294,13 @@ def fields_of(cls: type) -> tuple[Field, ...]:
 
     Raise TypeError if an annotation of a class that is no struct cannot be read.
     """
-    return tuple((_of_struct if issubclass(cls, msgspec.Struct) else _of_class)(cls))
+    fields = (_of_struct if issubclass(cls, msgspec.Struct) else _of_class)(cls)
+    return tuple(field for field in fields if SHARED not in field.marks)
+
+
+def shared_fields(cls: type) -> tuple[Field, ...]:
+    """Return the fields of a law that are no parameters, but values that it shares."""
+    return tuple(field for field in _of_class(cls) if SHARED in field.marks)
 
 
 def _of_struct(cls: type[msgspec.Struct]) -> Iterator[Field]:
