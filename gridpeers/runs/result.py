@@ -28,10 +28,11 @@ from gridpeers.scenarios.live.live_report import live_drawing
 from gridpeers.scenarios.record.record_info import FILE, LIVE
 from gridpeers.scenarios.results.claims import Verdict, benchmark_of, judge, judged
 from gridpeers.scenarios.results.findings import Findings, find
-from gridpeers.scenarios.results.history import History, as_they_came, windows
+from gridpeers.scenarios.results.history import UNITS, History, as_they_came, windows
 from gridpeers.scenarios.results.plots.drawing import Drawing, drawing_of
 from gridpeers.scenarios.results.recorded_events import law_failures
 from gridpeers.scenarios.results.run_files import FolderError, refusal, shown, write_whole
+from gridpeers.scenarios.results.shared_quantities import shared_frame
 from gridpeers.scenarios.schema import scenario_model as model
 from gridpeers.scenarios.schema.plugin_keys import claims_of
 from gridpeers.wire.messages import PlantEvent
@@ -188,6 +189,17 @@ class Result(_FromFolder):
     def history(self) -> pd.DataFrame:
         """Terminal quantities over time: columns (inverter, quantity), index t (s), units in `attrs["units"]`."""
         return self.record.frame()
+
+    def quantity(self, name: str) -> pd.DataFrame:
+        """One quantity over time, a column for each inverter: f, P, Q, V, P_set or V_set, or one that the law shares.
+
+        Its unit is in `attrs["units"]`. RecordFileError if no law shared it, or the run was not recorded.
+        """
+        if name in UNITS and name != "t":
+            frame: pd.DataFrame = self.history.xs(name, axis=1, level="quantity")
+            frame.attrs["units"] = {"t": "s", name: UNITS[name]}
+            return frame
+        return shared_frame(self.run_record, name)
 
     @cached_property
     def metrics(self) -> pd.DataFrame:

@@ -11,11 +11,13 @@ from gridpeers.scenarios.results.island_membership import Island, IslandInterval
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.scenarios.schema.configs import limits_of
 from gridpeers.scenarios.schema.participants import without_agent
+from gridpeers.scenarios.schema.plugin_keys import law_of
 from gridpeers.scenarios.schema.scenario_model import Event, LoadChange
 from gridpeers.scenarios.short_texts import in_order, short
 
 if TYPE_CHECKING:
     from gridpeers.scenarios.checks.checked_case import CheckedCase
+    from gridpeers.scenarios.results.shared_quantities import SharedRecord
 
 
 class Mark(NamedTuple):
@@ -46,6 +48,8 @@ class Drawing:
     island_intervals: Mapping[str, Sequence[IslandInterval]] = field(default_factory=dict)
     """Times with several islands, by case; only of cases that have any. Measures are those of the worst island then."""
     microgrid_of: Mapping[str, str] = field(default_factory=dict)
+    shared: Mapping[str, SharedRecord] = field(default_factory=dict)
+    """Quantities that laws declare to share, each with a figure of its own."""
 
     def most_islands(self, case: str) -> Islands:
         """Return the islands of a case when there are most of them; they have a figure of their own."""
@@ -87,7 +91,16 @@ def drawing_of(
         limited=tuple(limited),
         island_intervals={case: of for case, of in several.items() if of},
         microgrid_of={row.name: row.microgrid for row in (*first.feeder.inverters, *first.feeder.spares)},
+        shared=_shared(cases),
     )
+
+
+def _shared(cases: Mapping[str, CheckedCase]) -> Mapping[str, SharedRecord]:
+    if not any(law_of(case.scenario, name).shared for name, case in cases.items()):
+        return {}
+    from gridpeers.scenarios.results.shared_quantities import shared_records  # it imports what reads records
+
+    return shared_records(cases)
 
 
 def happening(event: Event, scenario: ScenarioModel) -> str:

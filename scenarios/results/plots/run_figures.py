@@ -243,21 +243,37 @@ def plug_and_play(drawing: Drawing) -> Page:
 
 def powers(drawing: Drawing, *, GFM: bool) -> Page:
     """Return P of each inverter of one kind (pu of its rating), one panel per case."""
-    count, nameplates = len(drawing.histories), drawing.nameplates
-    columns = 2 if count > 1 else 1
-    chosen = np.flatnonzero(nameplates.GFM == GFM)
-    widths = np.linspace(2.4, 0.9, len(chosen))  # wide below narrow: where curves coincide all of them are seen
-    panels = []
-    for place, (case, history) in enumerate(drawing.histories.items()):
-        curves = []
-        for number, i in enumerate(chosen):
-            again, of = divmod(number, len(STYLES))  # more inverters than colours: those of a later round dashed
-            style = (STYLES[of][0], ROUNDS[again % len(ROUNDS)], widths[number])
-            curves.append(PanelCurve(history.t, history.P[:, i] / nameplates.s[i], style, nameplates.names[i]))
-        panels.append(Panel(_case_title(drawing, case), "" if place % columns else P_LABEL, curves))
-    rows = [panels[i : i + columns] for i in range(0, count, columns)]
-    size = (3.7 * columns + (2.0 if count == 1 else 0.0), 2.0 * len(rows) + 0.6)
+    nameplates = drawing.nameplates
+    series = {
+        case: {nameplates.names[i]: (of.t, of.P[:, i] / nameplates.s[i]) for i in np.flatnonzero(nameplates.GFM == GFM)}
+        for case, of in drawing.histories.items()
+    }
     title = f"Real power of the {'grid-forming' if GFM else 'grid-following'} inverters"
+    return _by_inverter(drawing, series, P_LABEL, title)
+
+
+def shared(drawing: Drawing, name: str) -> Page:
+    """Return a quantity that laws share, of each inverter, one panel per case."""
+    quantity, series = drawing.shared[name]
+    label = f"{name} ({quantity.unit})" if quantity.unit else name
+    page = _by_inverter(drawing, series, label, f"{name}: {quantity.help}".rstrip(" .:"))
+    return page._replace(one_row=False)
+
+
+def _by_inverter(
+    drawing: Drawing, series: Mapping[str, Mapping[str, tuple[Floats, Floats]]], label: str, title: str
+) -> Page:
+    """Return a panel for each case, with the times and values of each inverter."""
+    columns, panels = 2 if len(series) > 1 else 1, []
+    for place, (case, of_case) in enumerate(series.items()):
+        widths = np.linspace(2.4, 0.9, len(of_case))  # wide below narrow: where curves coincide all of them are seen
+        curves = []
+        for number, (name, (t, y)) in enumerate(of_case.items()):
+            again, of = divmod(number, len(STYLES))  # more inverters than colours: those of a later round dashed
+            curves.append(PanelCurve(t, y, (STYLES[of][0], ROUNDS[again % len(ROUNDS)], widths[number]), name))
+        panels.append(Panel(_case_title(drawing, case), "" if place % columns else label, curves))
+    rows = [panels[i : i + columns] for i in range(0, len(panels), columns)]
+    size = (3.7 * columns + (2.0 if len(panels) == 1 else 0.0), 2.0 * len(rows) + 0.6)
     return Page(rows, size, share_y=True, title=title, one_row=True)
 
 
@@ -336,6 +352,7 @@ def figures_of(drawing: Drawing) -> dict[str, Callable[[], Page]]:
         figures["plug-n-play"] = partial(plug_and_play, drawing)
     if drawing.limited:
         figures["available-power"] = partial(available_power, drawing)
+    figures |= {name: partial(shared, drawing, name) for name in drawing.shared if name not in figures}
     return figures | {f"microgrids_{case}": partial(microgrids, drawing, case) for case in drawing.island_intervals}
 
 

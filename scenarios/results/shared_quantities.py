@@ -1,0 +1,90 @@
+"""What laws share beside the paper's values, such as an integral Omega, as quantities of a record: read and plotted.
+
+A law declares them (docs/laws.md); the values stand in the states that its agents sent, whose time is that of the
+measurement: in simulated time all agents' are the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from gridpeers.agents.agent_config import SharedQuantity
+from gridpeers.scenarios.record.record_file import RecordFileError
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.results.history import Floats
+from gridpeers.scenarios.schema.plugin_keys import law_of
+from gridpeers.wire.messages import State
+from gridpeers.wire.wording import suggestion
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from gridpeers.scenarios.checks.checked_case import CheckedCase
+
+Series = Mapping[str, tuple[Floats, Floats]]
+"""Times (s) and values of one quantity, by inverter."""
+
+
+class SharedRecord(NamedTuple):
+    """A shared quantity in the cases of a run."""
+
+    quantity: SharedQuantity
+    series: Mapping[str, Series]
+    """By case."""
+
+
+def read_shared(record: RunRecord) -> dict[str, Series]:
+    """Return all that the laws of a run shared, by name; RecordFileError if the record has no states."""
+    if record.info.level == "physics":
+        raise RecordFileError(f'{record.path}: it has no states: the run was recorded with record = "physics"')
+    found: dict[str, dict[str, list[tuple[float, float]]]] = {}
+    for each in record.messages(kind="State"):
+        if isinstance(each.message, State):
+            for name, value in each.message.shared.items():
+                found.setdefault(name, {}).setdefault(each.sender, []).append((each.message.t, value))
+    inverters = record.agents
+    return {name: {it: _columns(of[it]) for it in inverters if it in of} for name, of in found.items()}
+
+
+def _columns(rows: list[tuple[float, float]]) -> tuple[Floats, Floats]:
+    t, values = np.array(rows).T
+    return t, values
+
+
+def shared_frame(record: RunRecord, name: str) -> pd.DataFrame:
+    """Return one quantity: a column for each inverter, index t (s), unit in `attrs`; nan where an agent sent none.
+
+    Raise RecordFileError if no law shared it.
+    """
+    import pandas as pd  # takes longer to import than a case to run
+
+    shared = read_shared(record)
+    if name not in shared:
+        known = suggestion(name, shared, "quantities") if shared else "no law shared anything"
+        raise RecordFileError(f'{record.path}: no state has a quantity "{name}"; {known}')
+    columns = {it: pd.Series(values, index=t) for it, (t, values) in shared[name].items()}
+    frame = pd.DataFrame({it: column[~column.index.duplicated(keep="last")] for it, column in columns.items()})
+    frame.index.name, frame.columns.name = "t", "inverter"
+    unit = next((it.unit for it in record.info.agents[0].control.law.shared if it.name == name), "")
+    frame.attrs["units"] = {"t": "s", name: unit}
+    return frame
+
+
+def shared_records(cases: Mapping[str, CheckedCase]) -> dict[str, SharedRecord]:
+    """Return what the laws of a run declare to share, by name, in the cases that were recorded."""
+    found: dict[str, SharedRecord] = {}
+    for name, case in cases.items():
+        if not (declared := law_of(case.scenario, name).shared) or case.folder is None:
+            continue
+        try:
+            shared = read_shared(RunRecord.open(case.folder))
+        except RecordFileError:
+            continue
+        for quantity in declared:
+            if quantity.name in shared:
+                of = found.setdefault(quantity.name, SharedRecord(quantity, {}))
+                found[quantity.name] = of._replace(series={**of.series, name: shared[quantity.name]})
+    return found

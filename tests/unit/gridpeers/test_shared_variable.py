@@ -1,0 +1,66 @@
+"""The recipe of docs/laws.md for a law with a shared variable, followed to the letter; and what reads it."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import pytest
+
+import gridpeers as gp
+from gridpeers.scenarios.record.record_file import RecordFileError
+
+DOCS = Path(__file__).parents[3] / "docs" / "laws.md"
+SHORT = {"time.end_s": 1.1, "event": [{"label": "event1", "t_s": 1.0, "open": ["13-152"]}], "paper": ""}
+
+
+def recipe() -> str:
+    """The file of the recipe, as written."""
+    (code,) = re.findall(
+        r"^```python\n(\"\"\"A law that shares.*?)^```$", DOCS.read_text(encoding="utf-8"), re.M | re.S
+    )
+    return str(code)
+
+
+@pytest.fixture
+def law(tmp_path: Path) -> dict[str, str]:
+    (tmp_path / "omega.py").write_text(recipe(), encoding="utf-8")
+    return {"use": "omega:Averaging", "folder": str(tmp_path)}
+
+
+def test_the_recipe_is_one_file_that_runs_and_draws(tmp_path: Path) -> None:
+    (tmp_path / "omega.py").write_text(recipe(), encoding="utf-8")
+
+    done = subprocess.run([sys.executable, "omega.py"], cwd=tmp_path, capture_output=True, text=True, check=False)
+
+    assert done.returncode == 0, done.stderr
+    assert "inv9" in done.stdout
+    assert (tmp_path / "Omega.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("driver", ["inprocess", "processes"])
+def test_a_shared_quantity_is_read_and_drawn_whatever_the_driver(
+    law: dict[str, str], driver: Literal["inprocess", "processes"]
+) -> None:
+    """From the states of the record: five ticks of nine inverters, as m_p P_set, which the law makes of it."""
+    result = gp.load("islanding").replace({**SHORT, "case.IV.law": law}).run("IV", driver=driver)
+
+    Omega, P_set = result.quantity("Omega"), result.quantity("P_set")
+    assert Omega.attrs["units"] == {"t": "s", "Omega": "pu"}
+    assert list(Omega.index) == pytest.approx([1.02, 1.04, 1.06, 1.08])
+    assert list(Omega.columns) == list(P_set.columns)
+    assert result.plot("Omega").axes[0].get_ylabel() == "Omega (pu)"
+    with pytest.raises(RecordFileError, match='no state has a quantity "Omga"; did you mean "Omega"'):
+        result.quantity("Omga")
+
+
+def test_a_run_folder_has_its_figure(law: dict[str, str], tmp_path: Path) -> None:
+    scenario = gp.load("islanding").replace({**SHORT, "case.IV.law": law})
+    scenario.run("IV").save(tmp_path / "run")
+
+    assert (tmp_path / "run" / "plots" / "Omega.png").exists()
+    assert np.isfinite(gp.read(tmp_path / "run").quantity("Omega").to_numpy()).all()
