@@ -1,273 +1,353 @@
-"""The plant as a node: the common part of both kinds of time. Pure.
+"""The plant of a run as a node: it meets agents, measures for them, holds their set-points, and advances. Pure.
 
-It meets the agents by their tokens and nameplates, refuses those that cannot take part, passes on the accounts of
-emulated links, and sends telemetry to recorders. Its subclasses decide when the plant advances.
+It is the same in simulated and in real time. A tick policy decides when it ticks: `LockstepBarrier` once the whole
+roster has sent its states, `RealtimeTimer` by the clock. A roster decides who takes part: `LockstepRoster` changes
+between two ticks alone, `RealtimeRoster` at once.
+
+*gathering*: until all agents and recorders of the configuration are there; in real time no longer than
+`wait_for_agents`. *preparing*, *joining*: the roster changes (`gridpeers.plant.lockstep`). *running*: from a
+measurement to the next one. *holding*: between two ticks of simulated time, while much telemetry has no
+acknowledgement of a recorder. It has no deadline: a recorder that stands still is waited for. *closing*: from `Stop`,
+until all tokens are gone, as proof that every node has heard it. *recording*: until recorders have all. *over*.
+
+What may be lost is asked again: for nameplates, and by the same `Prepare` for each `Ready`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from typing import Literal, NamedTuple
+from functools import partial
+from math import inf
+from typing import cast
 
+from gridpeers.plant.lockstep import LockstepBarrier, LockstepRoster
+from gridpeers.plant.meeting import AGAIN, Meeting
 from gridpeers.plant.plant_config import PlantConfig
-from gridpeers.plant.plant_interface import PlantLike
-from gridpeers.plant.telemetry_reporter import Reporter
-from gridpeers.wire.codec import encode
-from gridpeers.wire.journal import JournalBuffer
-from gridpeers.wire.keys import check_name
+from gridpeers.plant.plant_interface import LivePlant, PlantLike
+from gridpeers.plant.plant_stepper import PlantStepper
+from gridpeers.plant.realtime.realtime import RealtimeRoster, RealtimeTimer
+from gridpeers.plant.realtime.run_commands import LinkCommandSender, RunCommands
+from gridpeers.plant.recorder_feed import KEPT_BYTES, KEPT_BYTES_RECORDED, RecorderFeed, RunReports
+from gridpeers.wire.codec import RejectedError, encode
+from gridpeers.wire.journal import JournalBuffer, TickTraffic, TimedTraffic
 from gridpeers.wire.links import Links
-from gridpeers.wire.membership import arrived
-from gridpeers.wire.messages import PLANT, Journal, LinkReport, Nameplate, PlantEvent, State, Stop, Telemetry
-from gridpeers.wire.post import Post
-from gridpeers.wire.timing import ticks_until, time_of
-from gridpeers.wire.wording import printable
+from gridpeers.wire.membership import arrived, is_usable
+from gridpeers.wire.messages import PLANT, Answer, Command, Journal, LinkReport, Nameplate, State, Waiting
+from gridpeers.wire.phases import Phases, PhaseTable
+from gridpeers.wire.post import ANYBODY, Post, Route
+from gridpeers.wire.timing import Awaited
 
-
-class TickActions(NamedTuple):
-    leave: tuple[str, ...] = ()  # inverters whose agents leave
-    join: tuple[str, ...] = ()  # inverters whose agents join
-    die: tuple[str, ...] = ()  # inverters whose agents die
-
-
-def agent_schedule(config: PlantConfig, inverters: tuple[str, ...]) -> dict[int, TickActions]:
-    """Return the scheduled joins, leaves and deaths of a run, by tick.
-
-    ValueError if an action names no inverter of the plant, or its time is no tick after 0.
-    """
-    at: dict[int, TickActions] = {}
-    for action in config.schedule:
-        if action.inverter not in inverters:
-            raise ValueError(f'schedule: no inverter "{action.inverter}"; inverters are {", ".join(inverters)}')
-        tick = round(action.t / config.T_c)
-        if tick < 1 or abs(tick * config.T_c - action.t) > 1e-9 * max(1.0, action.t):
-            raise ValueError(
-                f"schedule: {action.inverter} must {action.action} at a positive multiple of the control period "
-                f"{config.T_c:g} s, got {action.t:g} s"
-            )
-        actions = at.get(tick, TickActions())
-        at[tick] = actions._replace(**{action.action: (*getattr(actions, action.action), action.inverter)})
-    return at
-
+PHASES: PhaseTable = {
+    "gathering": {"prepare": "preparing", "begin": "running", "end": "closing", "leave": "over"},
+    "preparing": {"prepare": "preparing", "tick": "running", "hold": "holding", "end": "closing"},
+    "running": {
+        "tick": "running",
+        "prepare": "preparing",
+        "join": "joining",
+        "hold": "holding",
+        "end": "closing",
+        "leave": "over",
+    },
+    "joining": {"prepare": "preparing", "end": "closing"},
+    "holding": {"prepare": "preparing", "tick": "running", "end": "closing"},
+    "closing": {"record": "recording", "gone": "over"},
+    "recording": {"gone": "over"},
+    "over": {},
+}
 
 CLOSING = 2.0  # longest wait (s) for the other nodes to close
-MOST_RECORDERS = 20  # recorders that are noted beside those that the run waits for: anybody may hold tokens
-STAYS = "its inverter stays on primary droop at its last set-points"  # state of the inverter whose agent has died
-IDLE = "; its agent is idle, its inverter stays on primary droop"  # end of the event of a law that failed
 
 
 class PlantNode:
-    def __init__(self, config: PlantConfig, plant: PlantLike, links: Links | None) -> None:
+    """ValueError if the configuration and the plant do not fit."""
+
+    def __init__(self, config: PlantConfig, plant: PlantLike, links: Links | None = None) -> None:
         post = self.post = Post(PLANT, config.run, config.epoch)
-        post.on_nameplate = self._on_nameplate
-        self.keys, self.members, self.admission, self.rejects = post.keys, post.members, post.admission, post.rejects
-        self.name, self.routes, self.watched = PLANT, post.routes, post.keys.any_alive
-        self.take_actions, self.take_rejects = post.take_actions, post.take_rejects
-        self.is_known, self.lost = post.is_known, post.lost
-        for name in config.agents:
-            check_name("agents", name)
-            if name not in plant.inverters:
-                raise ValueError(f'agents: no inverter "{name}"; inverters are {", ".join(plant.inverters)}')
-        self.outcome = ""  # why the run broke; empty while it is sound
-        self.cause: Exception | None = None  # error of the plant that broke the run, if any
-        self.tick = 0  # k: the plant is at k T_c
-        self.config = config
-        self._inverters = tuple(plant.inverters)
-        self._links = links
-        self._end_tick = None if config.end is None else ticks_until(config.end, config.T_c)
-        self._recorders: set[str] = set()
-        self._tokens: set[str] = set()
-        """Present tokens of agents and recorders that take part; while it closes, also of agents told to stop."""
-        self._schedule = agent_schedule(config, plant.inverters)
-        self._reporter = Reporter(config.epoch, plant)
         if config.record != "physics":
             post.journal = JournalBuffer()
-        self._awaits_journals = post.journal is not None and config.clock == "wall"
-        """Whether agents send the end of their journals when they close."""
-        self._last_due = False  # whether the run has ended and the last telemetry is still to be sent
-        self._failed_laws: dict[str, str] = {}  # by agent, why its law failed
+        keys = self.keys = post.keys
+        self.config, self.links = config, links
+        self.name, self.members, self.rejects, self.routes = PLANT, post.members, post.rejects, post.routes
+        self.token, self.watched = keys.alive_plant(config.epoch), keys.any_alive
+        self.tokens = (self.token,)
+        self.take_actions, self.take_rejects, self.received = post.take_actions, post.take_rejects, post.received
+        self.is_known, self.lost = post.is_known, post.lost
+        post.on_nameplate = self._on_nameplate
+        wall = config.clock == "wall"
+        stepper = self.stepper = PlantStepper(config, plant)
+        phases = self._phases = Phases(PHASES)
+        kept = None if not wall else KEPT_BYTES if post.journal is None else KEPT_BYTES_RECORDED
+        self.feed = RecorderFeed(config.recorders, partial(post.publish, keys.telemetry), kept)
+        self.ticks = RealtimeTimer(post, stepper, phases) if wall else LockstepBarrier(post, stepper, phases, self.feed)
+        self.reports = RunReports(post, stepper, self.feed, self.ticks.report_ticks, live=wall)
+        self.meeting = Meeting(post, stepper, phases, self.feed)
+        self.roster: LockstepRoster | RealtimeRoster
+        self._states: dict[str, State] = {}  # states that the links let through and that are not held yet
+        self._tick_traffic: TickTraffic | None = None
+        self._timed: TimedTraffic | None = None
+        if isinstance(self.ticks, RealtimeTimer):
+            sender = LinkCommandSender(post, links, self.reports.publish)
+            self.reports.pacing, self.reports.impaired = self.ticks.pacing, lambda: sender.impaired(stepper.t)
+            self.roster = RealtimeRoster(
+                post, stepper, phases, self.ticks, self.meeting, self.reports, self.feed, sender
+            )
+            RunCommands(self, cast(LivePlant, plant), self.ticks, sender)
+            state_keys = [keys.state, keys.set_points]
+            requests = tuple(map(keys.link_request, stepper.inverters))
+            if post.journal is not None:
+                arrivals = config.record == "all"
+                post.traffic = self._timed = TimedTraffic(keys, post.journal, arrivals=arrivals, whole=True)
+        else:
+            self.roster = LockstepRoster(post, stepper, phases, self.ticks, self.meeting, self.reports)
+            post.routes[keys.request] = Route(ANYBODY, (Command,), self._on_request)
+            state_keys, requests = [keys.state], ()
+            if post.journal is not None:
+                post.traffic = self._tick_traffic = TickTraffic(keys, self.roster.everyone, post.journal)
+        for name in self.roster.everyone:
+            for key in state_keys:
+                post.routes[key(name)] = Route(name, (State,), self._on_state)
+            post.routes[keys.report(name)] = Route(name, (LinkReport,), self._on_report)
+            post.routes[keys.journal(name)] = Route(name, (Journal,), self._on_report)
+        self.subscriptions = tuple(post.routes)
+        self._measurement_keys = {name: keys.measurement(name) for name in self.roster.everyone}
+        self.publications = keys.control, keys.telemetry, *self._measurement_keys.values(), *requests
 
     @property
-    def token(self) -> str:
-        return self.keys.alive_plant(self.config.epoch)
-
-    @property
-    def tokens(self) -> tuple[str, ...]:
-        return (self.token,)
+    def phase(self) -> str:
+        return self._phases.now
 
     @property
     def finished(self) -> bool:
-        raise NotImplementedError
-
-    def received(self, key: str, payload: bytes, now: float) -> None:
-        if not self.finished:
-            self.post.received(key, payload, now)
-
-    def use_links(self, links: Links) -> None:
-        self._links = links
+        return self._phases.now == "over"
 
     @property
-    def t(self) -> float:
-        return time_of(self.tick, self.config.T_c)
+    def messages_needed(self) -> int:
+        return self.ticks.messages_needed
 
-    # ---------------------------------------------------------------- liveliness
+    @property
+    def deadline(self) -> float | None:
+        return self.ticks.deadline
+
+    def missing_messages(self) -> tuple[Awaited, ...]:
+        """Return the messages and tokens that the plant waits for, and their senders."""
+        return self.roster.missing() or self.ticks.missing()
+
+    # ---------------------------------------------------------------- what the driver calls
+
+    def start(self, now: float) -> None:
+        config = self.config
+        if self._timed is not None:
+            self._timed.process("start", f"run {config.run}, epoch {config.epoch}", now)
+        self.stepper.collect()
+        self.ticks.start(now)
+        if not self.ticks.grants:
+            names = ", ".join(config.agents) or "nobody"
+            self.post.say(f"run {config.run}: waits up to {config.wait_for_agents:g} s for {names}")
+        self._gather(now)
 
     def appeared(self, key: str, now: float) -> None:
-        """Note that a token appeared; of two processes of one name the first takes part."""
-        match self.post.token(key, now, appeared=True):
-            case ("alive", "recorder", name) if self._has_room(name):
-                self._tokens.add(key)
-                self._recorders.add(name)
-                self._recorder_came(name, now)
-            case ("alive", "recorder", name):
-                self.rejects.add("excess", key, f"the token of recorder {name}; {MOST_RECORDERS} others hold tokens")
-            case ("alive", "agent", name, instance):
-                refusal = self._refusal(name, instance)
-                if refusal:
-                    self._refuse(name, instance, refusal, now)
-                elif self.post.process_came(name, instance):
-                    self._tokens.add(key)
+        self.meeting.appeared(key, now, self.roster.refusal)
+        self._gather(now)
 
     def vanished(self, key: str, now: float) -> None:
-        self._tokens.discard(key)
-        match self.post.token(key, now, appeared=False):
-            case ("alive", "recorder", name):
-                self._recorders.discard(name)
-                self._recorder_gone(name)
-            case ("alive", "agent", name, instance) if self.post.process_gone(name, instance):
-                self._agent_gone(name, now)
-        self._close_if_alone()
+        name = self.meeting.vanished(key, now)
+        if name and self._phases.allows("end"):
+            self.roster.died(name, now)
+            self._break_if_broken(now)
+        self._close_if_alone(now)
 
-    def _on_nameplate(self, instance: str, nameplate: Nameplate, first: bool, now: float) -> None:
-        if first:
-            self._met(nameplate, now)
+    def work(self, now: float) -> bool:
+        """Advance the plant, or go on to the next tick, if nothing is missing; return whether it did anything."""
+        if self.ticks.due(now) is None:
+            return False
+        if self._timed is not None:
+            self._timed.woken(now, work=True)
+        if self.phase == "running":
+            self._advance(now)
+        elif (self.phase == "joining" and self.missing_messages()) or (self.phase == "holding" and self.feed.is_full):
+            return False
+        if self.ticks.grants:
+            self._go_on(now)
+        return True
 
-    def _met(self, nameplate: Nameplate, now: float) -> None:
-        raise NotImplementedError
-
-    def _publish(self, key: str, payload: bytes) -> None:
-        self.post.publish(key, payload)
-
-    def _has_room(self, recorder: str) -> bool:
-        """Whether a recorder is needed, noted already, or one of few."""
-        known = recorder in self._recorders or recorder in self.config.recorders
-        return known or len(self._recorders) < MOST_RECORDERS
-
-    def _is_taken(self, name: str, instance: str) -> bool:
-        return self.members.instance(name) not in ("", instance)
-
-    def _refusal(self, name: str, instance: str) -> str:
-        """Return the reason why a process cannot take part; empty if it can."""
-        raise NotImplementedError
-
-    def _refuse(self, name: str, instance: str, reason: str, now: float) -> None:
-        self.stop(self.keys.stop_request(name, instance), reason, refused=True)
-
-    def _recorder_came(self, name: str, now: float) -> None:
-        raise NotImplementedError
-
-    def _recorder_gone(self, name: str) -> None:
-        """Note that a recorder's token is gone."""
-
-    def _agent_gone(self, name: str, now: float) -> None:
-        raise NotImplementedError
-
-    def _close_if_alone(self) -> None:
-        """End the wait for the other nodes to close, once all have gone."""
-        raise NotImplementedError
-
-    # ---------------------------------------------------------------- the plant itself
+    def expire(self, now: float) -> None:
+        deadline = self.deadline
+        if deadline is None or now < deadline:
+            return
+        if self._timed is not None:
+            self._timed.woken(now)
+        verdict = self.ticks.passed(now, self.roster.missing())
+        for text in verdict.warnings:
+            self.stepper.note("warning", PLANT, text)
+            self.post.say(text)
+        if verdict.kind == "break":
+            self.abort(verdict.reason, now)
+        elif verdict.kind == "tick":
+            self._go_on(now)
+        elif verdict.kind == "over" and self.phase == "gathering":
+            self.roster.begin(now)
+        elif verdict.kind == "over":
+            self._close_if_alone(now, waited=True)
+        if now >= self.ticks.again_at and self._phases.allows("end"):
+            self._ask_again(now)
 
     def abort(self, reason: str, now: float) -> None:
-        raise NotImplementedError
+        """Break the run, unless it ends already."""
+        if self._phases.allows("end"):
+            self.stepper.outcome, self.stepper.reproducible = reason, False
+            self.close(reason, now)
 
-    def _operate(self, operation: Callable[[], object], now: float) -> bool:
-        """Call an operation of the plant; abort the run and return False if it raises RuntimeError."""
-        try:
-            operation()
-        except RuntimeError as error:
-            self.cause = error
-            self.abort(str(error), now)
-            return False
-        return True
+    def interrupt(self, reason: str, now: float) -> None:
+        """Leave the run; in real time another plant may take it up, so the agents are not told to close."""
+        if self.ticks.grants:
+            self.abort(reason, now)
+        elif self._phases.allows("leave"):
+            self.stepper.outcome = reason
+            self.reports.telemetry(final=True)
+            self._phases.on("leave")
+            self.post.closed = True
+            self.feed.end()
 
-    # ---------------------------------------------------------------- events and reports
+    def _break_if_broken(self, now: float) -> None:
+        if self.stepper.broken:
+            self.abort(self.stepper.broken, now)
 
-    def _note_node_faults(self) -> None:
-        """Note among the events which agents began or ended to lie by the plant's time."""
-        for name, text in () if self._links is None else self._links.node_events(self.t):
-            self._note_event("link", name, text)
+    # ---------------------------------------------------------------- the agents
 
-    def _note_event(self, kind: Literal["law", "link", "roster", "warning"], subject: str, text: str) -> None:
-        self._reporter.note(PlantEvent(t=self.t, kind=kind, subject=subject, text=text))
+    def _gather(self, now: float) -> None:
+        """Begin once all agents and recorders of the configuration are here."""
+        enough = len(self.members.nameplates) >= len(self.config.agents)  # else it would ask n times for all n
+        if self.phase == "gathering" and enough and not self.roster.missing():
+            self.roster.begin(now)
 
-    def stop(self, key: str, reason: str, *, refused: bool = False) -> None:
-        epoch = self.config.epoch
-        stop = Stop(sender=PLANT, epoch=epoch, seq=self.tick, t=self.t, reason=printable(reason), refused=refused)
-        self._publish(key, encode(stop))
+    def _on_nameplate(self, instance: str, nameplate: Nameplate, first: bool, now: float) -> None:
+        if first and self._phases.allows("end"):
+            self.roster.met(nameplate.sender, now)
+            self._break_if_broken(now)
+            self._gather(now)
 
-    def _note_state(self, state: State) -> None:
-        if state.fault:
-            self._failed_laws.setdefault(state.sender, state.fault)
-            self._note_event("law", state.sender, f"{state.sender}: {state.fault}{IDLE}")
-        if state.quiet:
-            self._reporter.note_quiet(self.t)
+    def _on_state(self, state: State, payload: bytes, now: float) -> None:
+        if not self.ticks.counts(state, now):
+            tick = self.stepper.tick
+            kind = "stale" if state.seq <= tick else "unexpected"
+            raise RejectedError(kind, f"State({state.seq}) of {state.sender} at tick {tick} ({self.phase})")
+        if state.fault or state.quiet:
+            self.stepper.hear(state)
+        at = state.t if self.ticks.grants else now * self.config.speed
+        if is_usable(self.links, state, payload, at, self.post.admission):
+            self._states[state.sender] = state
 
-    def _stops_for_a_law(self, now: float) -> bool:
-        """End the run if a law has failed and the scenario wants it so; return whether it ends."""
-        failed = sorted(self._failed_laws, key=self._inverters.index)
-        if not failed or self.config.on_law_failure != "stop":
-            return False
-        more = f", and {len(failed) - 1} more" if len(failed) > 1 else ""
-        why = f"{failed[0]}: {self._failed_laws[failed[0]]}{more}"
-        self.abort(printable(f"ended at t = {self.t:g} s, as on_law_failure says: {why}"), now)
-        return True
+    def _on_report(self, report: LinkReport | Journal, payload: bytes, now: float) -> None:
+        """Pass on an agent's report for the record; acknowledge the last account of its links, so that it closes."""
+        self.reports.publish(payload)
+        if isinstance(report, LinkReport) and report.final:
+            self.meeting.stop(self.keys.stop_request(report.sender, report.instance), "its report is here")
 
-    def _late_states(self, now: float) -> Iterable[State]:
-        """Return the usable states that the emulated links have delivered by now (s of run time)."""
-        return (state for state in arrived(self._links, now, self.rejects, self.admission) if isinstance(state, State))
+    def _on_request(self, command: Command, payload: bytes, now: float) -> None:
+        """Take a recorder's word on which Telemetry it needs next; publish again if it says the same once more."""
+        name, text = command.sender, command.argument
+        known = command.verb == "telemetry" and name in self.config.recorders and text.isascii() and text.isdigit()
+        if not known:
+            raise RejectedError("unexpected", f'"{command.verb}" of {name}, in simulated time')
+        self.post.last_heard[name] = command.seq, now
+        if not self.feed.acknowledged(name, int(text), now):
+            first, t = self.feed.again_from(int(text)), self.stepper.t
+            answer = Answer(sender=PLANT, epoch=self.post.epoch, seq=command.seq, t=t, ok=True, text=str(first))
+            self.reports.publish_aside(self.keys.answer(command.reply_to), answer)
+            self.feed.replay()
+        self._close_if_alone(now)
 
-    def _on_report(self, report: LinkReport, payload: bytes, now: float) -> None:
-        """Pass on the account of an agent's links; acknowledge the last one, so that the agent closes."""
-        self._publish(self.keys.telemetry, payload)
-        if report.final:
-            self.stop(self.keys.stop_request(report.sender, report.instance), "its report is here")
+    def _ask_again(self, now: float) -> None:
+        waits = self.phase in ("gathering", "joining", "holding")
+        self.ticks.again_at = now + (self.ticks.waiting if waits else AGAIN)
+        self.roster.ask_again()
+        if waits:
+            names = tuple(dict.fromkeys(who for _, who in self.roster.missing())) or self.config.recorders
+            tick, t, epoch = self.stepper.tick, self.stepper.t, self.post.epoch
+            waiting = Waiting(sender=PLANT, epoch=epoch, seq=tick, t=t, waits_for=names)
+            self.reports.publish_aside(self.keys.control, waiting)
 
-    def _on_journal(self, journal: Journal, payload: bytes, now: float) -> None:
-        self._publish(self.keys.telemetry, payload)
+    # ---------------------------------------------------------------- ticks
 
-    def _report_journal(self, *, last: bool = False) -> None:
-        for part in self.post.take_journal(self.t):
-            self._publish(self.keys.telemetry, encode(part))
+    def _go_on(self, now: float) -> None:
+        """Measure, once the roster of this tick is settled; or end the run."""
+        stepper = self.stepper
+        if not self._phases.allows("end"):
+            return
+        if stepper.at_end:
+            self.close("end of the scenario", now)
+            return
+        settled = self.roster.settle(now)
+        self._break_if_broken(now)
+        if not settled or not self._phases.allows("tick"):
+            return
+        if self.feed.is_full:
+            self._phases.on("hold")
+            self.ticks.wait_until(inf, now + AGAIN)
+            return
+        self._phases.on("tick")
+        names = self.roster.names
+        self.ticks.measured(names, now)
+        for measurement in stepper.measurements(names, self.ticks.heard(now)):
+            self.post.publish(self._measurement_keys[measurement.to], encode(measurement))
+        if stepper.tick == 0 and self.ticks.grants:
+            stepper.collect(self.links)
+            self.reports.telemetry()
 
-    def _report_links(self, *, last: bool = False) -> None:
-        for part in self.post.take_link_reports(self._links, t=self.t, last=last):
-            self._publish(self.keys.telemetry, encode(part))
-
-    def _report(self, *, final: bool, missing_agents: tuple[str, ...] = ()) -> None:
-        """Send telemetry, with the names of agents to start."""
-        raise NotImplementedError
-
-    def _send(self, message: Telemetry) -> None:
-        self._publish(self.keys.telemetry, encode(message))
+    def _advance(self, now: float) -> None:
+        """Hold the set-points that came, and go one tick on."""
+        stepper = self.stepper
+        if why := stepper.broken or stepper.law_failure():
+            self.abort(why, now)
+            return
+        if self._tick_traffic is not None:
+            self._tick_traffic.ticked(stepper.tick)
+        self.feed.replay()
+        states, self._states = self._states, {}
+        at = stepper.t if self.ticks.grants else now * self.config.speed
+        for late in arrived(self.links, at, self.rejects, self.post.admission):
+            if isinstance(late, State):
+                states[late.sender] = late
+        hold, epochs = stepper.plant.hold, self.post.admission.epochs
+        for name in self.roster.names:
+            if (state := states.get(name)) is not None and state.epoch == epochs.get(name):
+                hold(name, state.P_set, state.V_set)
+        if not stepper.advance():
+            self.abort(stepper.broken, now)
+            return
+        self.roster.advanced(now)
+        stepper.collect(self.links)
+        if not (stepper.at_end and self.ticks.grants):  # else the last telemetry follows
+            self.reports.regular(now, self.links)
 
     # ---------------------------------------------------------------- the end
 
-    def _tell_the_end(self, reason: str) -> None:
-        """Let all nodes close. The last telemetry waits for the agents' accounts of emulated links, and journals."""
-        self._last_due = True
-        if self._links is None and not self._awaits_journals:
-            self._send_the_last()
-        self.stop(self.keys.control, reason)
+    def close(self, reason: str, now: float) -> None:
+        """End the run: tell all nodes to close, and report once they have."""
+        if account := self.ticks.account:
+            self.post.say(f"ends: {reason}. {account}")
+        if self._tick_traffic is not None:
+            self._tick_traffic.ticked(self.stepper.tick)
+        self.reports.last_due = True
+        if self.links is None and self._timed is None:  # else once agents have sent their accounts and journals
+            self.reports.last(self.links)
+        self.meeting.stop(self.keys.control, reason)
+        self._phases.on("end")
+        self.feed.end()
+        self.ticks.wait_until(now + CLOSING)
+        self._close_if_alone(now)
 
-    def _all_have_gone(self) -> bool:
-        """Return whether all tokens are gone; send the last telemetry once those of the agents are."""
-        if not any(self.keys.parts(token)[1] == "agent" for token in self._tokens):
-            self._send_the_last()
-        return not self._tokens
-
-    def _send_the_last(self) -> None:
-        if self._last_due:
-            self._last_due = False
-            self._report_journal(last=True)
-            self._report_links(last=True)
-            self._report(final=True)
+    def _close_if_alone(self, now: float, *, waited: bool = False) -> None:
+        """Be over once all have gone and recorders have all; `waited`: agents, then recorders, had their time."""
+        phase = self.phase
+        if phase not in ("closing", "recording"):
+            return
+        if waited or not self.meeting.has_agents:
+            self.reports.last(self.links)
+        serves = self.feed.serves(self.meeting.recorders)
+        if waited and serves and phase == "closing":
+            self._phases.on("record")
+            self.ticks.wait_until(now + self.ticks.recording)
+        elif waited or not (serves or (phase == "closing" and not self.meeting.is_alone)):
+            self._phases.on("gone")
+            self.post.closed = True
+            self.ticks.wait_until(inf)

@@ -1,4 +1,4 @@
-"""The plant as a process: `LockstepPlant` or `RealtimePlant` on a Zenoh session."""
+"""The plant as a process: its node on a Zenoh session."""
 
 from __future__ import annotations
 
@@ -12,10 +12,9 @@ import msgspec
 from msgspec.structs import replace
 
 from gridpeers.plant.known_names import COMPILING, LISTENING, READY
-from gridpeers.plant.lockstep_plant import LockstepPlant
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_interface import LivePlant
-from gridpeers.plant.realtime.realtime_plant import RealtimePlant
+from gridpeers.plant.plant_node import PlantNode
 from gridpeers.wire.driver.drive import StoppedError, drive, perform, serve
 from gridpeers.wire.driver.machine import OpenFilesError, check_open_files, schedule_as_batch
 from gridpeers.wire.driver.process import ConfigurationError, MakeLinks, new_epoch, no_links
@@ -73,8 +72,7 @@ def run_plant(
         try:
             on_word(COMPILING)
             plant = builder(config)
-            links = make_links(PLANT, config.links)
-            node = RealtimePlant(config, plant, links) if wall else LockstepPlant(config, plant, links)
+            node = PlantNode(config, plant, make_links(PLANT, config.links))
         except ValueError as error:
             raise ConfigurationError(str(error)) from error
         except RuntimeError as error:
@@ -98,15 +96,15 @@ def run_plant(
             perform(node.take_actions(), session, log)
             raise
         except Exception as error:  # tell the agents, so that they close at once instead of seeking the plant
-            node.cause = error
-            node.abort(f"plant at t = {node.t:g} s: {type(error).__name__}: {error}", monotonic())
+            node.stepper.cause = error
+            node.abort(f"plant at t = {node.stepper.t:g} s: {type(error).__name__}: {error}", monotonic())
             serve(node, session, log)
     finally:
         session.close()
         if plant is not None:
             plant.close()
-    if node.cause is not None:
-        log.error("the plant broke", exc_info=node.cause)
+    if node.stepper.cause is not None:
+        log.error("the plant broke", exc_info=node.stepper.cause)
     if node.rejects.counts:
         log.warning("plant: dropped messages by kind: %s", dict(node.rejects.counts))
-    return node.outcome
+    return node.stepper.outcome

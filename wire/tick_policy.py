@@ -31,10 +31,11 @@ class TickPolicy(Protocol):
     def due(self, now: float) -> int | None:
         """Return the tick to do now, None if there is none."""
 
-    def counts(self, state: State) -> bool:
-        """Return whether a state off the wire enters the present tick; RejectedError if a later one came before."""
+    def counts(self, state: State, now: float) -> bool:
+        """Take a state off the wire; return whether it enters the present tick. RejectedError if a later one came."""
 
     def missing(self) -> tuple[Awaited, ...]:
         """Return the messages without which the tick is not due, and their senders."""
 
-    def passed(self, now: float) -> Verdict: ...
+    def passed(self, now: float, unmet: tuple[Awaited, ...] = ()) -> Verdict:
+        """Judge a deadline that may have passed; `unmet`: tokens and nameplates that the node waits for."""

@@ -86,9 +86,13 @@ class TickBarrier:
     def awaits(self, name: str) -> bool:
         return name in self._awaited
 
-    def came(self, name: str) -> None:
-        if self._awaited.pop(name, None) is not None and name not in self.siblings:
+    def came(self, name: str) -> bool:
+        """Note that a sender's message came, or never will; return whether it was awaited."""
+        if self._awaited.pop(name, None) is None:
+            return False
+        if name not in self.siblings:
             self._from_outside -= 1
+        return True
 
     def missing_messages(self) -> tuple[Awaited, ...]:
         return tuple(Awaited(message, sender) for sender, message in self._awaited.items())

@@ -41,7 +41,7 @@ from gridpeers.lab.replay.recorded_process import (
     tick_message,
 )
 from gridpeers.netem.schema.fault import Fault
-from gridpeers.plant.realtime.realtime_plant import RealtimePlant
+from gridpeers.plant.plant_node import PlantNode
 from gridpeers.scenarios.emulation.emulated_links import links_of
 from gridpeers.scenarios.emulation.link_data import LinkCommand
 from gridpeers.scenarios.record.record_reader import RunRecord
@@ -144,7 +144,7 @@ class ClosedLoop:
             for process in found:
                 self._processes[process.name, process.recorded.epoch] = process
                 self._push(process)
-            assert isinstance(first.again.node, RealtimePlant)
+            assert isinstance(first.again.node, PlantNode)
             self._loop(first.again.node, self._until(found))
             for process in found:
                 if process.again is not None:
@@ -162,7 +162,7 @@ class ClosedLoop:
 
     # ---------------------------------------------------------------- the loop
 
-    def _loop(self, plant: RealtimePlant, until: float) -> None:
+    def _loop(self, plant: PlantNode, until: float) -> None:
         waits = 0
         while self._due:
             due, _, _, process, message = heappop(self._due)
@@ -174,7 +174,7 @@ class ClosedLoop:
             assert step is not None
             if process.name == PLANT:
                 self._change_if_due(plant, step)
-            self._t = plant.t
+            self._t = plant.stepper.t
             if self._t > until + 1e-9:
                 return
             heard = self._heard(process, step)
@@ -231,10 +231,10 @@ class ClosedLoop:
 
     # ---------------------------------------------------------------- the change
 
-    def _change_if_due(self, plant: RealtimePlant, step: RecordedStep) -> None:
+    def _change_if_due(self, plant: PlantNode, step: RecordedStep) -> None:
         if self._changed or not self._changes or not isinstance(step.entry, WakeUp) or step.entry.work:
             return
-        if plant.phase != "running" or plant.t < self._changes.since - 1e-9:
+        if plant.phase != "running" or plant.stepper.t < self._changes.since - 1e-9:
             return
         self._changed = True
         for process in self._processes.values():

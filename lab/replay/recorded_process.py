@@ -16,7 +16,7 @@ from gridpeers.agents.laws.law import Law
 from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_interface import LivePlant
-from gridpeers.plant.realtime.realtime_plant import RealtimePlant
+from gridpeers.plant.plant_node import PlantNode
 from gridpeers.scenarios.drivers.telemetry_client import with_recorder
 from gridpeers.scenarios.emulation.emulated_links import links_of
 from gridpeers.scenarios.record.message_index import MessageIndex
@@ -202,7 +202,7 @@ class _Outbox(Traffic):
 
 
 class ReplayedProcess:
-    def __init__(self, node: RealtimeAgent | RealtimePlant, links: Links | None) -> None:
+    def __init__(self, node: RealtimeAgent | PlantNode, links: Links | None) -> None:
         self.node, self.links = node, links
         self._root = node.keys.prefix
         self._sent = _Outbox(len(self._root))  # type: ignore[abstract]  # methods of the protocol do nothing
@@ -210,7 +210,10 @@ class ReplayedProcess:
 
     def use_links(self, links: Links) -> None:
         self.links = links
-        self.node.use_links(links)
+        if isinstance(self.node, PlantNode):
+            self.node.links = links
+        else:
+            self.node.use_links(links)
 
     def hears(self, key: str) -> bool:
         return self._root + key in self.node.routes and not self.node.finished
@@ -289,7 +292,7 @@ def agent_as_run(config: AgentConfig, epoch: int) -> AgentConfig:
 def plant_again(recorded: RecordedProcess, info: RecordInfo, plant: LivePlant, links: Links | None) -> ReplayedProcess:
     """Make the process of the plant again, around a plant at t = 0; it waits for its recorder, as in the run."""
     config = with_recorder(info.plant, waits=info.driver == LIVE)
-    return ReplayedProcess(RealtimePlant(replace(config, epoch=recorded.epoch, record="physics"), plant, links), links)
+    return ReplayedProcess(PlantNode(replace(config, epoch=recorded.epoch, record="physics"), plant, links), links)
 
 
 def recorded_links(info: RecordInfo, name: str) -> Links | None:

@@ -8,22 +8,34 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from gridpeers.wire.codec import encode
-from gridpeers.wire.keys import Keys
+from gridpeers.plant.plant_interface import LivePlant
+from gridpeers.wire.codec import RejectedError, encode
+from gridpeers.wire.keys import READING
 from gridpeers.wire.links import Links
 from gridpeers.wire.messages import PLANT, Answer, Command, LinkAcknowledgement, LinkRequest
-from gridpeers.wire.timing import time_of
+from gridpeers.wire.post import ANYBODY, Post, Route
+from gridpeers.wire.timing import RateLimit, time_of
 from gridpeers.wire.wording import printable
 
 if TYPE_CHECKING:
-    from gridpeers.plant.realtime.realtime_plant import RealtimePlant
+    from gridpeers.plant.plant_node import PlantNode
+    from gridpeers.plant.realtime.realtime import RealtimeTimer
 
 AGAIN = 1.0  # time (s, wall) after which a command that was not acknowledged is sent again
 
+COMMANDS, COMMAND_INTERVAL = 100, 0.02
+"""Commands of one verb that are carried out at once, and time (s) after which one more is: a step must not wait for
+those who ask without end."""
+
+MOST_SWITCHES, MOST_LOADS = 500, 150  # most of them in a status, which must fit into an answer
+
 
 class LinkCommandSender:
-    def __init__(self, epoch: int, keys: Keys, links: Links | None, publish: Callable[[str, bytes], None]) -> None:
-        self._epoch, self._keys, self._links, self._publish = epoch, keys, links, publish
+    """`report`: publishes for recorders."""
+
+    def __init__(self, post: Post, links: Links | None, report: Callable[[bytes], None]) -> None:
+        self._epoch, self._keys, self._publish = post.epoch, post.keys, post.publish
+        self._links, self._report = links, report
         self._given: list[LinkRequest] = []
         self._acknowledged: dict[str, int] = {}  # number of the last command that each agent has acknowledged
         self._sent: dict[str, tuple[int, float]] = {}  # number of the last command sent to each agent, and when (s)
@@ -48,7 +60,7 @@ class LinkCommandSender:
         text, receivers, _ = self.links.command(tree, t)
         request = self._request(len(self._given) + 1, tree, t, reply_to)
         self._given.append(request)
-        self._publish(self._keys.telemetry, encode(request))
+        self._report(encode(request))
         return request, text, receivers
 
     def send(self, names: Iterable[str], now: float) -> None:
@@ -73,7 +85,7 @@ class LinkCommandSender:
             LinkAcknowledgement(sender=PLANT, epoch=epoch, seq=0, t=t, ok=True, text="", reply_to=reply_to, data=own)
         )
 
-    def answered(self, answer: LinkAcknowledgement) -> None:
+    def on_answer(self, answer: LinkAcknowledgement, payload: bytes, now: float) -> None:
         """Note the answer of an agent, and pass it on to the client that gave the command."""
         name = answer.sender
         self._acknowledged[name] = max(self._acknowledged.get(name, 0), min(answer.seq, len(self._given)))
@@ -95,103 +107,127 @@ class LinkCommandSender:
         self._publish(self._keys.answer(answer.reply_to), encode(answer))
 
 
-MOST_SWITCHES, MOST_LOADS = 500, 150  # most of them in a status, which must fit into an answer
+class RunCommands:
+    """Takes the commands on the keys of a plant node, and calls what it offers."""
 
+    def __init__(
+        self, node: PlantNode, plant: LivePlant, timer: RealtimeTimer, link_commands: LinkCommandSender
+    ) -> None:
+        self._node, self._plant, self._timer, self._link_commands = node, plant, timer, link_commands
+        self._limit = RateLimit(burst=COMMANDS, interval=COMMAND_INTERVAL)
+        node.routes[node.keys.command] = Route(ANYBODY, (Command,), self._on_command)
+        node.routes[node.keys.request] = Route(ANYBODY, (Command,), self._on_request)
 
-def answer(node: RealtimePlant, command: Command, now: float) -> Answer:
-    """Carry a command out, as far as that goes before its answer; return the answer."""
-    data = dict[str, Any]()
-    try:
-        if node.phase not in ("gathering", "running") and command.verb != "telemetry":
-            raise ValueError("the run is ending")
-        if command.verb == "status":
-            text, data = f"run {node.config.run} is {node.phase} at t = {node.t:.2f} s", _status(node)
-        elif command.verb in ("link", "links"):
-            text, data = _command_links(node, command, now)
-        else:
-            text = _say(node, command)
-        ok = True
-    except ValueError as error:
-        text, ok = str(error), False
-    epoch, seq = node.config.epoch, command.seq
-    return Answer(sender=PLANT, epoch=epoch, seq=seq, t=node.t, ok=ok, text=printable(text), data=data)
+    def _on_request(self, command: Command, payload: bytes, now: float) -> None:
+        if command.verb not in READING:
+            raise RejectedError("unexpected", f'"{command.verb}" on the key of those who only read')
+        self._on_command(command, payload, now)
 
+    def _on_command(self, command: Command, payload: bytes, now: float) -> None:
+        if self._limit.admit(command.verb, now) is None:
+            raise RejectedError("excess", f'more than {COMMANDS} commands "{command.verb}" at once')
+        answer = self._carry_out(command, now)
+        self._node.post.publish(self._node.keys.answer(command.reply_to), encode(answer))
+        if answer.ok:
+            self._follow_up(command, now)
+        if command.verb == "telemetry" and self._node.phase != "running":
+            self._node.feed.replay()
 
-def follow_up(node: RealtimePlant, command: Command, now: float) -> None:
-    agents = node.members.nameplates
-    if command.verb == "link":
-        node.link_commands.send(agents, now)
-    elif command.verb == "links":
-        node.link_commands.ask(agents, node.t, command.reply_to)
-    elif command.verb == "down":
-        node.close("the run was ended by command", now)
+    def _carry_out(self, command: Command, now: float) -> Answer:
+        """Carry a command out, as far as that goes before its answer; return the answer."""
+        node, t = self._node, self._node.stepper.t
+        data = dict[str, Any]()
+        try:
+            if node.phase not in ("gathering", "running") and command.verb != "telemetry":
+                raise ValueError("the run is ending")
+            if command.verb == "status":
+                text, data = f"run {node.config.run} is {node.phase} at t = {t:.2f} s", self._status()
+            elif command.verb in ("link", "links"):
+                text, data = self._command_links(command, now)
+            else:
+                text = self._say(command)
+            ok = True
+        except ValueError as error:
+            text, ok = str(error), False
+        epoch = node.config.epoch
+        return Answer(sender=PLANT, epoch=epoch, seq=command.seq, t=t, ok=ok, text=printable(text), data=data)
 
+    def _follow_up(self, command: Command, now: float) -> None:
+        agents = self._node.members.nameplates
+        if command.verb == "link":
+            self._link_commands.send(agents, now)
+        elif command.verb == "links":
+            self._link_commands.ask(agents, self._node.stepper.t, command.reply_to)
+        elif command.verb == "down":
+            self._node.close("the run was ended by command", now)
 
-def _say(node: RealtimePlant, command: Command) -> str:
-    """Carry out a command whose answer is a sentence alone."""
-    verb, argument = command.verb, command.argument
-    if verb == "telemetry":
-        if not (argument.isascii() and argument.isdigit() and len(argument) < 16):
-            raise ValueError(f'telemetry: "{argument[:20]}" is no number of a Telemetry; give one, e.g. 0')
-        return str(node.recorder_feed.again_from(int(argument)))
-    when = f"at t = {node.t:.2f} s"
-    if verb == "down":
-        return f"run {node.config.run} ends {when}"
-    if verb == "stop":
-        instance = node.members.instance(argument)
-        if not instance:
-            running = ", ".join(name for name in node.plant.inverters if node.members.instance(name)) or "none"
-            raise ValueError(f'no agent "{argument}" is running; running are: {running}')
-        node.stop(node.keys.stop_request(argument, instance), "stopped by command")
-        return f"{argument} was asked to leave {when}"
-    if verb == "load":
-        if command.load is None:
-            raise ValueError(f"load {argument}: nothing is to be set; give a factor, or real or reactive power")
-        return f"{node.plant.set_load(argument, command.load)}, {when}"
-    if verb == "synchronise":
-        node.plant.switch(argument, "close", synchronised=True)
-        return f"switch {argument}: close in step {when}"
-    if node.plant.switch(argument, verb):
-        return f"switch {argument} was {'open' if verb == 'open' else 'closed'} already {when}"
-    return f"switch {argument}: {verb} {when}"
+    def _say(self, command: Command) -> str:
+        """Carry out a command whose answer is a sentence alone."""
+        node, plant = self._node, self._plant
+        verb, argument = command.verb, command.argument
+        if verb == "telemetry":
+            if not (argument.isascii() and argument.isdigit() and len(argument) < 16):
+                raise ValueError(f'telemetry: "{argument[:20]}" is no number of a Telemetry; give one, e.g. 0')
+            return str(node.feed.again_from(int(argument)))
+        when = f"at t = {node.stepper.t:.2f} s"
+        if verb == "down":
+            return f"run {node.config.run} ends {when}"
+        if verb == "stop":
+            instance = node.members.instance(argument)
+            if not instance:
+                running = ", ".join(name for name in plant.inverters if node.members.instance(name)) or "none"
+                raise ValueError(f'no agent "{argument}" is running; running are: {running}')
+            node.meeting.stop(node.keys.stop_request(argument, instance), "stopped by command")
+            return f"{argument} was asked to leave {when}"
+        if verb == "load":
+            if command.load is None:
+                raise ValueError(f"load {argument}: nothing is to be set; give a factor, or real or reactive power")
+            return f"{plant.set_load(argument, command.load)}, {when}"
+        if verb == "synchronise":
+            plant.switch(argument, "close", synchronised=True)
+            return f"switch {argument}: close in step {when}"
+        if plant.switch(argument, verb):
+            return f"switch {argument} was {'open' if verb == 'open' else 'closed'} already {when}"
+        return f"switch {argument}: {verb} {when}"
 
+    def _command_links(self, command: Command, now: float) -> tuple[str, dict[str, Any]]:
+        """Return the command's effect in words; its number, its start (s), and the agents that are sent it.
 
-def _command_links(node: RealtimePlant, command: Command, now: float) -> tuple[str, dict[str, Any]]:
-    """Return the command's effect in words; its number, its start (s), and the agents that are sent it.
+        It holds from one control period after the due tick on: by then all agents have it.
+        """
+        agents = self._agents(present=True)
+        stepper, pacer = self._node.stepper, self._timer.pacer
+        if command.verb == "links":
+            assert self._link_commands.links is not None  # a run without any is an error
+            return "the links are asked for their status", {"number": 0, "t": stepper.t, "asked": agents}
+        overdue = max(0, int((now - pacer.due) / pacer.period))
+        runs = self._node.phase == "running"
+        t = time_of(stepper.tick + 1 + overdue, stepper.config.T_c) if runs else stepper.t
+        request, text, receivers = self._link_commands.give(command.link_command, t, command.reply_to)
+        start = f", from t = {t:.2f} s on" if receivers else ""
+        stepper.note("link", "links", f"link command {request.seq}: {text}{start}")
+        return text, {"number": request.seq, "t": request.t, "asked": agents, "receivers": receivers}
 
-    It holds from one control period after the due tick on: by then all agents have it.
-    """
-    agents = _agents(node, present=True)
-    if command.verb == "links":
-        assert node.link_commands.links is not None  # a run without any is an error
-        return "the links are asked for their status", {"number": 0, "t": node.t, "asked": agents}
-    overdue = max(0, int((now - node.pacer.due) / node.pacer.period))
-    t = time_of(node.tick + 1 + overdue, node.config.T_c) if node.phase == "running" else node.t
-    request, text, receivers = node.link_commands.give(command.link_command, t, command.reply_to)
-    node.note_links(f"link command {request.seq}: {text}" + (f", from t = {t:.2f} s on" if receivers else ""))
-    return text, {"number": request.seq, "t": request.t, "asked": agents, "receivers": receivers}
+    def _agents(self, *, present: bool) -> list[str]:
+        met = self._node.members.nameplates
+        return [name for name in self._plant.inverters if (name in met) == present]
 
-
-def _agents(node: RealtimePlant, *, present: bool) -> list[str]:
-    met = node.members.nameplates
-    return [name for name in node.plant.inverters if (name in met) == present]
-
-
-def _status(node: RealtimePlant) -> dict[str, Any]:
-    """Return the run's status: times in s, delays in s of wall time."""
-    return {
-        "run": node.config.run,
-        "phase": node.phase,
-        "t": node.t,
-        "tick": node.tick,
-        "end": node.config.end,
-        "speed": node.config.speed,
-        "pacing": msgspec.to_builtins(node.pacer.report()),
-        "agents": _agents(node, present=True),
-        "absent": _agents(node, present=False),
-        "events": msgspec.to_builtins(node.events),
-        "switches": dict(islice(node.plant.switches.items(), MOST_SWITCHES)),
-        "loads": {name: [S.real, S.imag] for name, S in islice(node.plant.loads.items(), MOST_LOADS)},
-        "impaired": list(node.link_commands.impaired(node.t)),
-        "rejected": sum(node.rejects.counts.values()),
-    }
+    def _status(self) -> dict[str, Any]:
+        """Return the run's status: times in s, delays in s of wall time."""
+        node, stepper, plant = self._node, self._node.stepper, self._plant
+        return {
+            "run": node.config.run,
+            "phase": node.phase,
+            "t": stepper.t,
+            "tick": stepper.tick,
+            "end": node.config.end,
+            "speed": node.config.speed,
+            "pacing": msgspec.to_builtins(self._timer.pacing()),
+            "agents": self._agents(present=True),
+            "absent": self._agents(present=False),
+            "events": msgspec.to_builtins(tuple(stepper.latest)),
+            "switches": dict(islice(plant.switches.items(), MOST_SWITCHES)),
+            "loads": {name: [S.real, S.imag] for name, S in islice(plant.loads.items(), MOST_LOADS)},
+            "impaired": list(self._link_commands.impaired(stepper.t)),
+            "rejected": sum(node.rejects.counts.values()),
+        }

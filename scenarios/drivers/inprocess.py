@@ -22,9 +22,10 @@ from gridpeers.agents.carriers.law_registry import close_laws, make_law
 from gridpeers.agents.laws.law import Law
 from gridpeers.agents.lockstep_agent import KnownAgents, LockstepAgent
 from gridpeers.plant.direct_plant import DirectPlant
-from gridpeers.plant.lockstep_plant import LockstepPlant
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_interface import PlantLike
+from gridpeers.plant.plant_node import PlantNode
+from gridpeers.plant.plant_stepper import PlantStepper
 from gridpeers.scenarios.emulation.emulated_links import links_of
 from gridpeers.scenarios.run_request import Other, Outcome
 from gridpeers.wire.codec import decode
@@ -45,7 +46,7 @@ def _run_direct(
     plant: PlantLike,
     on_telemetry: Callable[[Telemetry], None],
     on_other: Callable[[Other], None],
-) -> DirectPlant:
+) -> PlantStepper:
     core = DirectPlant(config, plant, on_telemetry, on_other)
     place = {name: i for i, name in enumerate(config.agents)}
     order = sorted(range(len(agents)), key=lambda i: place[agents[i].name])
@@ -54,8 +55,7 @@ def _run_direct(
         core.end_tick(group.tick(core.begin_tick()))
         for journal in group.take_journals():
             on_other(journal)
-        core.take_actions()  # words to agents, who are not there to hear them
-    return core
+    return core.stepper
 
 
 COLLECTED = 20
@@ -63,7 +63,7 @@ COLLECTED = 20
 
 _runs = count(1)
 
-_Node = LockstepPlant | LockstepAgent
+_Node = PlantNode | LockstepAgent
 
 
 class InprocessBus:
@@ -71,7 +71,7 @@ class InprocessBus:
 
     def __init__(
         self,
-        plant: LockstepPlant,
+        plant: PlantNode,
         agents: Iterable[LockstepAgent],
         on_telemetry: Callable[[Telemetry], None],
         on_other: Callable[[Other], None],
@@ -109,7 +109,7 @@ class InprocessBus:
                 self._start(self._agents[-1])
             if not (plant.finished or plant.work(0.0) or self._queue):
                 missing = "; ".join(f"{what} from {who}" for what, who in plant.missing_messages()[:5])
-                raise AssertionError(f"stalled in phase {plant.phase} at tick {plant.tick} without {missing}")
+                raise AssertionError(f"stalled in phase {plant.phase} at tick {plant.stepper.tick} without {missing}")
         self._do(plant, plant.take_actions())
 
     def _start(self, agent: LockstepAgent) -> None:
@@ -208,24 +208,24 @@ def run_inprocess(
         stack.enter_context(_all_so_far_stays())
         plant_config = msgspec.structs.replace(plant_config, recorders=())
         agents: list[LockstepAgent] = []
-        side: LockstepPlant
+        nodes: tuple[_Node, ...] = ()
         if messages or messages_decide(plant_config, tuple(known.values())):
-            side = _run_on_bus(plant_config, known, laws, agents, plant, note, on_other)
+            node = _run_on_bus(plant_config, known, laws, agents, plant, note, on_other)
+            stepper, nodes = node.stepper, (node, *agents)
         else:
             for config in known.values():  # one by one: those that are made are closed if the next cannot be
                 laws.append(make_law(config.control))
-            side = _run_direct(plant_config, tuple(known.values()), laws, plant, note, on_other)
+            stepper = _run_direct(plant_config, tuple(known.values()), laws, plant, note, on_other)
     failed = tuple(agent.failed for agent in agents if agent.failed)
-    rejects = (*side.rejects.take_lines(), *(line for agent in agents for line in agent.rejects.take_lines()))
-    nodes: tuple[_Node, ...] = side, *agents
-    for node in nodes:
-        node.post.release()
+    rejects = tuple(line for each in nodes for line in each.rejects.take_lines())
+    for each in nodes:
+        each.post.release()
     return Outcome(
-        broke=side.outcome,
-        reproducible=side.reproducible,
+        broke=stepper.outcome,
+        reproducible=stepper.reproducible,
         events=tuple(events),
         notes=(*failed, *rejects),
-        ticks=side.tick,
+        ticks=stepper.tick,
         start_s=started - began,
         run_s=perf_counter() - started,
     )
@@ -257,9 +257,9 @@ def _run_on_bus(
     plant: PlantLike,
     on_telemetry: Callable[[Telemetry], None],
     on_other: Callable[[Other], None],
-) -> LockstepPlant:
+) -> PlantNode:
     """Run with messages; return the plant's core, and add the agents' cores and their laws to the lists."""
-    side = LockstepPlant(plant_config, plant, links_of(PLANT, plant_config.links))
+    side = PlantNode(plant_config, plant, links_of(PLANT, plant_config.links))
     control = next((config.control for config in known.values()), Control(secondary="none", graph="none"))
     known_agents = KnownAgents(control)
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from gridpeers.agents.graphs import natural_order
 from gridpeers.plant.known_names import SUBSTATION
 from gridpeers.plant.plant_config import OnLawFailure
-from gridpeers.plant.plant_node import IDLE
+from gridpeers.plant.plant_stepper import IDLE
 from gridpeers.wire.messages import PlantEvent
 
 _LINE = re.compile(r"(?:law|graph) (?:(?!: ).)*? \((?P<line>[^()]+:\d+)\)(?::| of )")

@@ -165,7 +165,7 @@ class Recording:
         self._endpoint = TelemetryEndpoint("history", "toy", TelemetryStream(acknowledges=not self._stream))
         self._endpoint.appeared(KEYS.alive_plant(EPOCH))
         self._recorder: Recorder | None = Recorder(gaps=True)
-        self._keys, self._taken = [*self._endpoint.routes], 0
+        self._keys, self._taken = [*self._endpoint.post.routes], 0
 
     def take(self, payload: bytes, rng: random.Random) -> str:
         counts = self._endpoint.rejects.counts

@@ -9,8 +9,7 @@ from msgspec.structs import replace
 from gridpeers.agents.agent import Agent
 from gridpeers.agents.lockstep_agent import LockstepAgent
 from gridpeers.agents.realtime_agent import RealtimeAgent
-from gridpeers.plant.lockstep_plant import LockstepPlant
-from gridpeers.plant.realtime.realtime_plant import RealtimePlant
+from gridpeers.plant.plant_node import PlantNode
 from gridpeers.wire.codec import decode, encode
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import AgentStatus, Measurement, Message, Nameplate, Prepare, Ready, State
@@ -49,7 +48,7 @@ def measurement(k: int) -> Measurement:
 class Scene:
     """A core in the middle of a run: what it is told, and what it does."""
 
-    def __init__(self, side: RealtimeAgent | RealtimePlant | LockstepAgent | LockstepPlant) -> None:
+    def __init__(self, side: RealtimeAgent | PlantNode | LockstepAgent | PlantNode) -> None:
         self.side: Any = side
         self.now = 100.0
         self.done: list[object] = []
@@ -127,7 +126,7 @@ class RealtimePlantScene(Scene):
     def __init__(self) -> None:
         config, _ = toy_configs(3, end=None)  # type: ignore[arg-type]
         config = replace(config, clock="wall", epoch=EPOCH)
-        super().__init__(RealtimePlant(config, ToyPlant(config)))
+        super().__init__(PlantNode(config, ToyPlant(config)))
         _join(self)
 
     def honest(self, k: int) -> None:
@@ -145,7 +144,7 @@ class PlantScene(Scene):
     def __init__(self) -> None:
         config, _ = toy_configs(3, end=1e4)
         config = replace(config, epoch=EPOCH)
-        super().__init__(LockstepPlant(config, ToyPlant(config)))
+        super().__init__(PlantNode(config, ToyPlant(config)))
         _join(self)
         for name in NAMES:
             self.hear(KEYS.ready(name), Ready(sender=name, epoch=EPOCH, seq=0, t=0.0))

@@ -21,7 +21,7 @@ from gridpeers.agents.carriers.law_registry import make_law
 from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.plant.plant_config import PlantConfig
-from gridpeers.plant.realtime.realtime_plant import RealtimePlant
+from gridpeers.plant.plant_node import PlantNode
 from gridpeers.scenarios.drivers.telemetry_client import RECORDER
 from gridpeers.scenarios.emulation.emulated_links import links_of
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
@@ -36,7 +36,7 @@ from gridpeers.wire.node import Fetch, Listen, Log, Loss, Publish
 from tests.toy.toy_configs import ALL_FULL, toy_configs
 from tests.toy.toy_plant import ToyPlant
 
-Node = RealtimePlant | RealtimeAgent
+Node = PlantNode | RealtimeAgent
 
 Delay = Callable[[str, str, str, int], float | None]
 """Returns how long (s) a message is on the wire, by sender, receiver, key and number on that link; None: it is lost."""
@@ -74,7 +74,7 @@ class FakeClockRun:
         self._wakes: dict[str, float] = {}
         """When (s) each process is woken next."""
         config = replace(plant, epoch=int(START), recorders=(RECORDER,))
-        self.plant = RealtimePlant(config, ToyPlant(config), links_of(PLANT, plant.links))
+        self.plant = PlantNode(config, ToyPlant(config), links_of(PLANT, plant.links))
         self._join(self.plant, self.plant.subscriptions)
         self._tell(self.keys.alive_recorder(RECORDER), PLANT, appeared=True)
         for name in plant.agents:

@@ -14,21 +14,21 @@ import msgspec
 
 from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.agents.lockstep_agent import LockstepAgent
-from gridpeers.plant.lockstep_plant import LockstepPlant
 from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.plant.plant_node import PlantNode
 from gridpeers.wire.codec import decode
 from gridpeers.wire.messages import PlantEvent, Telemetry
-from gridpeers.wire.node import Fetch, Publish
+from gridpeers.wire.node import Fetch, Listen, Publish
 from tests.toy.toy_plant import ToyPlant
 
-EndSet = LockstepPlant | LockstepAgent
+EndSet = PlantNode | LockstepAgent
 
 
 class Links:
     """Plant and agents, joined by links. Everybody is known by its token."""
 
     def __init__(self, plant_config: PlantConfig, agent_configs: Iterable[AgentConfig], rng: random.Random) -> None:
-        self.plant = LockstepPlant(plant_config, ToyPlant(plant_config))
+        self.plant = PlantNode(plant_config, ToyPlant(plant_config))
         self._configs = {config.name: config for config in agent_configs}
         self._born = 0
         self.agents = [
@@ -69,9 +69,10 @@ class Links:
 
     def run(self, until_tick: int | None = None) -> None:
         """Step until the plant is over, or stands at a tick."""
-        while not self.plant.finished and (until_tick is None or self.plant.tick < until_tick):
+        while not self.plant.finished and (until_tick is None or self.plant.stepper.tick < until_tick):
             assert self.step(), (
-                f"stalled in phase {self.plant.phase} at tick {self.plant.tick}: {self.plant.missing_messages()}"
+                f"stalled in phase {self.plant.phase} at tick {self.plant.stepper.tick}, "
+                f"without {self.plant.missing_messages()}"
             )
 
     def step(self) -> bool:
@@ -89,7 +90,7 @@ class Links:
                     self._publish(token, action.key, action.payload)
                 elif isinstance(action, Fetch):
                     self._to_all(token, lambda to, a=action, b=token: partial(self._answer, to, b, a.key))
-                else:
+                elif isinstance(action, Listen):
                     self._keys[token].add(action.key)
                     self._to_all(token, lambda to, a=action, b=token: partial(self._subscribed.add, (to, b, a.key)))
         return True

@@ -155,6 +155,11 @@ class Value:
         return [call, *inner] if passes or inner else []
 
 
+def _post(call: Call) -> object:
+    """Return the post of the node that a driver's call is of."""
+    return getattr(call.arguments[0], "post", call.arguments[0])
+
+
 def way() -> dict[str, list[tuple[str, str]]]:
     """Return, by leg, the file and the name of each function on the way, in the order in which it is entered first."""
     calls, held, near, far = run()
@@ -162,19 +167,19 @@ def way() -> dict[str, list[tuple[str, str]]]:
     of_tick = [(call, message) for call, message in received if message.seq == TICK]
     [(at_agent, measurement)] = [(call, m) for call, m in of_tick if isinstance(m, Measurement) and m.to == far]
     sent = [(call, message) for call, message in of_tick if isinstance(message, State) and message.sender == far]
-    [neighbour] = [c.arguments[0] for c, m in of_tick if isinstance(m, Measurement) and m.to == near]
-    agents = {id(call.arguments[0]) for call, message in of_tick if isinstance(message, Measurement)}
-    [at_neighbour] = [call for call, _ in sent if call.arguments[0] is neighbour]
-    [at_plant] = [call for call, _ in sent if id(call.arguments[0]) not in agents]
+    [neighbour] = [_post(c) for c, m in of_tick if isinstance(m, Measurement) and m.to == near]
+    agents = {id(_post(call)) for call, message in of_tick if isinstance(message, Measurement)}
+    [at_neighbour] = [call for call, _ in sent if _post(call) is neighbour]
+    [at_plant] = [call for call, _ in sent if id(_post(call)) not in agents]
     value = Value(measurement, sent[0][1])
 
-    def of(node: object, calls: list[Call]) -> list[Call]:
-        return [each for call in calls if call.arguments[0] is node for each in value.part(call)]
+    def of(post: object, calls: list[Call]) -> list[Call]:
+        return [each for call in calls if _post(call) is post for each in value.part(call)]
 
-    agent, plant, start = at_agent.arguments[0], at_plant.arguments[0], calls.index(at_agent)
+    agent, plant, start = _post(at_agent), _post(at_plant), calls.index(at_agent)
     decided = value.part(at_agent)
     decided = decided[: 1 + max(i for i, call in enumerate(decided) if value.sends(call))]
-    handed_on = next(call for call in calls[start + 1 :] if call.arguments[0] is agent)
+    handed_on = next(call for call in calls[start + 1 :] if _post(call) is agent)
     legs = (
         [*of(plant, calls[:start]), *decided, *value.part(handed_on)],
         of(neighbour, calls[calls.index(at_neighbour) :]),

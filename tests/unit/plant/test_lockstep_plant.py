@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any, Literal
 
 import pytest
 from msgspec.structs import replace
 
 from gridpeers.agents.agent import Agent
-from gridpeers.plant import telemetry_reporter
-from gridpeers.plant.lockstep_plant import AGAIN, LockstepPlant
+from gridpeers.plant import recorder_feed
+from gridpeers.plant.meeting import AGAIN
 from gridpeers.plant.plant_config import ScheduledAction
 from gridpeers.plant.plant_interface import Reading
-from gridpeers.plant.telemetry_reporter import measurement_of
+from gridpeers.plant.plant_node import PHASES, PlantNode
+from gridpeers.plant.plant_stepper import measurement_of
 from gridpeers.wire.codec import decode, encode
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import (
@@ -29,6 +31,7 @@ from gridpeers.wire.messages import (
     Waiting,
 )
 from gridpeers.wire.node import Fetch, Publish
+from gridpeers.wire.phases import diagram
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
 
@@ -54,7 +57,7 @@ class Lab:
             schedule=tuple(ScheduledAction(t=t, inverter=name, action=action) for t, name, action in schedule),
         )
         self.toy = ToyPlant(config)
-        self.node = LockstepPlant(config, self.toy)
+        self.node = PlantNode(config, self.toy)
         self.now = 0.0
         self.sent: list[tuple[str, Message]] = []
         self.asked: list[tuple[str, ...]] = []
@@ -131,7 +134,7 @@ class Lab:
     def tick(self, count: int) -> None:
         """Let the whole roster do ticks."""
         for _ in range(count):
-            self.state(self.node.tick, *self.last(Prepare).roster)
+            self.state(self.node.stepper.tick, *self.last(Prepare).roster)
 
     def last(self, kind: type[Any]) -> Any:
         """The last message of a type."""
@@ -173,7 +176,7 @@ def ticking(*schedule: tuple[float, str, Literal["leave", "join", "die"]], **cha
     names = lab.node.config.agents
     lab.join(*names)
     lab.ready(0, *names)
-    assert lab.node.phase == "ticking"
+    assert lab.node.phase == "running"
     return lab
 
 
@@ -240,7 +243,7 @@ def test_everybody_must_be_ready_for_this_roster() -> None:
     lab.ready(1, "inv2")
     lab.token("inv3", gone=True)  # nobody can get ready to hear the dead: the next roster is without it
     lab.ready(2, "inv2", "inv4")
-    assert lab.node.phase == "ticking"
+    assert lab.node.phase == "running"
 
 
 def test_one_state_of_everybody_is_awaited_at_a_tick() -> None:
@@ -252,7 +255,7 @@ def test_one_state_of_everybody_is_awaited_at_a_tick() -> None:
     assert (lab.missing, lab.node.messages_needed) == ([("State(0)", "inv2")], 1)
 
     lab.state(0, "inv2")
-    assert lab.node.tick == 1
+    assert lab.node.stepper.tick == 1
     assert lab.last(Measurement).seq == 1
 
 
@@ -278,7 +281,7 @@ def test_a_prepare_is_sent_again_until_all_are_ready() -> None:
     lab.ready(0, *NAMES)
     lab.ready(0, "inv1")
     lab.wait(5.0)
-    assert lab.node.phase == "ticking"
+    assert lab.node.phase == "running"
     assert lab.node.rejects.counts == {}
     assert lab.missing == [("State(0)", name) for name in NAMES]
     assert len([message for _, message in lab.sent if isinstance(message, Prepare)]) == 2
@@ -293,7 +296,7 @@ def test_a_nameplate_is_asked_for_again_until_it_comes() -> None:
     assert lab.asked == [(name, name) for name in NAMES[:3]] * 2
     lab.join("inv1")
     lab.wait(9.5)
-    assert lab.node.outcome == ""
+    assert lab.node.stepper.outcome == ""
 
     lab.join("inv2", "inv3")
     lab.ready(0, *NAMES[:3])
@@ -303,7 +306,7 @@ def test_a_nameplate_is_asked_for_again_until_it_comes() -> None:
     lab.wait(AGAIN)
     assert lab.asked == [("inv4", "inv4")]
     lab.wait(10.0)
-    assert lab.node.outcome.startswith("plant: no nameplate from inv4 within 10 s")
+    assert lab.node.stepper.outcome.startswith("plant: no nameplate from inv4 within 10 s")
 
 
 def test_a_plant_that_stood_still_itself_blames_nobody() -> None:
@@ -311,10 +314,10 @@ def test_a_plant_that_stood_still_itself_blames_nobody() -> None:
     lab = ticking(deadline=10.0)
     lab.now += 60.0
     lab.node.expire(lab.now)
-    assert (lab.node.outcome, lab.node.deadline) == ("", lab.now + 10.0)
+    assert (lab.node.stepper.outcome, lab.node.deadline) == ("", lab.now + 10.0)
 
     lab.wait(10.0)
-    assert lab.node.outcome.startswith("plant: no State(0) from inv1 within 10 s")
+    assert lab.node.stepper.outcome.startswith("plant: no State(0) from inv1 within 10 s")
 
 
 def test_the_deadline_names_who_is_missing() -> None:
@@ -325,7 +328,9 @@ def test_the_deadline_names_who_is_missing() -> None:
     lab.node.expire(lab.node.deadline or 0.0)
     lab.do()
 
-    assert lab.node.outcome == "plant: no State(0) from inv2 within 10 s; last heard of inv2: tick 0, 10.0 s ago"
+    assert (
+        lab.node.stepper.outcome == "plant: no State(0) from inv2 within 10 s; last heard of inv2: tick 0, 10.0 s ago"
+    )
     assert lab.node.phase == "closing"
 
 
@@ -340,7 +345,7 @@ def test_a_death_while_the_run_goes_on_is_told() -> None:
     lab.state(10, "inv1", "inv3", "inv4")
 
     assert lab.last(Prepare).roster == ("inv1", "inv3", "inv4")
-    assert not lab.node.reproducible
+    assert not lab.node.stepper.reproducible
     assert lab.events() == [f"inv2 died at t = 0.2 s; {STAYS}"]
 
 
@@ -350,18 +355,18 @@ def test_a_death_while_the_run_goes_on_is_told() -> None:
 def test_the_plant_waits_for_its_recorder_however_long(monkeypatch: pytest.MonkeyPatch) -> None:
     """Beyond a window it goes on with no tick; agents hear every second that it waits, and no deadline passes."""
     lab = recorded(end=20.0)
-    monkeypatch.setattr(telemetry_reporter, "WINDOW", 20_000)
-    while lab.node.phase == "ticking":
+    monkeypatch.setattr(recorder_feed, "WINDOW", 20_000)
+    while lab.node.phase == "running":
         lab.tick(1)
-    tick = lab.node.tick
+    tick = lab.node.stepper.tick
     lab.wait(600.0)
     waiting = [message for _, message in lab.sent if isinstance(message, Waiting)]
 
-    assert (lab.node.phase, lab.node.tick, lab.node.outcome) == ("holding", tick, "")
+    assert (lab.node.phase, lab.node.stepper.tick, lab.node.stepper.outcome) == ("holding", tick, "")
     assert len(waiting) == 600
     assert waiting[0].waits_for == ("history",)
     lab.needs(2)
-    assert lab.node.phase == "ticking"
+    assert lab.node.phase == "running"
     assert lab.last(Measurement).seq == tick
 
 
@@ -393,7 +398,7 @@ def test_the_plant_leaves_once_its_recorder_has_the_end() -> None:
         lab.token(name, gone=True)
     lab.node.vanished(KEYS.alive_recorder("history"), lab.now)
     lab.wait(600.0)
-    assert lab.node.phase == "closing"
+    assert lab.node.phase == "recording"
     lab.recorder("history")
     (final,) = lab.telemetry()
     lab.needs(final)
@@ -417,11 +422,11 @@ def test_no_agent_is_late_while_the_recorder_is_silent() -> None:
     for _ in range(9):
         lab.needs(0)
         lab.wait(1.0)
-    assert lab.node.outcome == ""
+    assert lab.node.stepper.outcome == ""
     for _ in range(10):
         lab.needs(0)
         lab.wait(1.0)
-    assert lab.node.outcome.startswith("plant: no token from inv2 within 10 s")
+    assert lab.node.stepper.outcome.startswith("plant: no token from inv2 within 10 s")
 
 
 CALM = Reading(5e4, 1e3, 277.0, 60.0, 5e4, 277.0, False, "inv1")
@@ -442,3 +447,8 @@ def test_a_sensor_shows_the_end_of_its_scale_and_never_more() -> None:
     assert (wild.f, wild.P, wild.Q, wild.V, wild.P_set, wild.V_set) == (2000.0, -1e11, 1e11, 1e6, 1e11, 0.0)
     assert measured() == measured(f=60.0)
     assert (measured().f, measured().P) == (60.0, 5e4)
+
+
+def test_the_page_of_the_architecture_has_the_table_of_phases() -> None:
+    """Its picture is drawn from the table."""
+    assert diagram(PHASES) in (Path(__file__).parents[3] / "docs" / "architecture.md").read_text()

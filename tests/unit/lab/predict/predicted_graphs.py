@@ -11,7 +11,7 @@ from gridpeers.agents.agent import Agent
 from gridpeers.lab.predict.inverter_group import InverterGroup, inverter_group_of
 from gridpeers.plant.build import build_plant
 from gridpeers.plant.equipment import F_NOM, Feeder
-from gridpeers.plant.telemetry_reporter import measurement_of
+from gridpeers.plant.plant_stepper import measurement_of
 from gridpeers.scenarios.results.history import Floats
 from gridpeers.scenarios.results.metrics import F_BAND, MPSI_BAND, sharing_index
 from gridpeers.scenarios.schema import ScenarioModel, load_scenario

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings, SwitchEvent, SyncCheck
-from gridpeers.plant.realtime.realtime_plant import RealtimePlant
+from gridpeers.plant.plant_node import PlantNode
 from gridpeers.wire.codec import decode, encode
 from gridpeers.wire.messages import Answer, Command
 from gridpeers.wire.node import Publish
@@ -156,7 +156,7 @@ def test_the_command_to_close_in_step_is_answered_with_the_differences(network: 
     p = plant(network)
     run(p, 2.5)
     config = replace(toy_configs(9, end=60.0)[0], clock="wall")
-    side = RealtimePlant(config, p)
+    side = PlantNode(config, p)
     side.start(0.0)
     command = Command(sender="visitor", epoch=0, seq=0, t=0.0, verb="synchronise", argument="13-152", reply_to="v")
     side.received(side.keys.command, encode(command), 0.1)

@@ -7,7 +7,7 @@ from typing import Any
 from msgspec.structs import replace
 
 from gridpeers.agents.agent import Agent
-from gridpeers.plant.realtime.realtime_plant import RealtimePlant
+from gridpeers.plant.plant_node import PlantNode
 from gridpeers.wire.codec import decode, encode
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import Answer, Command, Leave, Message, PlantEvent, State, Telemetry
@@ -33,7 +33,7 @@ class Lab:
         config = replace(config, **changes)
         self.now = 50.0
         self.toy = ToyPlant(config)
-        self.side = RealtimePlant(config, self.toy)
+        self.side = PlantNode(config, self.toy)
         self.sent: list[tuple[str, Message]] = []
         self.fetched: list[str] = []
         self.side.start(self.now)

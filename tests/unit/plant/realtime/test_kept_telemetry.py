@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from gridpeers.plant.realtime.recorder_feed import RecorderFeed
+from gridpeers.plant.recorder_feed import RecorderFeed
 from gridpeers.scenarios.drivers.telemetry_stream import ASTRAY, TelemetryStream
 from gridpeers.wire.messages import Answer, Command, LinkReport, Message, Telemetry
 from tests.unit.plant.realtime.realtime_lab import KEYS, Lab, running
@@ -97,7 +97,7 @@ def test_a_recorder_that_was_cut_off_has_all_rows_and_reports_in_order_and_once(
 def test_what_the_plant_has_no_more_is_a_gap_that_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its memory is bounded: after a longer absence the recorder goes on with what there is, and knows it."""
     lab = running(end=None)
-    monkeypatch.setattr(lab.side.recorder_feed, "_limit", 4_000)
+    monkeypatch.setattr(lab.side.feed, "_limit", 4_000)
     link = Link(lab)
     lab.step(50)
     link.carry()

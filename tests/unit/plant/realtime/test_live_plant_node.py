@@ -6,8 +6,8 @@ import pytest
 from msgspec.structs import replace
 
 from gridpeers.agents.agent import Agent
+from gridpeers.plant.meeting import REFUSALS
 from gridpeers.plant.plant_config import ScheduledAction
-from gridpeers.plant.realtime.realtime_plant import REFUSALS
 from gridpeers.wire.messages import Measurement, Stop, Telemetry
 from tests.toy.toy_configs import agent_config
 from tests.unit.plant.realtime.realtime_lab import KEYS, Lab, running

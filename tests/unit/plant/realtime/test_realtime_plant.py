@@ -6,7 +6,8 @@ import pytest
 from msgspec.structs import replace
 
 from gridpeers.plant.realtime.pacer import FIRST, RealTimePacer, sentence
-from gridpeers.plant.realtime.realtime_plant import COMMANDS, LEAD
+from gridpeers.plant.realtime.realtime import LEAD
+from gridpeers.plant.realtime.run_commands import COMMANDS
 from gridpeers.wire.driver.drive import StoppedError
 from gridpeers.wire.messages import Answer, Command, Measurement, Stop, Telemetry, Waiting
 from tests.toy.toy_configs import toy_configs
@@ -72,7 +73,7 @@ def test_the_run_lasts_end_over_speed_and_all_are_told() -> None:
     for name in ("inv1", "inv2", "inv3"):
         lab.token(name, gone=True)
     assert lab.side.finished
-    assert lab.side.outcome == ""
+    assert lab.side.stepper.outcome == ""
 
 
 def test_an_interrupted_plant_leaves_its_agents_to_the_next_one() -> None:
@@ -94,7 +95,7 @@ def test_it_says_once_that_it_cannot_keep_pace() -> None:
     lab.step(10)
     warnings = lab.events("warning")
 
-    assert lab.side.pacer.report().late == 10
+    assert lab.side.ticks.pacer.report().late == 10
     assert len(warnings) == 1
     assert warnings[0].text.startswith("cannot keep pace at speed 1: 2 of 2 steps (100.0 %) more than")
 
@@ -104,7 +105,7 @@ def test_strict_breaks_the_run_that_cannot_keep_pace() -> None:
     lab = running(strict=True)
     lab.step(2, delay=0.03)
 
-    assert lab.side.outcome.startswith("plant: cannot keep pace at speed 1: ")
+    assert lab.side.stepper.outcome.startswith("plant: cannot keep pace at speed 1: ")
     assert len(lab.take(Stop)) == 1
 
 
@@ -117,7 +118,7 @@ def test_far_behind_it_puts_its_schedule_off_and_says_how_much() -> None:
 
     assert lab.side.deadline == pytest.approx(due + 3.0 + T_C)
     assert lab.events("warning")[0].text.startswith("fell 3.000 s of wall time behind")
-    assert lab.side.pacer.report().slipped == pytest.approx(3.0)
+    assert lab.side.ticks.pacer.report().slipped == pytest.approx(3.0)
 
 
 def test_a_plant_without_solution_breaks_the_run() -> None:
@@ -126,8 +127,8 @@ def test_a_plant_without_solution_breaks_the_run() -> None:
     lab = running(settings=config.settings)
     lab.step(6)
 
-    assert "no solution at t = 0.1 s" in lab.side.outcome
-    assert lab.side.cause is not None
+    assert "no solution at t = 0.1 s" in lab.side.stepper.outcome
+    assert lab.side.stepper.cause is not None
     assert len(lab.take(Stop)) == 1
 
 
@@ -161,7 +162,7 @@ def test_an_ended_run_stays_for_a_recorder_that_stood_still() -> None:
     lab.side.expire(lab.now)
     lab.side.appeared(recorder, lab.now)
     lab.do()
-    assert lab.side.phase == "closing"
+    assert lab.side.phase == "recording"
 
     lab.ask("telemetry", "0")
     again = lab.take(Telemetry)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gridpeers.plant.plant_node import IDLE
+from gridpeers.plant.plant_stepper import IDLE
 from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.results.recorded_events import law_failures
 from gridpeers.wire.messages import PlantEvent

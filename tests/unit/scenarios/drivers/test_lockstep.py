@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from gridpeers.agents.agent_config import AgentConfig, Control, GraphRule
 from gridpeers.agents.lockstep_agent import LockstepAgent
-from gridpeers.plant.lockstep_plant import LockstepPlant
 from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.plant.plant_node import PlantNode
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.run_request import Outcome
 from tests.toy.toy_configs import Schedule, agent_config, toy_configs
@@ -45,8 +45,8 @@ def test_who_is_faster_changes_nothing(seed: int, graph: GraphRule) -> None:
     run.run()
 
     assert run.rows == reference(graph=graph, end=0.2)
-    assert run.plant.outcome == ""
-    assert run.plant.reproducible
+    assert run.plant.stepper.outcome == ""
+    assert run.plant.stepper.reproducible
     assert not run.plant.rejects.counts
 
 
@@ -63,10 +63,10 @@ def test_the_run_survives_any_death_at_any_moment(seed: int, steps: int, graph: 
     run.run()
     deaths = [event for event in run.events if event.kind == "roster"]
 
-    assert run.plant.outcome == ""
+    assert run.plant.stepper.outcome == ""
     assert run.rows[-1][0] == 0.2
     if deaths:  # else it had left at the end already
-        assert not run.plant.reproducible
+        assert not run.plant.stepper.reproducible
         assert [event.subject for event in deaths] == ["inv3"]
         assert f"inv3 died at t = {deaths[0].t:g} s; its inverter stays on primary droop" in deaths[0].text
 
@@ -94,9 +94,9 @@ def test_who_dies_before_the_start_breaks_the_run() -> None:
     run.kill("inv2")
     run.run()
 
-    assert run.plant.outcome == "inv2 died before the run began"
+    assert run.plant.stepper.outcome == "inv2 died before the run began"
     assert run.telemetry[-1].final
-    assert run.telemetry[-1].outcome == run.plant.outcome
+    assert run.telemetry[-1].outcome == run.plant.stepper.outcome
     assert not run.agents
 
 
@@ -115,7 +115,7 @@ def test_the_plant_refuses_agents_without_inverters() -> None:
     config, _ = toy_configs(2)
 
     with pytest.raises(ValueError, match='agents: no inverter "inv3"; inverters are inv1, inv2'):
-        LockstepPlant(msgspec.structs.replace(config, agents=("inv1", "inv3")), ToyPlant(config))
+        PlantNode(msgspec.structs.replace(config, agents=("inv1", "inv3")), ToyPlant(config))
 
 
 def test_an_agent_without_a_plant_says_so() -> None:
@@ -157,8 +157,8 @@ def test_who_is_faster_changes_nothing_as_agents_come_and_go(seed: int, graph: G
 
     assert run.rows == rows
     assert tuple(run.events) == outcome.events
-    assert run.plant.outcome == ""
-    assert run.plant.reproducible
+    assert run.plant.stepper.outcome == ""
+    assert run.plant.stepper.reproducible
     assert not run.plant.rejects.counts
     assert not any(agent.rejects.counts for agent in run.agents)
 
@@ -175,7 +175,7 @@ def test_a_death_around_a_move_does_not_stall_the_run(seed: int, steps: int) -> 
     run.kill("inv3")
     run.run()
 
-    assert run.plant.outcome == ""
+    assert run.plant.stepper.outcome == ""
     assert run.rows[-1][0] == 0.4
 
 
@@ -196,4 +196,4 @@ def test_a_move_that_cannot_be_is_refused_at_the_start(
     plant, _ = configured((move,), n=2)
 
     with pytest.raises(ValueError, match=said):
-        LockstepPlant(plant, ToyPlant(plant))
+        PlantNode(plant, ToyPlant(plant))

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from gridpeers.agents.agent import Agent
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
-from gridpeers.plant.realtime.realtime_plant import RealtimePlant
+from gridpeers.plant.plant_node import PlantNode
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.emulation.emulated_links import links_of
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
@@ -112,7 +112,7 @@ def test_in_wall_clock_time_a_ghost_is_not_held_and_does_not_block_the_newcomer(
     config, _ = toy_configs(3, end=9.0)
     config = replace(config, clock="wall", links=LATE)
     toy, now = Holding(config), 50.0
-    plant = RealtimePlant(config, toy, links_of("plant", LATE))
+    plant = PlantNode(config, toy, links_of("plant", LATE))
     plant.start(now)
 
     def join(name: str, instance: str, epoch: int) -> None:
@@ -140,7 +140,7 @@ def test_in_wall_clock_time_a_ghost_is_not_held_and_does_not_block_the_newcomer(
     plant.vanished(KEYS.alive_agent("inv2", "a"), now)
     plant.take_actions()
     join("inv2", "b", 4)
-    t = plant.t
+    t = plant.stepper.t
     for k in range(40):
         step(said(4, k))
     after = [(at, P_set) for at, _, P_set in toy.held if at >= t]

@@ -14,13 +14,15 @@ from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.netem.fault_schedule import Heal
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem, NodeFault
-from gridpeers.plant.realtime.realtime_plant import RealtimePlant
+from gridpeers.plant.plant_node import PlantNode
 from gridpeers.plant.realtime.run_commands import LinkCommandSender
 from gridpeers.scenarios.emulation.emulated_links import EmulatedLinks
 from gridpeers.scenarios.emulation.link_data import EVERYTHING, EmulationConfig, LinkCommand
 from gridpeers.wire.codec import decode
 from gridpeers.wire.links import CommandEffect
-from gridpeers.wire.messages import LinkAcknowledgement, LinkRequest, Measurement, State
+from gridpeers.wire.messages import PLANT, LinkAcknowledgement, LinkRequest, Measurement, State
+from gridpeers.wire.node import Publish
+from gridpeers.wire.post import Post
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
 from tests.unit.agents import realtime_lab as agent_side
@@ -57,7 +59,6 @@ def answers(lab: agent_side.Lab) -> list[tuple[int, bool, str]]:
 def test_every_agent_takes_every_command_once_and_in_turn(seed: int) -> None:
     """Every command arrives once, in spite of losses on either way and of restarts of the agent's process."""
     rng, taken, now = random.Random(seed), list[int](), 0.0
-    wire: list[LinkRequest] = []
 
     class Note:
         def command(self, tree: dict[str, Any], t: float) -> CommandEffect:
@@ -68,12 +69,8 @@ def test_every_agent_takes_every_command_once_and_in_turn(seed: int) -> None:
             taken.append(tree["number"])
             return super().command(tree, t)
 
-    def publish(key: str, payload: bytes) -> None:
-        message = decode(payload)
-        if key == plant_side.KEYS.link_request("inv1") and isinstance(message, LinkRequest):
-            wire.append(message)
-
-    plant = LinkCommandSender(1, plant_side.KEYS, Note(), publish)  # type: ignore[arg-type]
+    post = Post(PLANT, "toy", 1)
+    plant = LinkCommandSender(post, Note(), lambda payload: None)  # type: ignore[arg-type]
     agent: Any = LinkCommandReceiver("inv1", 1, Taking())  # type: ignore[arg-type]
     given_so_far = 0
     for step in range(60):
@@ -87,22 +84,25 @@ def test_every_agent_takes_every_command_once_and_in_turn(seed: int) -> None:
             agent = LinkCommandReceiver("inv1", 1, Taking())  # type: ignore[arg-type]
             taken.clear()
         plant.send(("inv1",), now)
-        sent, wire[:] = list(wire), []
-        for command in sent:
+        for action in post.take_actions():
+            assert isinstance(action, Publish)
+            command = decode(action.payload)
+            if not isinstance(command, LinkRequest):
+                continue
             answer = agent.take(command, now) if rng.random() >= loss else None
             if answer is not None and rng.random() >= loss:
-                plant.answered(answer)
+                plant.on_answer(answer, b"", now)
     plant.send(("inv1",), now + 10.0)
 
     assert taken == [number + 1 for number in range(given_so_far)]
-    assert wire == []
+    assert post.take_actions() == []
 
 
 def test_a_command_holds_from_one_control_period_later_on_and_is_sent_before_the_measurement() -> None:
     """The plant tells everybody in the wake in which it hears of it; who joins later hears all before he measures."""
     lab = plant_side.Lab(2)
     config, _ = toy_configs(2, end=2.0)
-    lab.side = RealtimePlant(replace(config, clock="wall"), lab.toy, EmulatedLinks("plant", SETUP))
+    lab.side = PlantNode(replace(config, clock="wall"), lab.toy, EmulatedLinks("plant", SETUP))
     lab.side.start(lab.now)
     lab.join("inv1")
     lab.join("inv2")
@@ -135,7 +135,7 @@ def test_a_heal_names_only_links_that_have_a_fault_and_says_so_if_there_is_none(
     lab = plant_side.Lab(2)
     config, _ = toy_configs(2, end=9.0)
     links = EmulatedLinks("plant", setup)
-    lab.side = RealtimePlant(replace(config, clock="wall"), ToyPlant(config), links)
+    lab.side = PlantNode(replace(config, clock="wall"), ToyPlant(config), links)
     lab.side.start(lab.now)
     lab.join("inv1", "inv2")
     lab.ask("link", CUT)

@@ -1,0 +1,135 @@
+"""Agents and recorders by their tokens; processes that cannot take part; scheduled moves of agents. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.plant.plant_stepper import PlantStepper
+from gridpeers.plant.recorder_feed import RecorderFeed
+from gridpeers.wire.codec import encode
+from gridpeers.wire.messages import PLANT, Stop
+from gridpeers.wire.phases import Phases
+from gridpeers.wire.post import Post
+from gridpeers.wire.timing import Awaited, RateLimit
+from gridpeers.wire.wording import printable
+
+STAYS = "its inverter stays on primary droop at its last set-points"  # state of the inverter whose agent has died
+AGAIN = 1.0  # time (s) after which a question without an answer is asked again
+MOST_RECORDERS = 20  # recorders that are noted beside those that the run waits for: anybody may hold tokens
+
+REFUSALS, REFUSAL_INTERVAL = 20, 0.1
+"""Refused processes that are logged and told at once, and time (s) after which one more is told: each needs a publisher
+of its own, a millisecond or two in which a plant in real time does not step."""
+
+
+class TickActions(NamedTuple):
+    leave: tuple[str, ...] = ()  # inverters whose agents leave
+    join: tuple[str, ...] = ()  # inverters whose agents join
+    die: tuple[str, ...] = ()  # inverters whose agents die
+
+
+def agent_schedule(config: PlantConfig, inverters: tuple[str, ...]) -> dict[int, TickActions]:
+    """Return the scheduled joins, leaves and deaths of a run, by tick.
+
+    ValueError if an action names no inverter of the plant, or its time is no tick after 0.
+    """
+    at: dict[int, TickActions] = {}
+    for action in config.schedule:
+        if action.inverter not in inverters:
+            raise ValueError(f'schedule: no inverter "{action.inverter}"; inverters are {", ".join(inverters)}')
+        tick = round(action.t / config.T_c)
+        if tick < 1 or abs(tick * config.T_c - action.t) > 1e-9 * max(1.0, action.t):
+            raise ValueError(
+                f"schedule: {action.inverter} must {action.action} at a positive multiple of the control period "
+                f"{config.T_c:g} s, got {action.t:g} s"
+            )
+        actions = at.get(tick, TickActions())
+        at[tick] = actions._replace(**{action.action: (*getattr(actions, action.action), action.inverter)})
+    return at
+
+
+class Meeting:
+    def __init__(self, post: Post, stepper: PlantStepper, phases: Phases, feed: RecorderFeed) -> None:
+        self._post, self._stepper, self._phases, self._feed = post, stepper, phases, feed
+        self.recorders: set[str] = set()
+        self._needed = stepper.config.recorders
+        self._tokens: set[str] = set()
+        """Tokens of agents and recorders that take part; while the run ends, also of agents that were told to stop."""
+        self._refusal_limit = RateLimit(REFUSALS, REFUSAL_INTERVAL)
+
+    @property
+    def has_agents(self) -> bool:
+        return any(self._post.keys.parts(token)[1] == "agent" for token in self._tokens)
+
+    @property
+    def is_alone(self) -> bool:
+        """Whether all have gone, but for recorders that the run waits for."""
+        return self._tokens <= {self._post.keys.alive_recorder(name) for name in self._needed}
+
+    def missing(self, names: Iterable[str], recorders: bool = False) -> tuple[Awaited, ...]:
+        """Return the tokens and nameplates that are missing of agents, and perhaps of the recorders of the run."""
+        members = self._post.members
+        names = tuple(names)
+        here = {name for name in names if members.instance(name)}
+        absent = [name for name in self._needed if recorders and name not in self.recorders]
+        return (
+            *(Awaited("token", name) for name in names if name not in here),
+            *(Awaited("nameplate", name) for name in names if name in here and name not in members.nameplates),
+            *(Awaited("token", name) for name in absent),
+        )
+
+    def appeared(self, key: str, now: float, refusal: Callable[[str, str], str]) -> None:
+        """Note a token, unless its process is refused.
+
+        `refusal`: returns why the process of an agent cannot take part now, an empty string if it can.
+        """
+        match self._post.token(key, now, appeared=True):
+            case ("alive", "recorder", name):
+                self._recorder_came(key, name)
+            case ("alive", "agent", name, instance):
+                self._agent_came(key, name, instance, refusal(name, instance), now)
+
+    def vanished(self, key: str, now: float) -> str:
+        """Note that a token is gone; return the agent whose process it was, if that took part."""
+        self._tokens.discard(key)
+        match self._post.token(key, now, appeared=False):
+            case ("alive", "recorder", name):
+                self.recorders.discard(name)
+                if self._phases.now == "running" and (news := self._feed.gone(name)):
+                    self._post.say(news)
+            case ("alive", "agent", name, instance) if self._post.process_gone(name, instance):
+                return name
+        return ""
+
+    def stop(self, key: str, reason: str, *, refused: bool = False) -> None:
+        """Ask the agents that listen to a key to stop."""
+        tick, t = self._stepper.tick, self._stepper.t
+        stop = Stop(sender=PLANT, epoch=self._post.epoch, seq=tick, t=t, reason=printable(reason), refused=refused)
+        self._post.publish(key, encode(stop))
+
+    def _recorder_came(self, key: str, name: str) -> None:
+        if not (name in self.recorders or name in self._needed or len(self.recorders) < MOST_RECORDERS):
+            text = f"the token of recorder {name}; {MOST_RECORDERS} others hold tokens"
+            self._post.rejects.add("excess", key, text)
+            return
+        self._tokens.add(key)
+        self.recorders.add(name)
+        if news := self._feed.came(name):
+            self._post.say(news)
+
+    def _agent_came(self, key: str, name: str, instance: str, reason: str, now: float) -> None:
+        ends = not self._phases.allows("end")
+        if not (ends or reason):
+            if self._post.process_came(name, instance):
+                self._tokens.add(key)
+        elif self._refusal_limit.admit("refused", now) is None:
+            text = f"a token of {name}, one of too many to be told that they are refused"
+            self._post.rejects.add("excess", key, text)
+        elif ends:  # it has missed the `Stop` to all
+            self._tokens.add(key)
+            self.stop(self._post.keys.stop_request(name, instance), self._stepper.outcome or "the run has ended")
+        else:
+            self._post.say(f"refused {reason}")
+            self.stop(self._post.keys.stop_request(name, instance), reason, refused=True)
