@@ -48,13 +48,13 @@ class EmulatedLinks:
         self._dropped_before = 0
         self._lies: Counter[str] = Counter()
         """States that say something else here than their sender has decided, by sender."""
-        self._begin()
         self._intervals: dict[str, list[_Interval]] = {}
         for node in config.netem.nodes:
             if node.slow_s or (node.pause and not config.real_nodes):
                 end, slow = math.inf if node.to_s is None else node.to_s, math.inf if node.pause else node.slow_s
                 self._intervals.setdefault(node.name, []).append(_Interval(node.from_s, end, slow))
         self._pauses = tuple(at for at in self._intervals.get(name, ()) if math.isinf(at.slow))
+        self._begin()
 
     def offer(self, message: State | Measurement, payload: bytes, at: float) -> bool:
         """Take a message off the wire and return True; return False if no fault ever acts on its link."""
@@ -83,9 +83,8 @@ class EmulatedLinks:
         """Number of messages lost here since the process began, restarts included."""
         return self._dropped_before + self._receiver.dropped
 
-    def due(self, now: float) -> Sequence[Arrival]:
-        """Take out what has arrived by now (s of run time): a paused receiver takes it when it goes on."""
-        return () if self._pauses and self.stalled(now) else self._receiver.due(now)
+    def _due_unless_paused(self, now: float) -> Sequence[Arrival]:
+        return () if self.stalled(now) else self._receiver.due(now)
 
     def stalled(self, t: float) -> bool:
         return bool(self._pauses) and any(at.holds(t) for at in self._pauses)
@@ -138,6 +137,8 @@ class EmulatedLinks:
         self.clear.clear()
         self._faulty.clear()
         self._receiver = Receiver(self._name, config.netem, config.microgrids, keep_trace=config.keep_trace)
+        self.due = self._due_unless_paused if self._pauses else self._receiver.due
+        """Take out what has arrived by now (s of run time): a paused receiver takes it when it goes on."""
         self._schedules = LinkSchedules(config.netem, config.microgrids)
         self._lies.clear()
         self._liars = {  # senders whose states are lies here at some time
