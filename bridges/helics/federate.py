@@ -77,7 +77,6 @@ USER = "a HELICS federate"
 IMPORT = 60.0  # longest time (s) until the process has imported HELICS, on a machine that is busy
 FAREWELL = 3.0  # longest wait (s) for the process to leave the federation
 BEFORE = "before t = 0"
-ASK = 5.0  # longest wait (s) for the answer where the others are; it comes at once, but for a busy machine
 LATER = 3.0  # time (s) for which the process is heard out once its own wait for the broker is over
 
 
@@ -159,26 +158,17 @@ class HelicsFederate:
         return answer
 
     def _take(self, wait: float, late: str) -> dict[str, Any]:
-        """Return the next answer, or complain that it is late, with the times at which the others are."""
-        answer = self._answer(monotonic() + wait)
-        if answer is not None:
-            return answer
-        self._process.send({"do": "times"})
-        until = monotonic() + ASK
-        while (answer := self._answer(until)) is not None and "times" not in answer:
-            pass  # what was waited for, too late
-        silent = "" if self._when == BEFORE else "; nor did the broker answer where they stand"
-        where = f": {', '.join(answer['times'])}" if answer and answer["times"] else silent
-        key = "plant.helics.wait_s" if self._when == BEFORE else "processes.deadline_s"
-        raise HelicsError(f"HELICS, {self._when}: {late}{where}; end what hangs, or raise {key}")
-
-    def _answer(self, until: float) -> dict[str, Any] | None:
+        """Return the next answer, or complain that it is late."""
         try:
-            return self._process.answer(until)
+            answer = self._process.answer(monotonic() + wait)
         except ProcessEndedError as how:
             last = self._process.printed()[-300:].strip().rpartition("\n")[2]
             name = self._settings.name
             raise HelicsError(f"HELICS, {self._when}: our federate {name} {how}; {last or 'no word'}") from None
+        if answer is None:
+            key = "plant.helics.wait_s" if self._when == BEFORE else "processes.deadline_s"
+            raise HelicsError(f"HELICS, {self._when}: {late}; end what hangs, or raise {key}")
+        return answer
 
     def _explained(self, error: str, doing: str) -> str:
         broker = self._settings.broker

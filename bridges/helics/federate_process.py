@@ -9,7 +9,6 @@ answer; what HELICS prints goes to standard error.
     {"do": "begin", "publications": [[key, type, unit]], "subscriptions": [...]}
     {"do": "step", "publish": {key: value}, "time"}     publish, go to a time (s), return the values that came
     {"do": "end"}                                       leave the federation, end
-    {"do": "times"}                                     times of the others; also in the middle of a wait
     {"do": "abort", "reason": text}                     end the federation at once; also in the middle of a wait
 """
 
@@ -37,7 +36,7 @@ class _RefusedError(Exception):
 
 
 class Federate:
-    """The federate with its topics; each method but `abort` and `times` answers the request of its name."""
+    """The federate with its topics; each method but `abort` answers the request of its name."""
 
     def __init__(self) -> None:
         import helics
@@ -118,18 +117,6 @@ class Federate:
             self.helics.helicsFederateGlobalError(self.fed, GLOBAL_ERROR, reason)
             time.sleep(FAREWELL)  # HELICS has no sign that the others have heard it
 
-    def times(self) -> list[str]:
-        if self.fed is None:
-            return []
-        answer = self._query("root", "global_time")
-        cores = answer.get("cores", []) if isinstance(answer, dict) else []
-        times = {
-            federate.get("attributes", {}).get("name", ""): max(federate.get("granted_time", 0.0), 0.0)
-            for core in cores
-            for federate in core.get("federates", [])
-        }
-        return [f"{name} stands at t = {t:g} s" for name, t in times.items() if name != self.name]
-
     def _publish(self, values: dict[str, Any]) -> None:
         helics = self.helics
         write = {
@@ -185,17 +172,11 @@ def main() -> None:
         return
     answer({"ready": True})
 
-    def answer_times() -> None:
-        with contextlib.suppress(Exception):
-            answer({"times": federate.times()})
-
     def listen() -> None:
         """Take requests; do at once what must not wait for the present one."""
         for line in sys.stdin:
             request = json.loads(line)
-            if request["do"] == "times":  # HELICS asks a dead federate, too, and waits long for it
-                threading.Thread(target=answer_times, daemon=True).start()
-            elif request["do"] == "abort":
+            if request["do"] == "abort":
                 federate.abort(request["reason"])
                 os._exit(0)
             else:
