@@ -39,7 +39,7 @@ _OWN = (
     ("up", "start_commands:up", "Run the plant and all its agents at once, in real time."),
     ("down", "live_commands:down", "End a run: its agents leave, its plant ends."),
     ("status", "live_commands:status", "Look once at a run: time, pacing, agents, latest events."),
-    ("watch", "live_commands:watch", "Watch a run as a live table."),
+    ("watch", "live_commands:watch", "Watch a run as a live table, until Ctrl-C."),
     ("stop", "live_commands:stop", "Have an agent leave properly: its inverter is switched off."),
     ("event", "live_commands:event", "Open or close a switch of a running plant."),
     ("load", "live_commands:load", "Set a load of a running plant."),

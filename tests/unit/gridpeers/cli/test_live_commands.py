@@ -20,7 +20,7 @@ pytestmark = pytest.mark.usefixtures("elsewhere")
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["plant"], "SCENARIO is missing"),
+        (["plant"], "missing argument 'SCENARIO'"),
         (["plant", "islandin"], 'no scenario "islandin"; did you mean "islanding"?'),
         (["plant", "islanding", "--run", "a/b"], '--run: "a/b" cannot be part of a Zenoh key'),
         (["plant", "islanding", "--case", "V"], '--case: no case "V"; did you mean "IV"?'),
@@ -34,7 +34,7 @@ pytestmark = pytest.mark.usefixtures("elsewhere")
         (["up", "islanding", "--for", "0"], "--for: must be a time of more than 0 s and at most 1e+09 s, got 0 s"),
         (["watch", "--for", "-1"], "--for: must be a time of more than 0 s and at most 1e+09 s, got -1 s"),
         (["up", "islanding", "--out", "full"], "--out full: the folder is not empty"),
-        (["agent"], "INVERTER is missing"),
+        (["agent"], "missing argument 'INVERTER'"),
         (["agent", "inv 2"], 'INVERTER: "inv 2" cannot be part of a Zenoh key'),
         (["agent", "inv2", "--connect", "lab"], '--connect: "lab" is no endpoint; write PROTOCOL/HOST:PORT'),
         (["agent", "inv2", "--wait", "-3"], "--wait: must be a time of at least 0 s, got -3 s"),

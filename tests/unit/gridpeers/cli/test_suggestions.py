@@ -11,7 +11,7 @@ from tests.command_line import invoke
     ("words", "told"),
     [
         (["rnu"], ('no command "rnu"; did you mean "run"?',)),
-        (["link", "sett"], ('no command "sett"; did you mean "set"? The commands are set, cut, heal, show',)),
+        (["link", "sett"], ('no command "sett"; did you mean "set"? The commands are set, cut, heal',)),
         (["run", "x", "--driver", "inproces"], ("--driver", "inproces", "'inprocess'; gridpeers run -h shows what")),
         (["run", "x", "--speed", "fast"], ("--speed", "number")),
         (["run", "x", "--seed", "-1"], ("--seed", "0")),
