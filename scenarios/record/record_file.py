@@ -216,25 +216,30 @@ def record_path(path: str | Path, case: str = "") -> Path:
     """
     if not isinstance(path, str | Path):
         raise RecordFileError(f'{path!r:.60}: needs the path of a record, as "runs/islanding/latest/IV"')
-    path = Path(path)
+    first, *others = records_in(Path(path), case)
+    if others:
+        cases = ", ".join(file.parent.name for file in (first, *others))
+        raise RecordFileError(
+            f"{path}: it has a record of each case, {cases}; choose one with --case {first.parent.name}, "
+            f"or give its folder, {first.parent}"
+        )
+    return first
+
+
+def records_in(path: Path, case: str = "") -> tuple[Path, ...]:
+    """Return the files of the records of a run, of all its cases or of one; see `record_path`."""
     if not path.exists():
-        return path
+        return (path,)
     if path.is_file() or (path / FILE).exists():
         file = path if path.is_file() else path / FILE
         if case and case != file.resolve().parent.name:
             raise RecordFileError(
                 f'{path}: it is the record of one case, and "{case}" is another one; leave --case out'
             )
-        return file
+        return (file,)
     found = {file.parent.name: file for file in sorted(path.glob(f"*/{FILE}"))}
     if not found:
         raise RecordFileError(f"{path}: there is no {FILE}: the run was not recorded, or this is no folder of a run")
-    first, *others = found
     if case and case not in found:
         raise RecordFileError(f'{path}: no record of case "{case}"; {suggestion(case, found, "cases")}')
-    if others and not case:
-        raise RecordFileError(
-            f"{path}: it has a record of each case, {', '.join(found)}; choose one with --case {first}, "
-            f"or give its folder, {found[first].parent}"
-        )
-    return found[case or first]
+    return (found[case],) if case else tuple(found.values())
