@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 
 import msgspec
@@ -103,7 +102,6 @@ def _scaled(values: Sequence[float], sizes: Sequence[float], total: float) -> li
 
 
 MOST = 10.0  # greatest power of one load, over that of all loads, or of the inverters' ratings if more
-_POWER = re.compile(r"\bset to (\S+) kW and (\S+) kvar at nominal voltage")
 
 
 class LoadPowers:
@@ -137,12 +135,6 @@ class LoadPowers:
 
     def words(self, name: str, S: complex) -> str:
         return f"{S.real / 1e3:.6g} kW and {S.imag / 1e3:.6g} kvar at nominal voltage{_beside(S, self.table(name))}"
-
-
-def set_power(text: str) -> complex | None:
-    """Return the power (VA, to six digits) that an event of the plant says a load was set to; None if it says none."""
-    match = _POWER.search(text)
-    return complex(1e3 * float(match[1]), 1e3 * float(match[2])) if match else None
 
 
 def _refuse_unless_plausible(plausible: Plausible, value: float, unit: str) -> None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import lru_cache
-from math import inf
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -18,7 +17,7 @@ from gridpeers.plant.dynamics.circuit import PHASES, Circuit
 from gridpeers.plant.dynamics.inverters import Inverters
 from gridpeers.plant.dynamics.power_flow_at_rest import PowerFlow
 from gridpeers.plant.equipment import Feeder
-from gridpeers.plant.equipment.named_loads import set_power, with_powers
+from gridpeers.plant.equipment.named_loads import with_powers
 from gridpeers.plant.feeder.circuits import circuit_of
 from gridpeers.plant.feeder.plant import installed_inverters
 from gridpeers.plant.network import Network
@@ -28,7 +27,6 @@ from gridpeers.scenarios.checks.check_verdict import Check, NotJudgedError, Viol
 from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.results.history import Flags, Floats
 from gridpeers.scenarios.results.island_membership import closed_switches
-from gridpeers.wire.messages import PlantEvent
 from gridpeers.wire.schema.table_schema import Plausible, Unit
 
 MOST_NODES = 1500  # Nodes above which a feeder takes seconds
@@ -177,23 +175,15 @@ def _rows(case: CheckedCase) -> list[int]:
     for window in case.windows:
         inside = np.flatnonzero(window.rows(t))
         found += [int(inside[inside.size // 2]), int(inside[-1])] if inside.size else []
-    untold = min((e.t for e in case.events if e.kind == "load" and _power_of(e) is None), default=inf)
-    if untold < inf and not any(t[row] <= untold for row in found):
-        raise NotJudgedError("loads were changed in the run, and its events do not say to which power")
-    return [row for row in found if t[row] <= untold] or [len(t) - 1]
+    return found or [len(t) - 1]
 
 
 def _state_at(case: CheckedCase, t: float) -> NetworkState:
     """Return switches and loads at a time (s), by the plant's events; a load takes its power after its event."""
     powers = {
-        event.subject: S
+        event.subject: complex(event.P, event.Q)
         for event in case.events
-        if event.kind == "load" and event.t < t - 1e-9 and (S := _power_of(event)) is not None
+        if event.kind == "load" and event.t < t - 1e-9 and event.P is not None and event.Q is not None
     }
     until = (event for event in case.events if event.kind == "switch" and event.t <= t + 1e-9)
     return NetworkState(closed_switches(case.feeder, until), frozenset(powers.items()))
-
-
-def _power_of(event: PlantEvent) -> complex | None:
-    """Return the power (VA, nominal) of a load from its event on; of a table of events, by its words."""
-    return set_power(event.text) if event.P is None or event.Q is None else complex(event.P, event.Q)
