@@ -36,10 +36,10 @@ from gridpeers.wire.wording import suggestion
 LOOKING = 1.5
 
 
-def endpoint_for_run(listen: str, credentials: Credentials | None = None, access: Access | None = None) -> str:
+def endpoint_for_run(listen: str, access: Access) -> str:
     """Return the endpoint where a plant will be able to listen, a free port for port 0.
 
-    UsageError if it is no endpoint, or another run is there; ListenError if it cannot be listened on.
+    UsageError if it is no endpoint, or something answers there; ListenError if it cannot be listened on.
     """
     try:
         return free_endpoint(check_endpoint("--listen", listen), option="--listen")
@@ -47,17 +47,11 @@ def endpoint_for_run(listen: str, credentials: Credentials | None = None, access
         where = loopback_of(listen)
         if not (error.in_use and accepting((where,))):
             raise
-        with RunClient(RunAddress(run=RUN, connect=(where,), credentials=credentials)) as client:
-            client.until(lambda: bool(client.runs), LOOKING)
-            there = sorted(client.runs)
-        if not there:
-            raise
-        found_by = RunAddress(run=there[0], connect=(where,), access=access or Access()).words
+        found_by = RunAddress(run=RUN, connect=(where,), access=access).words
         status, down = command_line("status", *found_by), command_line("down", *found_by)
         raise UsageError(
-            f"--listen: {' and '.join(f'run {name}' for name in there)} is there already, at {where}; "
-            f"{status} shows it, {down} ends it; to have both, give this one a name and a port of its own, by --run "
-            "and --listen, and its other commands --run and --connect"
+            f"{error}; if it is a run, {status} shows it and {down} ends it, or give this one a name and a port of its "
+            "own, by --run and --listen"
         ) from None
 
 

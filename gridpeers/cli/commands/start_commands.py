@@ -67,7 +67,7 @@ def _start(start: Start, *, agents: bool) -> None:
     listen = with_protocol(check_endpoint("--listen", start.listen), keys=start.keys is not None, default=ENDPOINT)
     for name, text in (("--listen", listen), *(("--connect", text) for text in beyond)):
         check_open(name, text, access)
-    endpoint = endpoint_for_run(listen, credentials, access)
+    endpoint = endpoint_for_run(listen, access)
     check_alone(run, beyond, credentials, access)
 
     from gridpeers.scenarios.live.live_files import folders, live_record

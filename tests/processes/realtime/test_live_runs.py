@@ -141,7 +141,7 @@ def test_what_is_not_there_is_told_in_one_line(desk: Desk) -> None:
         assert re.search(what, errors[0])
         assert "Traceback" not in text
     assert second.end() == 2
-    assert f"--listen: run lab is there already, at {endpoint}; gridpeers status --run lab " in second.text
+    assert "address already in use; end what uses it; if it is a run, gridpeers status --connect " in second.text
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds the children in /proc")
