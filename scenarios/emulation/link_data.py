@@ -16,7 +16,7 @@ from gridpeers.wire.codec import decode_foreign
 from gridpeers.wire.messages import LinkReport, Name, Text
 from gridpeers.wire.plugins.plugin import Plugin
 from gridpeers.wire.schema.table_schema import Plausible, Problem
-from gridpeers.wire.wording import first_of, printable
+from gridpeers.wire.wording import counted, printable
 
 
 class EmulationConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -126,8 +126,6 @@ def _shown(value: Any) -> str:
 EVERYTHING = "{*, plant} <-> {*, plant}"
 """Pattern of all links there are."""
 
-MOST_NAMED = 8  # Links that are named at most; a partition of nine inverters affects 36
-
 
 class LinkCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
     """Either a fault or its end; the time from which it holds is sent beside it."""
@@ -175,17 +173,11 @@ class LinkCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         return f"{where}: " + ", ".join(faults + ([] if self.for_s is None else [f"for {self.for_s:g} s"]))
 
     def in_words(self, impaired: Sequence[Link]) -> str:
+        """Return what it does; a heal ends the faults of the `impaired` links."""
         if self.fault is not None:
             return str(self)
-        if not impaired:
-            return f"{'all links' if self.on == EVERYTHING else self.on}: no link has a fault, nothing to heal"
-        both = [link for link in impaired if link[::-1] in impaired]  # a fault both ways is named once
-        named = [
-            f"{src} {'<->' if (src, dst) in both else '->'} {dst}"
-            for i, (src, dst) in enumerate(impaired)
-            if (dst, src) not in impaired[:i]
-        ]
-        return f"{first_of(named, MOST_NAMED)}: healed"
+        where = "all links" if self.on == EVERYTHING else self.on
+        return f"{where}: {counted(len(impaired), 'link')} healed" if impaired else f"{where}: no link has a fault"
 
     def to_tree(self) -> dict[str, Any]:
         tree: dict[str, Any] = msgspec.to_builtins(self)

@@ -241,7 +241,7 @@ class _LinkReply(msgspec.Struct, frozen=True):
 
 class LinkCommandResult(NamedTuple):
     text: str
-    """Its effect in words, and from when on; a heal names only links that had a fault."""
+    """Its effect in words, and from when on."""
     acknowledged: list[str]
     absent: list[str]
     """Receivers without an agent: the plant tells the agent when it comes."""

@@ -128,7 +128,7 @@ def test_a_command_holds_from_one_control_period_later_on_and_is_sent_before_the
     assert [event.text for event in lab.events("link")] == ["link command 1: inv2 -> inv1: cut, from t = 0.08 s on"]
 
 
-def test_a_heal_names_only_links_that_have_a_fault_and_says_so_if_there_is_none() -> None:
+def test_a_heal_counts_the_links_that_have_a_fault_and_says_so_if_there_is_none() -> None:
     """Of all links the cut one is healed, once; a fault that the scenario has for later is none, and still comes."""
     later = Fault(on="inv1 -> plant", delay=0.1, from_s=5.0)
     setup = replace(SETUP, netem=Netem(links=(later,)))
@@ -146,11 +146,11 @@ def test_a_heal_names_only_links_that_have_a_fault_and_says_so_if_there_is_none(
     again = lab.ask("link", heal)
     lab.step()
 
-    assert (first.text, first.data["receivers"]) == ("inv2 -> inv1: healed", ["inv1"])
-    assert (again.text, again.data["receivers"]) == ("all links: no link has a fault, nothing to heal", [])
+    assert (first.text, first.data["receivers"]) == ("all links: 1 link healed", ["inv1"])
+    assert (again.text, again.data["receivers"]) == ("all links: no link has a fault", [])
     assert [event.text.partition(", from")[0] for event in lab.events("link")[1:]] == [
-        "link command 2: inv2 -> inv1: healed",
-        "link command 3: all links: no link has a fault, nothing to heal",
+        "link command 2: all links: 1 link healed",
+        "link command 3: all links: no link has a fault",
     ]
     assert (links.impaired(4.9), links.impaired(5.0)) == ((), ("inv1",))
 
