@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tests.way.way import PAGE, files_of, page_with, table, way
 
-LIMITS = {"measurement": (19, 53), "to the neighbour": (11, 26), "to the plant": (15, 23)}
+LIMITS = {"measurement": (18, 51), "to the neighbour": (11, 26), "to the plant": (15, 20)}
 """Most files and most calls of each leg; the aim is 14 files and 25 calls."""
 
 
