@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 import gridpeers as gp
-from tests.conformance.laws.law_runs import SHORT, failed, islanding, written
+from tests.conformance.laws.law_runs import SHORT, failed, written
 from tests.conformance.laws.test_carriers import PATIENT, PROGRAM
 
 BAD = "tests.conformance.laws.bad_laws"
@@ -198,20 +198,6 @@ def test_gains_of_the_papers_law_in_a_case_of_another_are_refused() -> None:
         gp.ScenarioError, match=r'case.IV.degraded_communication.weights: weights other than "paper" are the law'
     ):
         gp.load("islanding").replace({"case.IV.law": "dapi", "case.IV.degraded_communication": weights}).check()
-
-
-def test_a_users_module_beside_the_scenario_is_found(tmp_path: Path) -> None:
-    """`mine:Mine` is the class Mine of mine.py in the folder of the scenario file, wherever the run is started."""
-    (tmp_path / "my_law.py").write_text(
-        "import gridpeers as gp\nclass Hold(gp.Law):\n    def step(self, own, neighbours, T):\n"
-        "        return gp.SetPoints(own.P_set, own.V_set)\n"
-    )
-    file = tmp_path / "mine.toml"
-    file.write_text(
-        gp.load("islanding").replace({**SHORT}).to_toml().replace('law = "consensus"', 'law = "my_law:Hold"')
-    )
-
-    assert gp.load(file).run("IV").sha256 != islanding(short=True).sha256
 
 
 def test_a_module_that_ends_python_while_it_is_imported_is_refused(tmp_path: Path) -> None:

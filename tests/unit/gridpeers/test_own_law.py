@@ -102,25 +102,3 @@ def test_a_law_under_a_name_is_written_by_its_module(monkeypatch: pytest.MonkeyP
     law = law_of(gp.load("islanding").replace({"law": "mine"}).spec, "IV")
 
     assert law.use == f"{__name__}:Mine"
-
-
-def test_problems_in_an_own_law_are_told_with_its_key(tmp_path: Path) -> None:
-    """A parameter out of range, an unknown one, a missing module: with the unit and what would be right."""
-    (tmp_path / "mine.py").write_text(MINE)
-    scenario = gp.Scenario(
-        time={"end_s": 1.0},
-        case={"IV": {"secondary": "all", "graph": "full"}},
-        event=[{"label": "e", "t_s": 0.5, "open": ["13-152"]}],
-    )
-
-    for law, told in (
-        ({"use": "mine:Mine", "folder": str(tmp_path), "gain": 500}, "gain: must be from 0 to 100 1/s, got 500"),
-        ({"use": "mine:Mine", "folder": str(tmp_path), "gian": 5}, 'gian: unknown parameter; did you mean "gain"'),
-        ({"use": "mine:Me", "folder": str(tmp_path)}, 'module mine has no "Me"; did you mean "Mine"'),
-        ("yours:Mine", 'there is no module "yours"'),
-        ("dapy", 'there is no law "dapy"; did you mean "dapi"'),
-    ):
-        with pytest.raises(gp.ScenarioError) as caught:
-            scenario.replace({"case.IV.law": law})
-        assert str(caught.value).startswith("replace: case.IV.law")
-        assert told in str(caught.value)

@@ -152,11 +152,6 @@ OPEN = (
         (["status", "--keys", "nowhere"], "nowhere: there is no such folder of keys"),
         (["agent", "inv7", "--keys", "lab"], 'no certificate was issued to "inv7"; those of role agent: none'),
         (["agent", "inv1", "inv2", "--keys", "lab"], "--keys: agents of one process have one certificate"),
-        (
-            ["stop", "inv1", "--keys", "lab", "--as", "viewer"],
-            "viewer has the role viewer, which may look at a run (status, watch, view) and not command it; an operator "
-            "may: --as operator takes the certificate of one",
-        ),
         (["run", "islanding", "--keys", "lab"], 'lab: no certificate was issued to "inv9"'),
         (["run", "islanding", "--keys", "lab", "--driver", "inprocess"], "--keys: needs --driver processes"),
         (["run", "islanding", "--keys", "lab", "--processes", "3"], "--processes: agents of one process have one"),
