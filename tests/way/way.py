@@ -1,11 +1,11 @@
 """Follow one value through a real run, and count its way: ``python -m tests.way.way [--write]``.
 
 The run is the paper's islanding, case IV, on the in-process bus, with its codec, nodes and plant, and an emulated fault
-on every link. The value is the measurement of one agent at one tick without change of roster, and the state that
-answers it. On its way are, each once a leg, the functions of this repository that take, return or enclose it, and all
-that these call until it is handed on. Off it is what sees other agents' values alone, what happens once a tick for all
-(`advance`), and the driver that carries bytes (here a bus, between processes `wire/driver`). A comprehension belongs
-to its function; compiled code, the standard library and packages do not count.
+on every link between agents. The value is the measurement of one agent at one tick without change of roster, and the
+state that answers it. On its way are, each once a leg, the functions of this repository that take, return or enclose
+it, and all that these call until it is handed on. Off it is what sees other agents' values alone, what happens once a
+tick for all (`advance`), and the driver that carries bytes (here a bus, between processes `wire/driver`). A
+comprehension belongs to its function; compiled code, the standard library and packages do not count.
 """
 
 from __future__ import annotations
@@ -37,7 +37,8 @@ BEGIN, END = "<!-- begin: python -m tests.way.way --write -->\n", "<!-- end -->\
 TICK = 55
 """In the islanded microgrid, at t = 1.1 s."""
 
-FAULTS = tuple(Fault(on=on, loss=1e-6) for on in ("* -> *", "plant -> *", "* -> plant"))
+FAULTS = (Fault(on="* -> *", loss=1e-6),)
+"""Between agents alone: a fault of a link of the plant has the same steps as that of the leg to the neighbour."""
 
 LEGS = {
     "measurement": "sensed, sent, received; the law; the state sent",
