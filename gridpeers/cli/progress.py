@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from gridpeers.scenarios.short_texts import duration
-
 if TYPE_CHECKING:
     from gridpeers.scenarios.run_request import Progress as TellCase
 
@@ -106,16 +104,10 @@ def remaining(console: Console, total: float) -> Iterator[TellPart]:
 def _part_lines(console: Console, total: float) -> TellPart:
     """Print a line for each piece of work that begins, and for each tenth of all."""
     shown: set[tuple[str, int]] = set()
-    began: tuple[float, float] | None = None
 
     def tell(what: str, done: float) -> None:
-        nonlocal began
-        since, before = began = began or (monotonic(), done)
-        if (now := (what.partition(",")[0], int(10.0 * done / total))) in shown:
-            return
-        shown.add(now)
-        left = (monotonic() - since) / (done - before) * (total - done) if done > before else 0.0
-        words = f", about {duration(round(left))} left" if left else ""
-        console.print(f"{what}: {100.0 * done / total:.0f} % done{words}", soft_wrap=True)
+        if (now := (what.partition(",")[0], int(10.0 * done / total))) not in shown:
+            shown.add(now)
+            console.print(f"{what}: {100.0 * done / total:.0f} % done", soft_wrap=True)
 
     return tell

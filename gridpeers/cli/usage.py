@@ -46,7 +46,6 @@ PASSED, CLAIM_FAILED, BAD_INPUT, BROKEN, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 1
 OPTIONS = {
     "plant.simulator": "--plant",
     "plant.load_set": "--load-set",
-    "plant.helics.broker": "--broker",
 }
 """Options that change a key of the scenario, by this key."""
 

@@ -1,18 +1,17 @@
-"""The commands `gridpeers feeder ...`: import a feeder, check it, solve it, draw it."""
+"""The commands `gridpeers feeder ...`: import a feeder, check it, solve it, export it."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from io import BytesIO
 from pathlib import Path
 from tempfile import gettempdir
 from typing import Annotated
 
 import typer
 
-from gridpeers.cli.usage import BAD_INPUT, argument, check_choice, fail, flag, load, option, refuse
+from gridpeers.cli.usage import BAD_INPUT, argument, check_choice, fail, load, option, refuse
 from gridpeers.feeder import Feeder, reader_of
 from gridpeers.output_folders import FolderError, refusal, shown, whole_folder, write_whole
 from gridpeers.plant.equipment.connectivity import Connectivity
@@ -22,7 +21,7 @@ from gridpeers.plant.tables import FeederError, feeders
 from gridpeers.rooms import ROOMS
 from gridpeers.wire.wording import counted
 
-app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Import, check, solve, draw and export feeders.")
+app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Import, check, solve and export feeders.")
 
 FeederName = Annotated[
     str, argument("FEEDER", "A feeder that comes with gridpeers, a folder of tables, or a .dss or .glm file.")
@@ -137,27 +136,6 @@ def solve(
         typer.echo(f"neutral  {worst['V']:.2f} V to earth at most, bus {worst['bus']}, node {worst['phase']}")
     if csv is not None:
         typer.echo(f"Voltages: {shown(csv)}")
-
-
-@app.command()
-def plot(
-    feeder: FeederName,
-    out: Annotated[Path, typer.Option(help="File of the figure: .png, .svg or .pdf.")] = Path("feeder.png"),
-    voltages: Annotated[bool, flag("Colour by voltage instead of by microgrid.", "--voltages")] = False,
-    load_set: LoadSet = None,
-    switch: Switches = None,
-    leave_out: LeaveOut = None,
-) -> None:
-    """Draw a feeder's one-line diagram, on its coordinates or as a tree.
-
-    Example:  gridpeers feeder plot microgrid123 --out map.svg
-    """
-    tables = _read(feeder, load_set, switch, leave_out)
-    out, drawn = out if out.suffix else out.with_suffix(".png"), BytesIO()
-    with _problems_told(feeder, out):
-        tables.plot(voltages=voltages).savefig(drawn, dpi=130, format=out.suffix[1:].lower())
-        write_whole(out, drawn.getvalue())
-    typer.echo(f"Figure: {shown(out)}")
 
 
 @app.command()

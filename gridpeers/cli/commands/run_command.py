@@ -55,7 +55,6 @@ def run(
     ] = None,
     processes: Annotated[int, option("N", "Processes that the agents share; one an agent when left out.")] = 0,
     keys: Keys = None,
-    broker: Annotated[str | None, option("ADDRESS", "With --plant helics: the broker, tcp://127.0.0.1:23404.")] = None,
     case: Annotated[str | None, option("NAMES", "Cases to run, e.g. I,IV; all when left out.")] = None,
     seed: Annotated[int | None, option("N", "Seed instead of the one in the scenario.", min=0)] = None,
     require_checks: Annotated[
@@ -73,10 +72,7 @@ def run(
 
     Example:  gridpeers run islanding --case IV --driver inprocess
     """
-    changes = {"plant.simulator": plant, "plant.helics.broker": broker}
-    spec, feeder = load(scenario, {key: value for key, value in changes.items() if value is not None})
-    if broker is not None and spec.plant.simulator != "helics":
-        fail(["--broker: goes with a plant in a HELICS federation; add --plant helics"], BAD_INPUT)
+    spec, feeder = load(scenario, {} if plant is None else {"plant.simulator": plant})
     if port is not None and not view:
         fail(["--port: goes with a page; add --view"], BAD_INPUT)
     pace: Pace = {"clock": clock, "speed": speed, "strict": strict, "processes": processes, "keys": keys}

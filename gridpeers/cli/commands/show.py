@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from itertools import chain
 from pathlib import Path
 from typing import Annotated, Literal, get_args
@@ -113,15 +112,11 @@ def compare(
 
 
 def _names(first: Path, second: Path) -> tuple[str, str]:
-    """Return short names of two folders that differ: as much of their paths as tells them apart, rather than a time."""
-    parts, others = ([printable(part) for part in path.resolve().parts] for path in (first, second))
-    of_runs = [re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d-\d\d-\d\d(-\d+)?", path[-1]) for path in (parts, others)]
-    if all(of_runs) and parts[-2] != others[-2]:
-        return parts[-2], others[-2]
-    for count in range(1, max(len(parts), len(others)) + 1):
-        names = "/".join(parts[-count:]), "/".join(others[-count:])
-        if names[0] != names[1]:
-            return names
+    """Return short names of two folders that differ: those of their scenarios, whose runs are called by the time."""
+    folders = first.resolve(), second.resolve()
+    for a, b in (tuple(path.parent.name for path in folders), tuple(path.name for path in folders)):
+        if a != b:
+            return printable(a), printable(b)
     return "first", "second"
 
 

@@ -99,10 +99,6 @@ def test_check_says_that_a_file_can_be_run(elsewhere: Path) -> None:
             ["agent", "inv1", "inv2", "inv1"],
             "gridpeers: INVERTER: inv1 is given twice; one agent controls an inverter\n",
         ),
-        (
-            ["run", "islanding", "--case", "IV", "--plant", "helics", "--broker", "foo bar"],
-            'gridpeers: --broker: must be like tcp://127.0.0.1:23404, got "foo bar"\n',
-        ),
         (["run", "bad.toml"], "bad.toml:15: time.T_c_s: 20 s is not plausible"),
         (["check", "bad.toml"], "2 problems:"),
         (["run", "used.toml"], "cannot be listened on: address already in use"),

@@ -151,14 +151,13 @@ def test_counts_are_words_for_people(elsewhere: Path) -> None:
 
 
 def test_a_model_for_gridlabd_goes_the_same_ways(elsewhere: Path) -> None:
-    """A .glm file is checked, imported, solved and drawn, and becomes an islanding at a line near its substation."""
+    """A .glm file is checked, imported and solved, and becomes an islanding at a line near its substation."""
     Path("feeder.glm").write_text(LOADS)
     for words, text in (
         (("check", "feeder.glm", "--switch", "head"), "switch head: closed; open, it cuts off"),
         (("import", "feeder.glm", "--out", "mine"), "Tables: mine"),
         (("solve", "feeder.glm", "--csv", "model.csv"), "lowest"),
         (("solve", "mine", "--csv", "tables.csv"), "lowest"),
-        (("plot", "mine", "--voltages", "--out", "map"), "Figure: map.png"),
     ):
         code, printed = invoke("feeder", *words)
         assert code == 0, printed
@@ -181,7 +180,7 @@ def test_a_model_for_gridlabd_goes_the_same_ways(elsewhere: Path) -> None:
     (("import", "bad.txt"), "a feeder is a .dss file (OpenDSS) or a .glm file (GridLAB-D)"),
     (("check", "nothere"), "no such feeder and no such folder"),
     (("solve", "microgrid123", "--open", "sw9"), 'switch "sw9": no such switch'),
-    (("plot", "microgrid123", "--switch", "Line.l1"), "--switch and --leave-out are for .dss and .glm files"),
+    (("solve", "microgrid123", "--switch", "Line.l1"), "--switch and --leave-out are for .dss and .glm files"),
     (("solve", "microgrid123", "--load-set", "evnt2"), 'load set "evnt2": no such set; there are event2, main'),
     (("solve", "bad.dss", "--load-set", "main"), "--load-set is for a folder of tables"),
     (("import", "bad.dss"), "3 problems"),
