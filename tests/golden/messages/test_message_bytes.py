@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 from gridpeers.wire.codec import decode, encode
 from gridpeers.wire.messages import MESSAGES, Message
-from tests.golden.messages.message_values import LEAST, WHOLE, with_defaults
+from tests.golden.messages.message_values import with_defaults
+from tests.golden.messages.pin import FILE, LEAST, WHOLE, messages
 
-FILE = Path(__file__).parent / "messages.txt"
 PINNED = {
     name: bytes.fromhex(text.replace("\n", ""))
     for name, _, text in (block.partition("\n") for block in FILE.read_text(encoding="ascii").split("\n\n"))
 }
 """Bytes by type of message, and whether every field or the fewest are given."""
-VALUES = {f"{type(of).__name__} {how}": of for how, messages in (("whole", WHOLE), ("least", LEAST)) for of in messages}
+VALUES = messages()
 
 
 @pytest.mark.parametrize("name", VALUES)
@@ -32,7 +30,10 @@ def test_pinned_bytes_give_the_message(name: str) -> None:
 
 
 def test_every_type_and_every_field_is_pinned() -> None:
-    """A new type or field is pinned with its first commit: the whole messages leave nothing at its default."""
+    """A new type or field is pinned with its first commit: the whole messages leave nothing at its default.
+
+    `python -m tests.golden.messages.pin` pins it.
+    """
     assert tuple(map(type, WHOLE)) == MESSAGES
     assert [(type(message).__name__, with_defaults(message)) for message in WHOLE if with_defaults(message)] == []
     assert set(map(type, LEAST)) == {kind for kind in MESSAGES if _has_defaults(kind)}
