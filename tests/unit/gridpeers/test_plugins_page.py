@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import re
+import subprocess
+import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -15,11 +19,9 @@ PAGE = (Path(__file__).parents[3] / "docs" / "plugins.md").read_text(encoding="u
 ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
 
 
-def block(language: str) -> str:
-    """The first block of the page in a language."""
-    found = re.search(rf"```{language}\n(.*?)```", PAGE, re.S)
-    assert found
-    return found[1]
+def block(language: str, number: int = 0) -> str:
+    """A block of the page in a language."""
+    return str(re.findall(rf"```{language}\n(.*?)```", PAGE, re.S)[number])
 
 
 @pytest.mark.usefixtures("elsewhere")
@@ -40,3 +42,30 @@ def test_each_part_of_the_page_has_its_say_in_a_run(elsewhere: Path) -> None:
     (nadir,) = [it for it in gp.read("here").check_verdicts if it.check == "Nadir"]
     assert nadir.status == "passed", nadir.sentence
     assert ",fault" in (elsewhere / "here" / "IV" / "links.csv").read_text(encoding="utf-8")
+
+
+def test_a_distribution_brings_a_command_a_reader_of_feeders_and_a_simulator(tmp_path: Path) -> None:
+    """The module and the entry points of the page, as pip would install them."""
+    (tmp_path / "mine.py").write_text(block("python", 1), encoding="utf-8")
+    (tmp_path / "x.copy").write_text("ieee34\n", encoding="ascii")
+    about = tmp_path / "mine-1.0.dist-info"
+    about.mkdir()
+    project = tomllib.loads(block("toml", 1))["project"]
+    (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n")
+    points = [
+        line for group, of in project["entry-points"].items() for line in (f"[{group}]", *map(" = ".join, of.items()))
+    ]
+    (about / "entry_points.txt").write_text("\n".join(points))
+
+    def gridpeers(*words: str) -> str:
+        command = [sys.executable, "-m", "gridpeers", *words]
+        env = os.environ | {"PYTHONPATH": str(tmp_path)}
+        done = subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True, check=False)
+        assert done.returncode in (0, 1), done.stderr  # 1 says that a claim fails with other sensors
+        return done.stdout
+
+    assert gridpeers("feeder", "import", "x.copy", "--out", "y").startswith("ieee34: ")
+    gridpeers("run", "islanding", "--case", "IV", "--plant", "biased", "--driver", "inprocess", "--out", "here")
+    frequencies = [float(line.split()[1]) for line in gridpeers("nadir", "here").splitlines()[1:]]
+    assert len(frequencies) == 9
+    assert all(59.0 < f < 60.0 for f in frequencies)
