@@ -23,9 +23,9 @@ def export(
         Path | None, typer.Option(metavar="DIR", help="Folder for the files; that of each record when left out.")
     ] = None,
 ) -> None:
-    """Write rows, events and fates of messages of a run for other programs.
+    """Write a run's tables as CSV, Parquet, MATLAB or Excel files.
 
-    They come of the record run.mcap, also where the run was killed or still goes on: then they end with it, and a note
+    Rows, events and fates of messages come of the record run.mcap, also where the run was killed or still goes on: then they end with it, and a note
     says so. csv, parquet and feather have a file for each table, mat and xlsx one for all. Files of the same name are
     replaced.
 
