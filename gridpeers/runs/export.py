@@ -12,8 +12,8 @@ from typing import Literal
 import pandas as pd
 
 from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.results.case_tables import EVENTS, LINKS, event_rows, header, link_rows, write_tables
 from gridpeers.scenarios.results.run_files import FolderError, write_whole
-from gridpeers.scenarios.results.tables import EVENTS, LINKS, event_rows, header, link_rows, write_tables
 
 Format = Literal["csv", "parquet", "feather", "mat", "xlsx"]
 

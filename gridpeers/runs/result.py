@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 import shutil
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 import pandas as pd
@@ -25,7 +25,7 @@ from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.checks.judging import judge_case
 from gridpeers.scenarios.live.departures import compare
 from gridpeers.scenarios.live.live_report import live_drawing
-from gridpeers.scenarios.record.record_info import FILE, LIVE
+from gridpeers.scenarios.record.record_info import LIVE
 from gridpeers.scenarios.results.claims import Verdict, benchmark_of, judge, judged
 from gridpeers.scenarios.results.findings import Findings, find
 from gridpeers.scenarios.results.history import UNITS, History, as_they_came, windows
@@ -35,7 +35,6 @@ from gridpeers.scenarios.results.run_files import FolderError, refusal, shown, w
 from gridpeers.scenarios.results.shared_quantities import shared_frame
 from gridpeers.scenarios.schema import scenario_model as model
 from gridpeers.scenarios.schema.plugin_keys import claims_of
-from gridpeers.wire.messages import PlantEvent
 from gridpeers.wire.wording import suggestion
 
 if TYPE_CHECKING:
@@ -43,8 +42,6 @@ if TYPE_CHECKING:
 
     from gridpeers.lab.explanation.explanation import Explanation
     from gridpeers.scenarios.record.record_reader import RunRecord
-
-T = TypeVar("T")
 
 
 class _FromFolder:
@@ -112,7 +109,7 @@ class Results(_FromFolder, Mapping[str, "Result"]):
     @property
     def failures(self) -> pd.DataFrame:
         """Laws that failed, a row each: case, t (s), agent, why, and line, as "mine.py:12"; empty if none did."""
-        return frames.failures_frame({case: law_failures(result.plant_events) for case, result in self.items()})
+        return frames.failures_frame({case: law_failures(self._folder.events(case)) for case in self})
 
     @property
     def sha256(self) -> dict[str, str]:
@@ -162,10 +159,10 @@ class Results(_FromFolder, Mapping[str, "Result"]):
         spec = msgspec.structs.replace(self.spec, cases={case: self.spec.cases[case] for case in cases})
         *_, last = cases.values()  # in real time each case has its own events
         if self.driver == LIVE:
-            departures = compare(spec, self._feeder, last.plant_events, float(last.record.t[-1]))
+            departures = compare(spec, self._feeder, self._folder.events(last.case), float(last.record.t[-1]))
             return live_drawing(departures, replace(last.checked_case, scenario=spec))
         recorded = {case: result.checked_case for case, result in cases.items()}
-        return drawing_of(spec, recorded, as_they_came(spec, last.plant_events))
+        return drawing_of(spec, recorded, as_they_came(spec, self._folder.events(last.case)))
 
     def __repr__(self) -> str:
         return f"<Results {self.spec.name}: cases {', '.join(self)}; {self.driver}>"
@@ -183,7 +180,7 @@ class Result(_FromFolder):
     @cached_property
     def record(self) -> History:
         """The recorded rows as numpy arrays, by quantity."""
-        return self._recorded(lambda record: record.physics())
+        return self._folder.recorded(self.case, lambda record: record.physics())
 
     @cached_property
     def history(self) -> pd.DataFrame:
@@ -204,7 +201,7 @@ class Result(_FromFolder):
     @cached_property
     def metrics(self) -> pd.DataFrame:
         """Metrics, a row per window; nan with a reason (column `reasons`) where there is no steady value."""
-        return frames.metrics_frame(frames.windows_of(self._whole))
+        return frames.metrics_frame(frames.windows_of(self._folder.numbers_of(self.case)))
 
     @cached_property
     def islands(self) -> pd.DataFrame:
@@ -212,34 +209,27 @@ class Result(_FromFolder):
 
         An island is known by its first inverter. What is shared has no value over several islands together.
         """
-        return frames.islands_frame(frames.windows_of(self._whole))
+        return frames.islands_frame(frames.windows_of(self._folder.numbers_of(self.case)))
 
     @cached_property
     def events(self) -> pd.DataFrame:
         """Events of the plant and the agents: time t (s), kind, subject, text."""
-        return frames.events_frame(self.plant_events)
-
-    @cached_property
-    def plant_events(self) -> tuple[PlantEvent, ...]:
-        """The events as the plant sent them."""
-        return self._recorded(lambda record: record.events())
+        return frames.events_frame(self._folder.events(self.case))
 
     @property
     def failures(self) -> pd.DataFrame:
         """Laws that failed, a row each, as `Results.failures`."""
-        return frames.failures_frame({self.case: law_failures(self.plant_events)})
+        return frames.failures_frame({self.case: law_failures(self._folder.events(self.case))})
 
     @cached_property
     def links(self) -> pd.DataFrame:
         """Fate of every message on emulated links: src, dst, seq, t (s), delay (s; nan: dropped), fate."""
-        return frames.links_frame(self._recorded(lambda record: list(record.links())))
+        return frames.links_frame(self._folder.recorded(self.case, lambda record: list(record.links())))
 
-    @cached_property
+    @property
     def run_record(self) -> RunRecord:
         """The record of the case: messages, decisions with their inputs, process events (docs/recorder.md)."""
-        from gridpeers.scenarios.record.record_reader import RunRecord
-
-        return RunRecord.open(self.folder / self.case)
+        return self._folder.record(self.case)
 
     def decision(self, agent: str, t: float) -> Explanation:
         """Explain the decision of an agent that was in force at a run time (s), as `gridpeers why` does.
@@ -257,25 +247,25 @@ class Result(_FromFolder):
     @property
     def links_sha256(self) -> str:
         """SHA-256 of all fates of messages on emulated links; "" without such links."""
-        return str(self._whole.get("links_sha256", ""))
+        return str(self._folder.numbers_of(self.case).get("links_sha256", ""))
 
     @property
     def disturbed(self) -> list[str]:
         """Windows of a run in real time in which something happened that the scenario does not tell."""
-        return list(self._whole.get("disturbed", ()))
+        return list(self._folder.numbers_of(self.case).get("disturbed", ()))
 
     @cached_property
     def checked_case(self) -> CheckedCase:
         """The case as metrics and checks see it: what a check of one's own is called with."""
-        measured = frames.windows_of(self._whole)  # a live run need not reach all events
-        came = windows(as_they_came(self.spec, self.plant_events), self.spec.time.end_s)
+        measured = frames.windows_of(self._folder.numbers_of(self.case))  # a live run need not reach all events
+        came = windows(as_they_came(self.spec, self._folder.events(self.case)), self.spec.time.end_s)
         return CheckedCase(
             scenario=self.spec,
             feeder=self._feeder,
             case=self.case,
             history=self.record,
             windows=[window for window in came if window.label in measured],
-            events=self.plant_events,
+            events=self._folder.events(self.case),
             messages_saved={label: of["messages_saved"] for label, of in measured.items() if of.get("messages_saved")},
             folder=self.folder / self.case,
         )
@@ -307,23 +297,6 @@ class Result(_FromFolder):
     def save(self, folder: str | Path) -> Path:
         """Write the run folder as the command does, with all cases of the run; see `Results.save`."""
         return self._run.save(folder)
-
-    def _recorded(self, read: Callable[[RunRecord], T]) -> T:
-        """Read something from the record, which a run that came to its end has whole."""
-
-        def whole(file: Path) -> T:
-            record = self.run_record
-            found = read(record)
-            if record.damage:
-                raise ValueError(record.damage[0])
-            return found
-
-        return self._folder.read(f"{self.case}/{FILE}", whole)
-
-    @property
-    def _whole(self) -> dict[str, Any]:
-        """The content of metrics.json on the case."""
-        return self.numbers["cases"][self.case]  # type: ignore[no-any-return]
 
     def __repr__(self) -> str:
         return f"<Result {self.spec.name} {self.case}: {self.driver}; history {self.sha256[:12]}>"

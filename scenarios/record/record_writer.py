@@ -33,7 +33,7 @@ from gridpeers.scenarios.record.record_info import (
     Topic,
     channels,
 )
-from gridpeers.scenarios.results.tables import QUANTITIES
+from gridpeers.scenarios.results.case_tables import QUANTITIES
 from gridpeers.wire.codec import payload_of
 from gridpeers.wire.messages import Journal, LinkReport, LinkRequest, PlantEvent, Telemetry
 

@@ -10,9 +10,9 @@ from typing import NamedTuple
 from gridpeers.agents.graphs import GraphError, in_neighbours
 from gridpeers.netem.schema.pattern import Link
 from gridpeers.plant.equipment import Feeder, InverterRow
+from gridpeers.scenarios.results.case_tables import QUANTITIES
 from gridpeers.scenarios.results.metrics_file import Clock
 from gridpeers.scenarios.results.run_files import FolderError, shown
-from gridpeers.scenarios.results.tables import QUANTITIES
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.scenarios.schema.configs import configs
 from gridpeers.scenarios.schema.participants import inverters_of, netem_of, setup_of, with_agent

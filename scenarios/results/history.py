@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gridpeers.plant.equipment import Feeder, InverterRow
-from gridpeers.scenarios.results.tables import QUANTITIES
+from gridpeers.scenarios.results.case_tables import QUANTITIES
 from gridpeers.scenarios.schema.participants import with_agent
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.wire.messages import PlantEvent

@@ -14,8 +14,8 @@ from struct import pack
 from typing import TYPE_CHECKING
 
 from gridpeers.netem.ledger import LinkTrace
+from gridpeers.scenarios.results.case_tables import write_tables
 from gridpeers.scenarios.results.link_record import LinkRecord
-from gridpeers.scenarios.results.tables import write_tables
 from gridpeers.wire.messages import Journal, LinkReport, LinkRequest, PlantEvent, Telemetry
 
 if TYPE_CHECKING:

@@ -25,9 +25,9 @@ def export(
 ) -> None:
     """Write a run's tables as CSV, Parquet, MATLAB or Excel files.
 
-    Rows, events and fates of messages come of the record run.mcap, also where the run was killed or still goes on: then they end with it, and a note
-    says so. csv, parquet and feather have a file for each table, mat and xlsx one for all. Files of the same name are
-    replaced.
+    Rows, events and fates of messages come of the record run.mcap, also where the run was killed or still goes on: then
+    they end with it, and a note says so. csv, parquet and feather have a file for each table, mat and xlsx one for all.
+    Files of the same name are replaced.
 
     Exit code: 0 they were written, 2 bad usage, no record, no rows, or a folder that cannot be written.
 

@@ -15,11 +15,11 @@ from gridpeers.netem.receiver import Receiver
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.scenarios.emulation.link_data import report_data
-from gridpeers.scenarios.results import tables
+from gridpeers.scenarios.results import case_tables
+from gridpeers.scenarios.results.case_tables import LINKS, write_tables
 from gridpeers.scenarios.results.history import History
 from gridpeers.scenarios.results.link_record import LinkRecord
 from gridpeers.scenarios.results.record import Recorder
-from gridpeers.scenarios.results.tables import LINKS, write_tables
 from gridpeers.wire.messages import LinkReport, Telemetry
 
 NO_ROWS = History.of((), b"")
@@ -104,7 +104,7 @@ def test_the_line_of_the_report_says_whose_states_were_false(tmp_path: Path) -> 
 
 def test_verdicts_are_sorted_by_link_and_take_no_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A run of hours with faults has millions of them, reported as they come; equal runs give equal files."""
-    monkeypatch.setattr(tables, "_SPOOL", 10_000)
+    monkeypatch.setattr(case_tables, "_SPOOL", 10_000)
 
     def reported() -> Iterator[LinkTrace]:
         for first in range(0, 20_000, 100):
