@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import signal
 from contextlib import nullcontext
+from pathlib import Path
 from types import SimpleNamespace
-from typing import cast
+from typing import Any, cast
 
+import msgspec
 import pytest
 from msgspec.structs import replace
 
@@ -15,10 +17,14 @@ from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.plant.known_names import COMPILING, LISTENING
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
-from gridpeers.scenarios.live import live_processes
-from gridpeers.scenarios.live.live_processes import UNHEARD, LiveRecorder, _followed, meaning
+from gridpeers.scenarios.live import live_processes, live_report
+from gridpeers.scenarios.live.live_files import folders
+from gridpeers.scenarios.live.live_processes import UNHEARD, LiveRecorder, ProcessOutcome, _followed, meaning
 from gridpeers.scenarios.live.run_address import RunAddress, UsageError
 from gridpeers.scenarios.live.run_requests import own_code
+from gridpeers.scenarios.results.metrics_file import RunMetrics
+from gridpeers.scenarios.results.record import Recorded
+from gridpeers.scenarios.schema import load_scenario
 from gridpeers.wire.driver.drive import StoppedError
 from gridpeers.wire.driver.ending import SAME_REQUEST_TIME, StopSignal
 from gridpeers.wire.plugins.plugin import Plugin
@@ -131,3 +137,24 @@ def test_a_run_of_which_nothing_was_heard_has_failed() -> None:
     outcome = _followed(cast("LiveRecorder", DeafRecorder()), lambda: "", StopSignal(StoppedError))
 
     assert outcome.broke == UNHEARD
+
+
+def test_a_run_that_is_interrupted_while_it_is_judged_has_its_scenario(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its numbers are missing; the scenario that it began with can be run again."""
+
+    def interrupted(*words: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(live_report, "write_report", interrupted)
+    scenario, _ = load_scenario("islanding")
+    scenario = msgspec.structs.replace(scenario, cases={"IV": scenario.cases["IV"]})
+    outcome = ProcessOutcome(recorded=cast(Recorded, SimpleNamespace(ended=2.01)))
+    with folders(tmp_path / "live", scenario) as kept:
+        assert kept.whole == tmp_path / "live"
+        ended = live_report.conclude(outcome, cast(RunMetrics, SimpleNamespace(scenario=scenario, folder=kept.whole)))
+
+    assert load_scenario(tmp_path / "live" / "scenario.toml")[0] == scenario
+    assert ended.interrupted == "SIGINT"
+    assert (tmp_path / "live" / "status.txt").read_text() == "broken: interrupted while its numbers were made\n"

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
+import threading
+from pathlib import Path
 
 import pytest
 
+from gridpeers.wire.driver.command_line import command_line
 from gridpeers.wire.driver.drive import StoppedError
 from gridpeers.wire.driver.ending import SAME_REQUEST_TIME, StopSignal, stop_at_signals
+from gridpeers.wire.driver.machine import schedule_as_batch
 
 
 def test_what_follows_at_once_is_the_same_request() -> None:
@@ -56,3 +61,52 @@ leave(3)
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=30.0)
 
     assert (done.returncode, done.stdout.strip()) == (3, "done")
+
+
+def test_a_program_that_is_not_found_by_its_name_has_its_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without an active environment; with one nobody types a path, and from Python a command has its name."""
+    for name in ("gridpeers", "pytest"):
+        (tmp_path / name).write_text("#!/bin/sh\n")
+        (tmp_path / name).chmod(0o755)
+    monkeypatch.setenv("PATH", "/usr/bin:/bin")
+    monkeypatch.chdir(tmp_path)
+    for called in ("./gridpeers", str(tmp_path / "gridpeers")):
+        monkeypatch.setattr(sys, "argv", [called])
+        assert command_line("run", "a b") == f"{tmp_path}/gridpeers run 'a b'"
+        assert command_line(program="pytest") == f"{tmp_path}/pytest"
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert command_line("run", "a b") == "gridpeers run 'a b'"
+    monkeypatch.setattr(sys, "argv", ["/somewhere/notebook.py"])
+    assert command_line("down") == "gridpeers down"
+
+
+with_policies = pytest.mark.skipif(not hasattr(os, "SCHED_BATCH"), reason="this system knows no such policy")
+
+
+def policies(before: int) -> tuple[int, int]:
+    found: list[int] = []
+
+    def thread() -> None:
+        os.sched_setscheduler(0, before, os.sched_param(0))
+        schedule_as_batch()
+        found.append(os.sched_getscheduler(0))
+        inner = threading.Thread(target=lambda: found.append(os.sched_getscheduler(0)))
+        inner.start()
+        inner.join()
+
+    outer = threading.Thread(target=thread)
+    outer.start()
+    outer.join()
+    return found[0], found[1]
+
+
+@with_policies
+def test_a_thread_and_those_it_starts_become_batch_work() -> None:
+    """Zenoh's threads, which start later, are scheduled as the agent that opens the session."""
+    assert policies(os.SCHED_OTHER) == (os.SCHED_BATCH, os.SCHED_BATCH)
+
+
+@with_policies
+def test_a_policy_that_the_user_has_chosen_stays() -> None:
+    """A run under `chrt --idle` stays in the background."""
+    assert policies(os.SCHED_IDLE) == (os.SCHED_IDLE, os.SCHED_IDLE)

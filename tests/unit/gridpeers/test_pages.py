@@ -1,5 +1,8 @@
-"""What the README tells to type and to write works as it stands."""
+"""What the README and the pages on Python and plug-ins tell to type and to write works as it stands."""
 
+from __future__ import annotations
+
+import doctest
 import re
 import shlex
 import tomllib
@@ -10,6 +13,7 @@ from typing import Any
 import pytest
 import typer
 
+import gridpeers as gp
 from gridpeers.cli.root import app
 from gridpeers.scenarios.catalogue_files import CATALOGUE
 from gridpeers.scenarios.schema import load_scenario
@@ -75,3 +79,53 @@ def test_a_row_whose_command_needs_an_extra_tells_to_install_it(
             missing.append(code == 2 and "gridpeers[sweep]" in said)
 
     assert ("'.[sweep]'" in row) == any(missing)
+
+
+ROOT = Path(__file__).parents[3]
+PAGES = ("README.md", "docs/python.md")
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_a_session_is_shown_as_it_goes(page: str) -> None:
+    """Every line that is typed gives what stands below it."""
+    text = (ROOT / page).read_text(encoding="utf-8")
+    blocks = "\n".join(re.findall(r"```pycon\n(.*?)```", text, re.S))
+    flags = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
+    test = doctest.DocTestParser().get_doctest(blocks, {}, page, page, 0)
+    said: list[str] = []
+
+    failed, tried = doctest.DocTestRunner(optionflags=flags).run(test, out=said.append)
+
+    assert tried >= 7
+    assert failed == 0, "".join(said)
+
+
+PAGE = (Path(__file__).parents[3] / "docs" / "plugins.md").read_text(encoding="utf-8")
+ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
+
+
+def block(language: str) -> str:
+    """The first block of the page in a language."""
+    found = re.search(rf"```{language}\n(.*?)```", PAGE, re.S)
+    assert found
+    return found[1]
+
+
+@pytest.mark.usefixtures("elsewhere")
+def test_each_part_of_the_page_has_its_say_in_a_run(elsewhere: Path) -> None:
+    """The module and the scenario of the page beside each other: metric, claim and check judge, the fault drops."""
+    own = block("toml")
+    top, case = own[: own.index("[case.IV]")], own[own.index("[case.IV]") :]
+    until_case = ISLANDING.partition('[[event]]\nlabel = "event2"')[0].replace('paper = "islanding"', "")
+    (elsewhere / "mine.py").write_text(block("python"), encoding="utf-8")
+    text = f"{top}\n{until_case.replace('end_s = 7.0', 'end_s = 2.0')}\n{case}"
+    (elsewhere / "mine.toml").write_text(text, encoding="utf-8")
+
+    code, text = invoke("run", "mine.toml", "--driver", "inprocess", "--out", "here")
+
+    assert code in (0, 1), text  # 1 says that the claim fails in so short a run
+    assert re.search(r"(PASS|FAIL) .*Frequency and sharing are back within 1 s", text), text
+    assert "f_min_Hz" in text
+    (nadir,) = [it for it in gp.read("here").check_verdicts if it.check == "Nadir"]
+    assert nadir.status == "passed", nadir.sentence
+    assert ",fault" in (elsewhere / "here" / "IV" / "links.csv").read_text(encoding="utf-8")
