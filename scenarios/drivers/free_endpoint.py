@@ -20,11 +20,7 @@ to the agents, which start with the plant: for listening, or as the near end of 
 
 
 class ListenError(ValueError):
-    """Nobody can listen at an endpoint, e.g. because it is `in_use`; the message gives the reason and the ways out."""
-
-    def __init__(self, text: str, *, in_use: bool = False) -> None:
-        super().__init__(text)
-        self.in_use = in_use
+    """Nobody can listen at an endpoint; the message gives the reason and the ways out."""
 
 
 class ZenohEndpoint(NamedTuple):
@@ -74,8 +70,7 @@ def free_endpoint(text: str = "tcp/127.0.0.1:0", *, option: str = "listen") -> s
         return str(endpoint._replace(port=port))
     raise ListenError(
         f"{option}: {text} cannot be listened on: {(reason.strerror or str(reason)).lower()}; "
-        f"{_way_out(endpoint.host, reason)}",
-        in_use=reason.errno == errno.EADDRINUSE,
+        f"{_way_out(endpoint.host, reason)}"
     )
 
 

@@ -8,19 +8,14 @@ from msgspec.structs import replace
 from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.plant_config import PlantConfig
-from gridpeers.scenarios.drivers.free_endpoint import ListenError, free_endpoint
 from gridpeers.scenarios.live.feeder_map import feeder_map
 from gridpeers.scenarios.live.run_address import (
     LONGEST_TIME,
-    RUN,
     Access,
     RunAddress,
     UsageError,
-    accepting,
     check_duration,
-    check_endpoint,
     check_wait,
-    loopback_of,
 )
 from gridpeers.scenarios.live.run_client import RunClient
 from gridpeers.scenarios.run_request import SPEEDS
@@ -34,25 +29,6 @@ from gridpeers.wire.trust.credentials import Credentials
 from gridpeers.wire.wording import suggestion
 
 LOOKING = 1.5
-
-
-def endpoint_for_run(listen: str, access: Access) -> str:
-    """Return the endpoint where a plant will be able to listen, a free port for port 0.
-
-    UsageError if it is no endpoint, or something answers there; ListenError if it cannot be listened on.
-    """
-    try:
-        return free_endpoint(check_endpoint("--listen", listen), option="--listen")
-    except ListenError as error:
-        where = loopback_of(listen)
-        if not (error.in_use and accepting((where,))):
-            raise
-        found_by = RunAddress(run=RUN, connect=(where,), access=access).words
-        status, down = command_line("status", *found_by), command_line("down", *found_by)
-        raise UsageError(
-            f"{error}; if it is a run, {status} shows it and {down} ends it, or give this one a name and a port of its "
-            "own, by --run and --listen"
-        ) from None
 
 
 def check_alone(

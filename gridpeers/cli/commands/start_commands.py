@@ -21,6 +21,7 @@ from gridpeers.cli.commands.options import (
     opened,
 )
 from gridpeers.cli.usage import ScenarioName, chosen, flag, load, option
+from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
 from gridpeers.scenarios.live.run_address import (
     ENDPOINT,
     RUN,
@@ -58,7 +59,7 @@ class Start:
 
 def _start(start: Start, *, agents: bool) -> None:
     """Run the plant, with its agents or without, until it ends; end with its exit code."""
-    from gridpeers.scenarios.live.live_options import check_alone, chosen_case, configure, endpoint_for_run
+    from gridpeers.scenarios.live.live_options import check_alone, chosen_case, configure
 
     # first: reading a scenario takes seconds, and a forgotten run is reported at once
     run = check_name("--run", start.run)
@@ -67,7 +68,7 @@ def _start(start: Start, *, agents: bool) -> None:
     listen = with_protocol(check_endpoint("--listen", start.listen), keys=start.keys is not None, default=ENDPOINT)
     for name, text in (("--listen", listen), *(("--connect", text) for text in beyond)):
         check_open(name, text, access)
-    endpoint = endpoint_for_run(listen, access)
+    endpoint = free_endpoint(listen, option="--listen")
     check_alone(run, beyond, credentials, access)
 
     from gridpeers.scenarios.live.live_files import folders, live_record

@@ -141,7 +141,7 @@ def test_what_is_not_there_is_told_in_one_line(desk: Desk) -> None:
         assert re.search(what, errors[0])
         assert "Traceback" not in text
     assert second.end() == 2
-    assert "address already in use; end what uses it; if it is a run, gridpeers status --connect " in second.text
+    assert "address already in use; end what uses it (gridpeers down ends a live run" in second.text
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds the children in /proc")
