@@ -33,7 +33,7 @@ from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.scenarios.results.record import Recorded, Recorder, RecordError
 from gridpeers.scenarios.short_texts import short
 from gridpeers.wire.driver.drive import StoppedError
-from gridpeers.wire.driver.ending import StopSignal, stop_at_signals
+from gridpeers.wire.driver.ending import stop_at_signals
 from gridpeers.wire.driver.machine import keep_out_of_the_heap
 from gridpeers.wire.messages import PLANT, Pacing, PlantEvent, Telemetry
 from gridpeers.wire.timing import RateLimit
@@ -93,7 +93,6 @@ class LiveRecorder:
         self.recorded: Recorded | None = None
         self.failure = ""
         self.failed_laws: dict[str, PlantEvent] = {}
-        self.cut_short = ""
         self._limit = RateLimit()
         self.client: TelemetryClient
         self._thread = threading.Thread(target=self._follow, daemon=True)
@@ -133,8 +132,7 @@ class LiveRecorder:
         if recorder.count < 2:
             say("nothing was recorded, so there are no numbers")
         elif not self.client.ended:
-            why = self.cut_short or "then no word came of the plant"
-            say(text := f"the record ends at {recorder.ended:.2f} s: {why}")
+            say(text := f"the record ends at {recorder.ended:.2f} s, without the plant's last message")
             self.failure = self.failure or text
         else:
             self.recorded = recorder.finish(recorder.ended, recorder.record_step)
@@ -188,7 +186,7 @@ def meaning(word: str, config: PlantConfig) -> str:
 
 
 def plant_here(config: PlantConfig, folder: Path | None, record: RecordInfo) -> ProcessOutcome:
-    requests = stop_at_signals(StoppedError)
+    stop_at_signals(StoppedError)
     _log()
     config = with_recorder(config, waits=folder is not None)
 
@@ -197,7 +195,7 @@ def plant_here(config: PlantConfig, folder: Path | None, record: RecordInfo) -> 
             say(meaning(word, config))
 
     recorder = LiveRecorder(config, folder, record, silent=LOGGED)
-    outcome = _followed(recorder, lambda: run_plant(config, make_links=links_of, on_word=on_word), requests)
+    outcome = _followed(recorder, lambda: run_plant(config, make_links=links_of, on_word=on_word))
     if outcome.interrupted:  # else the plant has said it
         _say_end(recorder, config)
     return outcome
@@ -211,7 +209,7 @@ def all_here(
     record: RecordInfo,
 ) -> ProcessOutcome:
     """Run the plant and its agents, but for spare ones, as processes of their own, until the run ends."""
-    requests = stop_at_signals(StoppedError)
+    stop_at_signals(StoppedError)
     config = with_recorder(config, waits=folder is not None)
     endpoint, listen = loopback_of(config.listen[0]), return_path(config.listen)
     over = threading.Event()
@@ -250,7 +248,7 @@ def all_here(
     configs = [replace(agent, connect=(endpoint,), listen=listen) for agent in agents]
     supervisor = Supervisor(config, configs, logs, on_exit, on_word)
     recorder = LiveRecorder(config, folder, record)
-    outcome = _followed(recorder, run, requests)
+    outcome = _followed(recorder, run)
     _say_end(recorder, config)
     return outcome
 
@@ -286,16 +284,11 @@ def agent_here(
         return ProcessOutcome(interrupted=_signal_of(stop))
 
 
-def _followed(recorder: LiveRecorder, run: Callable[[], str], requests: StopSignal) -> ProcessOutcome:
+def _followed(recorder: LiveRecorder, run: Callable[[], str]) -> ProcessOutcome:
     broke = interrupted = ""
     try:
         with recorder:
-            try:
-                broke = run()
-            except (StoppedError, KeyboardInterrupt) as stop:
-                if requests.requests > 1:
-                    recorder.cut_short = f"{_signal_of(stop)} came again before the plant had ended"
-                raise
+            broke = run()
         broke = broke or recorder.failure or ("" if recorder.client.latest else UNHEARD)
     except (StoppedError, KeyboardInterrupt) as stop:
         interrupted = _signal_of(stop)

@@ -41,19 +41,17 @@ class StopSignal:
     def __init__(self, error: Callable[[str], BaseException], clock: Callable[[], float] = monotonic) -> None:
         self._error, self._clock = error, clock
         self._at = -inf
-        self.requests = 0
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
         now = self._clock()
         if now - self._at >= SAME_REQUEST_TIME:
             self._at = now
-            self.requests += 1
             name = signal.Signals(number).name
             raise KeyboardInterrupt(name) if number == signal.SIGINT else self._error(name)
 
 
-def stop_at_signals(error: Callable[[str], BaseException]) -> StopSignal:
-    """Have SIGINT and SIGTERM raise in the main thread; return their handler.
+def stop_at_signals(error: Callable[[str], BaseException]) -> None:
+    """Have SIGINT and SIGTERM raise in the main thread, by one handler.
 
     A SIGINT that is ignored stays so: a shell ignores it for a program in the background.
     """
@@ -61,7 +59,6 @@ def stop_at_signals(error: Callable[[str], BaseException]) -> StopSignal:
     signal.signal(signal.SIGTERM, stop)
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, stop)
-    return stop
 
 
 READER_GONE = 128 + signal.SIGPIPE

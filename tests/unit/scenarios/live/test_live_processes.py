@@ -1,12 +1,11 @@
-"""What a live run's terminal shows and refuses, and how a second Ctrl-C cuts it short."""
+"""What a live run's terminal shows and refuses."""
 
 from __future__ import annotations
 
-import signal
 from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any, ClassVar, cast
 
 import msgspec
 import pytest
@@ -25,8 +24,6 @@ from gridpeers.scenarios.live.run_requests import own_code
 from gridpeers.scenarios.results.metrics_file import RunMetrics
 from gridpeers.scenarios.results.record import Recorded
 from gridpeers.scenarios.schema import load_scenario
-from gridpeers.wire.driver.drive import StoppedError
-from gridpeers.wire.driver.ending import SAME_REQUEST_TIME, StopSignal
 from gridpeers.wire.plugins.plugin import Plugin
 from tests.toy.toy_configs import agent_config, toy_configs
 
@@ -88,53 +85,22 @@ def test_code_of_a_plant_on_another_host_is_run_only_if_it_is_trusted(
     assert ran == (["inv1"] if runs else [])
 
 
-class CutRecorder:
-    """A recorder to which the plant's last message never came."""
-
-    def __init__(self) -> None:
-        self.cut_short = self.failure = ""
-        self.recorded, self.client = None, SimpleNamespace(pacing=None, latest=None)
-        self.failed_laws: dict[str, object] = {}
-
-    def __enter__(self) -> CutRecorder:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.failure = f"the record ends at 9.20 s: {self.cut_short or 'then no word came of the plant'}"
-
-
-@pytest.mark.parametrize(
-    ("later", "why"),
-    [
-        (0.5 * SAME_REQUEST_TIME, "then no word came of the plant"),
-        (SAME_REQUEST_TIME, "SIGINT came again before the plant had ended"),
-    ],
-)
-def test_a_record_that_a_second_ctrl_c_cuts_short_says_so(later: float, why: str) -> None:
-    """The plant is not blamed for what the user asked for; a second signal at once is the first one's twin."""
-    times = [5.0, 5.0 + later]
-    requests = StopSignal(StoppedError, lambda: times.pop(0))
-
-    def run() -> str:
-        try:
-            requests(signal.SIGINT, None)
-        finally:  # as processes are ended
-            requests(signal.SIGINT, None)
-        return ""
-
-    outcome = _followed(cast("LiveRecorder", CutRecorder()), run, requests)
-
-    assert (outcome.interrupted, outcome.broke) == ("SIGINT", f"the record ends at 9.20 s: {why}")
-
-
 def test_a_run_of_which_nothing_was_heard_has_failed() -> None:
     """Its plant ended well by its own account: no link to it was made, so nobody knows what it did."""
 
-    class DeafRecorder(CutRecorder):
+    class DeafRecorder:
+        """A recorder to which nothing came."""
+
+        failure, recorded, client = "", None, SimpleNamespace(pacing=None, latest=None)
+        failed_laws: ClassVar[dict[str, object]] = {}
+
+        def __enter__(self) -> DeafRecorder:
+            return self
+
         def __exit__(self, *_: object) -> None:
             """End as a recorder that writes no files."""
 
-    outcome = _followed(cast("LiveRecorder", DeafRecorder()), lambda: "", StopSignal(StoppedError))
+    outcome = _followed(cast("LiveRecorder", DeafRecorder()), lambda: "")
 
     assert outcome.broke == UNHEARD
 
