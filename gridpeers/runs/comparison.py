@@ -34,12 +34,11 @@ def compare(a: RunSource, b: RunSource, *, names: tuple[str, str] = ("a", "b")) 
 
     Of runs with several cases, those are compared that both have; two single cases whatever they are called.
     """
-    words = tuple(names) if isinstance(names, list | tuple) else ()
-    if len(words) != 2 or words[0] == words[1] or not all(isinstance(word, str) and word for word in words):
+    if names[0] == names[1]:
         raise ScenarioError([f'names: two different words are needed, as ("before", "after"), got {names!r:.60}'])
     first, second = map(_cases_of, (a, b))
     if len(first) == len(second) == 1:
-        return Comparison({"": (*first.values(), *second.values())}, (words[0], words[1]))  # type: ignore[dict-item]
+        return Comparison({"": (*first.values(), *second.values())}, names)  # type: ignore[dict-item]
     both = [case for case in first if case in second]
     if not both:
         raise ScenarioError(
@@ -49,7 +48,7 @@ def compare(a: RunSource, b: RunSource, *, names: tuple[str, str] = ("a", "b")) 
                 f'gridpeers.compare(a["{next(iter(first))}"], b["{next(iter(second))}"])'
             ]
         )
-    return Comparison({case: (first[case], second[case]) for case in both}, (words[0], words[1]))
+    return Comparison({case: (first[case], second[case]) for case in both}, names)
 
 
 def _cases_of(run: RunSource) -> Mapping[str, Result]:

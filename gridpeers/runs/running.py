@@ -22,7 +22,6 @@ from gridpeers.scenarios.schema.configs import as_in
 from gridpeers.scenarios.schema.loading import read_tables, read_toml
 from gridpeers.scenarios.schema.plugin_keys import check_portable
 from gridpeers.scenarios.schema.scenario_errors import Problems
-from gridpeers.wire.wording import suggestion
 
 if TYPE_CHECKING:
     from gridpeers.scenario import Scenario
@@ -45,14 +44,8 @@ def run(
     **pace: Unpack[Pace],
 ) -> Results:
     """Run some cases of a scenario, or all, into a folder of their own; see `gridpeers.Scenario.run`."""
-    words = How.__annotations__
-    for name in pace:
-        if name not in words:
-            raise TypeError(f'run has no argument "{name}"; {suggestion(name, words, "arguments")}')
     spec = with_cases(scenario.spec, cases)
     check_how(driver, pace, spec)
-    if progress is not None and not callable(progress):
-        raise ScenarioError([f"progress: must be a function of a case and two times, got {progress!r:.60}"])
     if driver == "processes" and (wrong := check_portable(spec)):
         raise ScenarioError(wrong)
     sizes = file_sizes(spec, scenario.feeder, clock=pace.get("clock", "simulated"))

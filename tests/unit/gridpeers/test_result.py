@@ -127,7 +127,7 @@ def test_a_file_of_a_run_that_was_spoilt_is_named(run: gp.Result, tmp_path: Path
 
 def test_a_folder_of_any_name_is_read_and_compared(run: gp.Result, tmp_path: Path) -> None:
     """A name has bytes, and they need not be UTF-8; a table has them as escapes."""
-    folder = Path(shutil.copytree(run.folder, tmp_path / os.fsdecode(b"r\xff")))
+    folder = Path(shutil.copytree(run.folder, tmp_path / os.fsdecode(b"r\xff") / "run"))
 
     assert gp.read(folder).sha256 == run.sha256
     code, text = invoke("compare", str(folder), str(run.folder), "--out", str(tmp_path / "c.svg"))

@@ -60,8 +60,8 @@ def test_all_problems_of_a_sweep_come_before_the_first_run(scenario: gp.Scenario
         gp.sweep(scenario, {"gains.kp": [1.0], "time.T_c_s": ["x", 0.02]})
     assert "sweep: grid.gains.kp: unknown key" in str(caught.value)
     assert 'grid.time.T_c_s: must be a number, got "x"' in str(caught.value)
-    with pytest.raises(gp.ScenarioError, match=r"sweep: grid\.gains\.k_p: needs a list of values, got 3"):
-        gp.sweep(scenario, {"gains.k_p": 3}, seeds="two")  # type: ignore[dict-item, arg-type]
+    with pytest.raises(gp.ScenarioError, match=r"sweep: grid\.case\.IV\.graph: needs a list of values, got 'ring'"):
+        gp.sweep(scenario, {"case.IV.graph": "ring"})
     with pytest.raises(gp.ScenarioError, match="needs a scenario, its name or its path, got 3"):
         gp.sweep(3, {"gains.k_p": [0.001]})  # type: ignore[arg-type]
     with pytest.raises(gp.ScenarioError, match="nothing is varied"):
