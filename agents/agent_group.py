@@ -3,7 +3,7 @@
 Where no link is emulated and no agent joins, leaves or dies, messages decide nothing: at tick k an agent has the
 measurement of tick k and the states of tick k-1 of its in-neighbours, however they came. So the agents of one process
 can share one board with the last state of each, instead of a message, its checks and a copy for each link.
-`gridpeers.agents.lockstep_agent` takes the same decisions with messages; a process has no other way.
+`gridpeers.agents.agent_node` takes the same decisions with messages; a process has no other way.
 """
 
 from __future__ import annotations

@@ -1,119 +1,141 @@
-"""An agent as a node: the common part of both kinds of time. Pure.
+"""One agent as a participant of a run, under either kind of time. Pure.
 
-The node meets the other agents by their tokens and nameplates, and listens to its in-neighbours by the run's graph. It
-passes their states through the emulated links, if there are any, and reports these to the plant.
-`gridpeers.agents.lockstep_agent` and `gridpeers.agents.realtime_agent` decide when it ticks.
+The node meets the other agents, hears its in-neighbours by the run's graph, passes their states through the emulated
+links, if there are any, and sends what the agent decides. Its tick policy says when it ticks, with what, and what
+follows if something is late: `gridpeers.agents.tick_barrier` in simulated time, `gridpeers.agents.tick_timer` in real
+time. Its phases:
+
+- *seeking*: there is no plant.
+- *waiting*: there is no measurement, or no recent one.
+- *meeting*: in simulated time, the agent gets ready for a roster.
+- *running*: the agent ticks. In real time it begins with the set-points that its measurement shows: those that the
+  plant holds for it.
+- *leaving*: its last accounts are on their way; in real time the plant takes its inverter off the network.
+- *over*.
 """
 
 from __future__ import annotations
 
-from math import inf
+from collections.abc import Callable
 
 from gridpeers.agents.agent import Agent
 from gridpeers.agents.agent_config import AgentConfig, check_nameplate
+from gridpeers.agents.decision_journal import DecisionJournal
 from gridpeers.agents.laws.law import Law
+from gridpeers.agents.neighbours import Hearing, OpenMeeting
+from gridpeers.agents.roster_meeting import KnownAgents, RosterMeeting
+from gridpeers.agents.session_health import SessionHealth
+from gridpeers.agents.tick_barrier import AgentBarrier
+from gridpeers.agents.tick_timer import AgentTimer
+from gridpeers.agents.upkeep import Upkeep
 from gridpeers.wire.codec import RejectedError, encode
+from gridpeers.wire.journal import JournalBuffer, TimedTraffic
 from gridpeers.wire.links import Links
-from gridpeers.wire.membership import Membership, arrived, is_usable
-from gridpeers.wire.messages import PLANT, Measurement, Nameplate, State, Stop
+from gridpeers.wire.membership import arrived, is_usable
+from gridpeers.wire.messages import PLANT, LinkRequest, Measurement, Prepare, State, Stop, Waiting
+from gridpeers.wire.phases import Phases, PhaseTable
 from gridpeers.wire.post import FollowedPlant, Post, Route
 
+_ENDS = {"leave": "leaving", "end": "over"}
 
-class NeighbourStates:
-    """Keep the own last measurement and each neighbour's last state that the links delivered.
+AGENT_PHASES: PhaseTable = {
+    "seeking": {"plant appeared": "waiting", **_ENDS},
+    "waiting": {"measured": "running", "roster": "meeting", "plant gone": "seeking", "new session": "seeking", **_ENDS},
+    "meeting": {"roster": "meeting", "ready": "waiting", **_ENDS},
+    "running": {"held": "waiting", "roster": "meeting", "new session": "seeking", **_ENDS},
+    "leaving": {"end": "over"},
+    "over": {},
+}
 
-    Times are run time (s). Simulated time takes them from the ticks. In real time the agent counts them on its own
-    clock, from an origin of its own.
-    """
-
-    def __init__(self) -> None:
-        self._states: dict[str, tuple[State, float]] = {}
-        self.measurement: Measurement | None = None
-        self._measured_at = 0.0
-
-    def keep(self, message: State | Measurement, at: float) -> None:
-        if isinstance(message, State):
-            self._states[message.sender] = message, at
-        else:
-            self.measurement, self._measured_at = message, at
-
-    @property
-    def t(self) -> float:
-        return 0.0 if self.measurement is None else self.measurement.t
-
-    def measured(self, at: float, max_age: float) -> Measurement | None:
-        """Return the own measurement if it arrived at most `max_age` (s) ago, else None."""
-        return None if round(at - self._measured_at, 9) > max_age else self.measurement
-
-    def age(self, name: str, at: float) -> float:
-        """Return the age of a neighbour's last state (s); infinite if there is none.
-
-        It is the greater of the time since its arrival, and of its own time before the own measurement's.
-        """
-        if name not in self._states:
-            return inf
-        state, arrived_at = self._states[name]
-        return max(at - arrived_at, self.t - state.t)
-
-    def forget(self, name: str) -> None:
-        self._states.pop(name, None)
-
-    def clear(self) -> None:
-        self._states.clear()
-        self.measurement = None
-
-
-_KEPT = State, Measurement
-"""Messages that links deliver and a node keeps: as a tuple, for a union would be made anew for every message."""
+JOURNAL_PERIOD = 0.2
+"""Longest time (s) until a part of the journal is sent in simulated time, where emulated links change all the time how
+the agent decides."""
 
 
 class AgentNode:
-    """One agent as a participant of a run.
+    """A node (`gridpeers.wire.node`), on one session after the other if need be.
 
     `instance` is the id of this process, unique in the run, and part of the agent's token. Without `links` none are
-    emulated; without a law it is the paper's.
+    emulated; without a law it is the paper's. `known` is what the agents of this process know of the others in
+    simulated time; by default this agent shares it with nobody.
     """
 
     def __init__(
         self,
         config: AgentConfig,
         instance: str,
-        links: Links | None,
-        law: Law | None,
-        members: Membership | None = None,
+        links: Links | None = None,
+        law: Law | None = None,
+        known: KnownAgents | None = None,
     ) -> None:
-        post = self.post = Post(config.name, config.run, config.epoch, members)
-        post.on_nameplate = self._on_nameplate
-        self.plant = FollowedPlant(post, self._follow)
-        self.keys, self.members, self.admission, self.rejects = post.keys, post.members, post.admission, post.rejects
-        self.name, self.routes, self.watched = config.name, post.routes, post.keys.any_alive
-        self.take_actions, self.take_rejects = post.take_actions, post.take_rejects
-        self.is_known, self.lost = post.is_known, post.lost
         check_nameplate(config)
+        name, realtime = config.name, config.clock == "wall"
+        known = KnownAgents(config.control) if known is None else known
+        own: tuple[Callable[[str], str], ...]
+        post = self.post = Post(name, config.run, config.epoch, None if realtime else known.members)
+        keys = self.keys = post.keys
+        self.members, self.admission = post.members, post.admission
+        self.rejects, self.routes = post.rejects, post.routes
+        self.received, self.is_known, self.lost = post.received, post.is_known, post.lost
+        self.take_actions, self.take_rejects = post.take_actions, post.take_rejects
+        self.name, self.watched, self.token = name, keys.any_alive, keys.alive_agent(name, instance)
+        self.tokens = (self.token,)
+        self.siblings: set[str] = set()
+        """Agents of the same process, whose messages do not come from outside."""
+
+        self.phases = Phases(AGENT_PHASES)
         self.stopped = ""
         self.failed = ""
         """Why the agent could not continue, or take part at all; empty otherwise."""
-        self.plant_seen = False
-        self.session_broken = False
-        self._config, self._instance, self._links = config, instance, links
-        self._agent = Agent(config, law)
+        self.plant_seen = self.session_broken = False
+        self._config, self._instance = config, instance
+        self._plant, self._plant_epoch = FollowedPlant(post, self._follow), 0
+        self._agent = Agent(config if realtime else config.by_own_clock(), law)
         self._agent.rejects = self.rejects
-        self.states = NeighbourStates()
-        self.routes[self.keys.stop_request(config.name, instance)] = Route(PLANT, (Stop,), self._on_stop_request)
-        self.routes[self.keys.measurement(config.name)] = Route(PLANT, (Measurement,), self._on_own_measurement)
-
-    @property
-    def token(self) -> str:
-        return self.keys.alive_agent(self.name, self._instance)
-
-    @property
-    def tokens(self) -> tuple[str, ...]:
-        return (self.token,)
-
-    @property
-    def nameplate(self) -> tuple[str, bytes]:
+        self.nameplate = keys.nameplate(name, instance), encode(self._agent.nameplate)
         """Key of the own queryable, and its answer."""
-        return self.keys.nameplate(self.name, self._instance), encode(self._agent.nameplate)
+        self.heard = Hearing(self._agent, links)
+        self._reason = ""
+        """Why it leaves."""
+        self._ran = self._reported = False
+        self._journal_at = 0.0
+        self._timed: TimedTraffic | None = None
+        self._decisions: DecisionJournal | None = None
+        if config.record != "physics":
+            post.journal = JournalBuffer()
+            self._decisions = DecisionJournal(self._agent, post.journal)
+            if realtime:
+                self._timed = post.traffic = TimedTraffic(keys, post.journal, arrivals=config.record == "all")
+
+        self.routes[keys.stop_request(name, instance)] = Route(PLANT, (Stop,), self._on_stop)
+        self.routes[keys.measurement(name)] = Route(PLANT, (Measurement,), self._on_measurement)
+        self.policy: AgentBarrier | AgentTimer
+        self._meeting: RosterMeeting | OpenMeeting
+        self._prepare: Callable[[Prepare, float], None] | None = None
+        self.upkeep: Upkeep | None = None
+        """What is to be done in real time beside the ticks."""
+        if realtime:
+            self._meeting = meeting = OpenMeeting(post, self._agent, self._on_state)
+            health = SessionHealth(name)
+            timer = self.policy = AgentTimer(config, post, self.phases, self.heard, meeting, health, self._timed)
+            self.upkeep = Upkeep(post, self.phases, self.heard, meeting, timer, health, links)
+            self.routes[keys.control] = Route(PLANT, (Waiting, Stop), self._on_control)
+            self.routes[keys.link_request(name)] = Route(PLANT, (LinkRequest,), self.upkeep.on_link_command)
+            own = keys.set_points, keys.leave, keys.status, keys.link_acknowledgement
+        else:
+            known.add(self._agent.nameplate)
+            roster = self._meeting = RosterMeeting(post, self.phases, known, self._agent, instance)
+            roster.on_state, self._prepare = self._on_state, roster.on_prepare
+            self.policy = AgentBarrier(config, post, self.heard, roster, self.siblings)
+            self.routes[keys.control] = Route(PLANT, (Prepare, Waiting, Stop), self._on_control)
+            own = (keys.ready,)
+        post.on_nameplate = self._meeting.on_nameplate
+        self.publications = tuple(key(name) for key in (keys.state, keys.report, keys.journal, *own))
+        self._first_routes = dict(self.routes)
+        self._state_key = keys.state(name)
+        self._quiet_key = keys.set_points(name) if realtime else self._state_key
+
+    # ---------------------------------------------------------------- what the driver needs
 
     @property
     def subscriptions(self) -> tuple[str, ...]:
@@ -121,83 +143,243 @@ class AgentNode:
 
     @property
     def finished(self) -> bool:
-        return bool(self.stopped or self.failed)
+        return self.session_broken or self.phases.now == "over"
 
-    def received(self, key: str, payload: bytes, now: float) -> None:
-        if not self.finished:
-            self.post.received(key, payload, now)
+    @property
+    def messages_needed(self) -> int:
+        return self.policy.messages_needed
 
-    def _follow(self, epoch: int) -> None:
-        """Note that the node follows another plant, or the first."""
+    @property
+    def deadline(self) -> float | None:
+        return self.policy.deadline
 
-    def use_links(self, links: Links) -> None:
-        self._links = links
-
-    def note_siblings(self, names: frozenset[str]) -> None:
-        """Note the agents of the same process, whose messages do not come from outside."""
+    def start(self, now: float) -> None:
+        """Begin, or begin again after a broken session; there is nothing to do yet."""
+        self.policy.start(now)
+        if self.upkeep is None:
+            return
+        self.upkeep.start(now)
+        if self._timed is not None:
+            self._timed.process("session" if self.session_broken else "start", f"instance {self._instance}", now)
+        if not self.session_broken:
+            return
+        self.session_broken = self.post.closed = False
+        if self.phases.now == "leaving":  # what it said last may be lost with the old session
+            self._end(stopped=self._reason)
+            return
+        if self.phases.allows("new session"):
+            self.phases.on("new session")
+        self._agent.restart()
+        self.routes.clear()
+        self.routes.update(self._first_routes)
+        self._plant.present.clear()
+        self.admission.release(PLANT)
+        self.upkeep.new_session()
 
     def work(self, now: float) -> bool:
         return False
 
     def appeared(self, key: str, now: float) -> None:
         match self.post.token(key, now, appeared=True):
-            case ("alive", "plant", epoch) if self.plant.appeared(epoch):
+            case ("alive", "plant", epoch) if self._plant.appeared(epoch):
                 self.plant_seen = True
-                self._plant_came(now)
+                self.policy.plant_came(now)
+                if self.phases.now == "seeking":
+                    self.phases.on("plant appeared")
+                    if self.upkeep is not None:
+                        self.post.say("the plant is there; waits for its measurement")
             case ("alive", "agent", name, instance) if name != self.name:
                 self.post.process_came(name, instance)
 
     def vanished(self, key: str, now: float) -> None:
         match self.post.token(key, now, appeared=False):
-            case ("alive", "plant", epoch) if self.plant.vanished(epoch):
-                self._plant_gone(now)
-            case ("alive", "agent", name, instance) if self.post.process_gone(name, instance):
-                self._agent_gone(name, instance, now)
+            case ("alive", "plant", epoch) if self._plant.vanished(epoch):
+                verdict = self.policy.gone(PLANT)
+                if self.phases.now == "leaving":
+                    self._end(stopped=self._reason)
+                elif verdict.kind == "break":
+                    self._end(failed=verdict.reason)
+                else:
+                    self._hold(verdict.reason)
+                    if not self._plant.present and self.phases.allows("plant gone"):
+                        self.phases.on("plant gone")
+            case ("alive", "agent", name, instance) if self._meeting.gone(name, instance):
+                self.policy.gone(name)
+                if self.policy.due(now) is not None and not self.finished:
+                    self._tick(now)
 
-    def _on_nameplate(self, instance: str, nameplate: Nameplate, first: bool, now: float) -> None:
-        raise NotImplementedError
+    def expire(self, now: float) -> None:
+        deadline = self.policy.deadline
+        if self.finished or deadline is None or now < deadline:
+            return
+        if self._timed is not None:
+            self._timed.woken(now)
+        verdict = self.policy.passed(now)
+        if verdict.kind == "over":
+            self._report_the_last()
+            self._end(stopped=self._reason)
+        elif verdict.kind == "break":
+            self._end(failed=verdict.reason)
+        elif verdict.kind == "tick" and self.upkeep is not None:
+            if verdict.reason:
+                self._hold(verdict.reason)
+            shown = self.upkeep.shown
+            self._tick(now)
+            if self.upkeep.journal_due(now):
+                self.post.send(self.keys.journal(self.name), *self.post.take_journal(self.heard.t))
+            if problem := self.upkeep.session_problem(bool(self._agent.fault), now):
+                self.session_broken = self.post.closed = True
+                self.post.say(f"{problem}; opens a new session")
+            self.upkeep.report(shown, now, self.policy.at)
 
-    def _plant_came(self, now: float) -> None:
-        raise NotImplementedError
+    # ---------------------------------------------------------------- messages
 
-    def _plant_gone(self, now: float) -> None:
-        raise NotImplementedError
+    def _follow(self, epoch: int) -> None:
+        """Begin anew with another plant; one whose token was gone for a while goes on where it was."""
+        if self._plant_epoch not in (0, epoch) and self.upkeep is not None:
+            self._hold("the plant has a new life; starts from what it measures")
+            self._ran = False
+            self.upkeep.new_plant()
+        self._plant_epoch = epoch
 
-    def _agent_gone(self, name: str, instance: str, now: float) -> None:
-        raise NotImplementedError
+    def _on_control(self, message: Prepare | Waiting | Stop, payload: bytes, now: float) -> None:
+        if isinstance(message, Stop):
+            self._on_stop(message, payload, now)
+        else:
+            if isinstance(message, Prepare) and self._prepare is not None:
+                self._prepare(message, now)
+            self.policy.plant_waits(message, now)
 
-    def _listen_to(self, name: str) -> None:
-        self.post.listen(self.keys.state(name), Route(name, (State,), self._on_state))
-
-    def _on_own_measurement(self, message: Measurement, payload: bytes, now: float) -> None:
-        if message.to != self.name:
-            raise RejectedError("unexpected", f"the measurement of {message.to}")
-        self._on_measurement(message, payload, now)
-
-    def _on_stop_request(self, message: Stop, payload: bytes, now: float) -> None:
-        raise NotImplementedError
+    def _on_stop(self, message: Stop, payload: bytes, now: float) -> None:
+        if message.refused:
+            self._end(failed=message.reason)
+        elif self.phases.now == "leaving":
+            self._end(stopped=self._reason)
+        else:
+            self._leave(message.reason, now)
 
     def _on_measurement(self, message: Measurement, payload: bytes, now: float) -> None:
-        raise NotImplementedError
+        if message.to != self.name:
+            raise RejectedError("unexpected", f"the measurement of {message.to}")
+        self.policy.granted(message, now)
+        at = message.t if self.upkeep is None else now * self._config.speed
+        if is_usable(self.heard.links, message, payload, at, self.admission):
+            self.heard.keep(message, at)
+        if self.policy.due(now) is not None:
+            self._tick(now)
 
-    def _on_state(self, message: State, payload: bytes, now: float) -> None:
-        raise NotImplementedError
+    def _on_state(self, state: State, payload: bytes, now: float) -> None:
+        at = state.t if self.upkeep is None else now * self._config.speed
+        if self.policy.counts(state, now) and is_usable(self.heard.links, state, payload, at, self.admission):
+            self.heard.keep(state, at)
+        if self.policy.due(now) is not None:
+            self._tick(now)
 
-    def _hear(self, message: State | Measurement, payload: bytes, at: float) -> None:
-        """Use a message off the wire at this time (s of run time), unless an emulated link takes it."""
-        if is_usable(self._links, message, payload, at, self.admission):
-            self._keep(message, at)
+    # ---------------------------------------------------------------- ticks
 
-    def _hear_late(self, at: float) -> None:
-        """Use the messages that the emulated links have delivered by now (s of run time)."""
-        for message in arrived(self._links, at, self.rejects, self.admission):
-            if isinstance(message, _KEPT):
-                self._keep(message, at)
+    def _tick(self, now: float) -> None:
+        """Decide the tick that is due and send it; without a measurement the agent is on hold. Leaving, report."""
+        if self.phases.now == "leaving":
+            self._report_the_last()
+            return
+        post, policy, heard = self.post, self.policy, self.heard
+        at = policy.at
+        for message in () if heard.links is None else arrived(heard.links, at, self.rejects, self.admission):
+            heard.keep(message, at)
+        if PLANT not in self.admission.epochs:
+            return  # what the dead plant said last would still look fresh
+        measured = heard.measured(at, self._config.max_age)
+        if measured is not None:
+            if self.phases.now == "waiting":
+                self.phases.on("measured")
+                if self.upkeep is not None:
+                    joins, P_set, V_set = "goes on" if self._ran else "joins", measured.P_set, measured.V_set
+                    post.say(f"{joins} at t = {measured.t:.2f} s, from {P_set:.0f} W and {V_set:.1f} V")
+                self._ran = True
+        elif self.upkeep is not None:
+            self._hold("no recent measurement; holds")
+        elif self.phases.now == "running":
+            self.phases.on("held")
+        state = policy.decide(self._agent, measured, self._decisions, now)
+        if state is None:
+            return
+        journal, linked = post.journal, heard.links is not None
+        # Without links entries are rare, and none may wait: once the plant has the last state, the run is over.
+        due = (policy.reports or now - self._journal_at >= JOURNAL_PERIOD) if linked else journal
+        if due and journal is not None and self.upkeep is None:
+            self._journal_at = now
+            post.send(self.keys.journal(self.name), *post.take_journal(at, empty=linked))
+        post.publish(self._quiet_key if state.quiet else self._state_key, encode(state))
+        if policy.reports:
+            post.send(self.keys.report(self.name), *post.take_link_reports(heard.links, instance=self._instance))
+        if isinstance(policy, AgentBarrier):
+            for early, payload in policy.take_early():
+                if is_usable(heard.links, early, payload, early.t, self.admission):
+                    heard.keep(early, early.t)
 
-    def _keep(self, message: State | Measurement, at: float) -> None:
-        if type(message) is not State or self._agent.hear(message):
-            self.states.keep(message, at)
+    def _hold(self, why: str) -> None:
+        """Drop in real time what was heard; the next measurement shows the set-points to start from."""
+        if self.phases.now == "running":
+            self.phases.on("held")
+            self.post.say(why)
+        if self.upkeep is not None:
+            self.upkeep.hold()
+        self._agent.restart()
 
-    def _report_links(self, *, final: bool = False) -> None:
-        for part in self.post.take_link_reports(self._links, instance=self._instance, last=final):
-            self.post.publish(self.keys.report(self.name), encode(part))
+    # ---------------------------------------------------------------- the end
+
+    def leave(self, reason: str) -> None:
+        """Leave in real time, as somebody outside of the run asks for it; noted, because a replay must do the same."""
+        if self._timed is not None and not self.finished and self.phases.now != "leaving":
+            self._timed.process("leave", reason, self._timed.now)
+        self._leave(reason, 0.0)
+
+    def _leave(self, reason: str, now: float) -> None:
+        """Send the last accounts, and close once the plant has them; at once if there is nothing to wait for.
+
+        In simulated time the account of emulated links needs the neighbours' last states. In real time the plant takes
+        the inverter off the network.
+        """
+        if self.finished or self.phases.now == "leaving":
+            return
+        self._reason = reason
+        self.phases.on("leave")
+        waits = self.heard.links is not None
+        if self.upkeep is not None:
+            self._report_the_last()
+            self.upkeep.leave()
+            waits = bool(self._plant.present)
+        if not waits:
+            self._end(stopped=reason)
+            return
+        self.policy.leave(now)
+        if self.policy.due(now) is not None:
+            self._tick(now)
+
+    def _report_the_last(self) -> None:
+        post, links = self.post, self.heard.links
+        if not self._reported:
+            self._reported = True
+            empty = self.upkeep is None and links is not None
+            post.send(self.keys.journal(self.name), *post.take_journal(self.policy.t, empty=empty))
+            post.send(self.keys.report(self.name), *post.take_link_reports(links, instance=self._instance, last=True))
+
+    def _end(self, *, stopped: str = "", failed: str = "") -> None:
+        if not self.finished:
+            self.stopped, self.failed = stopped, failed
+            self.phases.on("end")
+            self.post.closed = True
+
+    # ---------------------------------------------------------------- a replay that asks what would have been
+
+    def use_links(self, links: Links) -> None:
+        self.heard.links = links
+
+    def change(self, config: AgentConfig, law: Law | None = None) -> None:
+        """Go on in real time under another rule of control, with the set-points of now; see `Agent.taken_over`."""
+        self._config, self._agent = config, self._agent.taken_over(config, law)
+        self._agent.rejects = self.rejects
+        if self.post.journal is not None:
+            self._decisions = DecisionJournal(self._agent, self.post.journal)
+        if self.upkeep is not None:
+            self.upkeep.change(config, self._agent)

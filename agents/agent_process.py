@@ -1,4 +1,4 @@
-"""One agent or several as a process: `LockstepAgent` or `RealtimeAgent`, behind one Zenoh session after the other."""
+"""One agent or several as a process, behind one Zenoh session after the other."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from time import monotonic, sleep
 from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.agents.agent_node import AgentNode
 from gridpeers.agents.carriers.law_registry import make_law
 from gridpeers.agents.laws.law import Law
-from gridpeers.agents.lockstep_agent import KnownAgents, LockstepAgent
-from gridpeers.agents.realtime_agent import RealtimeAgent
+from gridpeers.agents.roster_meeting import KnownAgents
 from gridpeers.wire.driver.drive import StoppedError, drive, serve
 from gridpeers.wire.driver.machine import schedule_as_batch
 from gridpeers.wire.driver.process import ConfigurationError, MakeLinks, new_epoch, no_links
@@ -27,8 +27,6 @@ from gridpeers.wire.trust.credentials import Credentials
 AgentProcess = AgentConfig | tuple[AgentConfig, ...]
 """Configuration of a process: one agent, or several."""
 
-
-AnyAgent = RealtimeAgent | LockstepAgent
 
 OPENED_AGAIN, OPENED_WITHIN = 1.0, 60.0
 """Time (s) between two tries to open a session in place of a broken one, and time (s) for all of them: meanwhile keys
@@ -90,12 +88,12 @@ def _made_laws(configs: Sequence[AgentConfig], laws: ExitStack) -> list[Law]:
     return made
 
 
-def _run(configs: Sequence[AgentConfig], laws: Sequence[Law], make_links: MakeLinks) -> tuple[AnyAgent, ...]:
+def _run(configs: Sequence[AgentConfig], laws: Sequence[Law], make_links: MakeLinks) -> tuple[AgentNode, ...]:
     """Take part until all agents have finished, with a new session whenever the last was broken; return the agents."""
     first = configs[0]
     credentials = None if first.credentials is None else first.credentials.knowing(first.inverters)
-    nodes: tuple[AnyAgent, ...] = ()
-    core: AnyAgent | NodeGroup | None = None
+    nodes: tuple[AgentNode, ...] = ()
+    core: AgentNode | NodeGroup | None = None
     while core is None or core.session_broken:
         session = _opened(first, credentials, again=core is not None)
         try:
@@ -105,8 +103,9 @@ def _run(configs: Sequence[AgentConfig], laws: Sequence[Law], make_links: MakeLi
                     _node(config, session.id, make_links, law, known) for config, law in zip(configs, laws, strict=True)
                 )
                 core = nodes[0] if len(nodes) == 1 else NodeGroup(nodes)
-            for agent in _realtime(nodes):
-                agent.host_moved = partial(getattr, session, "moved")
+            for node in nodes:
+                if node.upkeep is not None:
+                    node.upkeep.host_moved = partial(getattr, session, "moved")
             if credentials is not None:
                 for node in nodes:
                     node.post.vouches = session.vouches
@@ -116,10 +115,6 @@ def _run(configs: Sequence[AgentConfig], laws: Sequence[Law], make_links: MakeLi
         if core.session_broken:
             end_left_links()
     return nodes
-
-
-def _realtime(nodes: Sequence[AnyAgent]) -> list[RealtimeAgent]:
-    return [node for node in nodes if isinstance(node, RealtimeAgent)]
 
 
 def _opened(config: AgentConfig, credentials: Credentials | None, *, again: bool) -> Session:
@@ -142,21 +137,21 @@ def _opened(config: AgentConfig, credentials: Credentials | None, *, again: bool
         sleep(OPENED_AGAIN)
 
 
-def _node(config: AgentConfig, instance: str, make_links: MakeLinks, law: Law, shared: list[KnownAgents]) -> AnyAgent:
+def _node(config: AgentConfig, instance: str, make_links: MakeLinks, law: Law, shared: list[KnownAgents]) -> AgentNode:
     try:
         links = make_links(config.name, config.links)
         if config.clock == "wall":
-            return RealtimeAgent(config, instance, links, law)
+            return AgentNode(config, instance, links, law)
         known = next((each for each in shared if each.control == config.control), None)
         if known is None:
             known = KnownAgents(config.control)
             shared.append(known)
-        return LockstepAgent(config, instance, links, law, known)
+        return AgentNode(config, instance, links, law, known)
     except ValueError as error:
         raise ConfigurationError(str(error)) from None
 
 
-def take_part(core: AnyAgent | NodeGroup, nodes: Sequence[AnyAgent], session: Session, log: logging.Logger) -> None:
+def take_part(core: AgentNode | NodeGroup, nodes: Sequence[AgentNode], session: Session, log: logging.Logger) -> None:
     """Take part with one session. All of an agent's sessions hold one token, so the others see one agent."""
     for node in nodes:
         session.answer(*node.nameplate)
@@ -165,9 +160,9 @@ def take_part(core: AnyAgent | NodeGroup, nodes: Sequence[AnyAgent], session: Se
     try:
         drive(core, session, log)
     except (StoppedError, KeyboardInterrupt) as stop:
-        leaving = _realtime(nodes)
+        leaving = [node for node in nodes if node.upkeep is not None]
         for node in leaving:
-            node.asked_to_leave(f"asked to leave: {stop}")
+            node.leave(f"asked to leave: {stop}")
         if leaving:
             serve(core, session, log)  # until the plant has acknowledged
         raise

@@ -4,7 +4,7 @@ A group looks like one node to its driver. Messages between its nodes stay insid
 and goes to every node with a route for it. The nodes hold one token each, so the others see as many agents.
 
 **Queries.** A node queries a process for its nameplate after it has subscribed to that process: the answer proves that
-the subscription is known (`gridpeers.agents.lockstep_agent`). A query proves the same for every subscription that was
+the subscription is known (`gridpeers.agents.roster_meeting`). A query proves the same for every subscription that was
 declared before it, so nodes share a query, or its answer, unless the group has declared a subscription in between.
 """
 
@@ -18,6 +18,8 @@ from gridpeers.wire.node import Action, Core, Fetch, Listen, Log, Loss, Publish,
 
 class GroupedNode(Core, Protocol):
     session_broken: bool
+    siblings: set[str]
+    """Agents of the same process, whose messages do not come from outside."""
 
     @property
     def name(self) -> str: ...
@@ -27,7 +29,6 @@ class GroupedNode(Core, Protocol):
     def nameplate(self) -> tuple[str, bytes]: ...
     @property
     def publications(self) -> tuple[str, ...]: ...
-    def note_siblings(self, names: frozenset[str]) -> None: ...
 
 
 class _Query(NamedTuple):
@@ -44,7 +45,7 @@ class NodeGroup:
         self.nameplates = dict(node.nameplate for node in nodes)
         names = frozenset(node.name for node in nodes)
         for node in nodes:
-            node.note_siblings(names)
+            node.siblings.update(names)
         self._now = 0.0
         self._start_anew()
 

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
 
-from gridpeers.wire.codec import RejectedError, RejectedMessages, decode, is_marked
+from gridpeers.wire.codec import RejectedError, RejectedMessages, decode, encode, is_marked
 from gridpeers.wire.journal import JournalBuffer, Traffic
 from gridpeers.wire.keys import Keys, epoch_of
 from gridpeers.wire.links import Links
@@ -165,6 +165,10 @@ class Post:
         if self.traffic is not None:
             self.traffic.sent(key, payload)
         self.actions.append(Publish(key, payload))
+
+    def send(self, key: str, *messages: AnyMessage) -> None:
+        for message in messages:
+            self.publish(key, encode(message))
 
     def say(self, text: str) -> None:
         """Have a line logged."""

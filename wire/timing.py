@@ -61,44 +61,39 @@ class TickBarrier:
     """The awaited messages, their deadline after `timeout` (s) without progress, and the last sign of life of all."""
 
     def __init__(self, name: str, timeout: float) -> None:
-        self._name, self._timeout = name, timeout
-        self._awaited: dict[str, str] = {}
-        self.siblings: frozenset[str] = frozenset()
+        self._name, self.timeout = name, timeout
+        self.awaited: dict[str, str] = {}
+        """The awaited message of each sender."""
+        self.siblings: set[str] = set()
         """Senders in the same process, whose messages do not come from outside."""
-        self._from_outside = 0
         self.last_heard: dict[str, tuple[int, float]] = {}
         """Number and time (s) of each sender's last message, its last sign of life; the node notes them."""
         self.deadline: float | None = None
 
     @property
     def is_open(self) -> bool:
-        return not self._awaited
+        return not self.awaited
 
     @property
     def messages_needed(self) -> int:
-        return max(1, self._from_outside)
+        return max(1, len(self.awaited.keys() - self.siblings) if self.siblings else len(self.awaited))
 
     def wait_for(self, awaited: dict[str, str], now: float) -> None:
-        self._awaited = awaited
-        self._from_outside = len(self._awaited.keys() - self.siblings) if self.siblings else len(self._awaited)
+        self.awaited = awaited
         self.renew(now)
 
     def awaits(self, name: str) -> bool:
-        return name in self._awaited
+        return name in self.awaited
 
     def came(self, name: str) -> bool:
         """Note that a sender's message came, or never will; return whether it was awaited."""
-        if self._awaited.pop(name, None) is None:
-            return False
-        if name not in self.siblings:
-            self._from_outside -= 1
-        return True
+        return self.awaited.pop(name, None) is not None
 
     def missing_messages(self) -> tuple[Awaited, ...]:
-        return tuple(Awaited(message, sender) for sender, message in self._awaited.items())
+        return tuple(Awaited(message, sender) for sender, message in self.awaited.items())
 
     def renew(self, now: float) -> None:
-        self.deadline = now + self._timeout
+        self.deadline = now + self.timeout
 
     def is_over(self, now: float) -> bool:
         """Whether the deadline has passed; it starts again if this process was stopped itself, as by Ctrl-Z."""
@@ -119,7 +114,7 @@ class TickBarrier:
             if sender in self.last_heard:
                 tick, at = self.last_heard[sender]
                 sign = f"last heard of {sender}: tick {tick}, {now - at:.1f} s ago"
-            parts.append(f"no {message} from {sender} within {self._timeout:g} s; {sign}")
+            parts.append(f"no {message} from {sender} within {self.timeout:g} s; {sign}")
         return f"{self._name}: " + ". ".join(parts)
 
 

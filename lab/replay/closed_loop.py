@@ -18,10 +18,10 @@ from typing import Any
 from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import AgentConfig, nameplate_of
+from gridpeers.agents.agent_node import AgentNode
 from gridpeers.agents.carriers.law_registry import close_laws
 from gridpeers.agents.graphs import in_neighbours, rule_of
 from gridpeers.agents.laws.law import Law
-from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.lab.replay.changes import ChangedRule, Changes
 from gridpeers.lab.replay.recorded_process import (
     KeyedMessage,
@@ -86,8 +86,8 @@ class LoopProcess:
         self._sent: dict[str, int] = {}
 
     @property
-    def agent(self) -> RealtimeAgent | None:
-        return self.again.node if self.again is not None and isinstance(self.again.node, RealtimeAgent) else None
+    def agent(self) -> AgentNode | None:
+        return self.again.node if self.again is not None and isinstance(self.again.node, AgentNode) else None
 
     def next(self) -> None:
         assert self.head is not None
@@ -222,7 +222,7 @@ class ClosedLoop:
         if node is None or head is None or not node.session_broken:
             return
         if not (isinstance(head.entry, ProcessEvent) and head.entry.kind == "session"):
-            node.session_broken = False
+            node.session_broken = node.post.closed = False
             self._note(f"{process.name} would have opened a new session; what that would have brought is not known")
 
     def _note(self, text: str) -> None:

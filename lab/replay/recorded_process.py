@@ -11,9 +11,9 @@ from typing import NamedTuple
 from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.agents.agent_node import AgentNode
 from gridpeers.agents.carriers.law_registry import make_law
 from gridpeers.agents.laws.law import Law
-from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_interface import LivePlant
 from gridpeers.plant.plant_node import PlantNode
@@ -202,7 +202,7 @@ class _Outbox(Traffic):
 
 
 class ReplayedProcess:
-    def __init__(self, node: RealtimeAgent | PlantNode, links: Links | None) -> None:
+    def __init__(self, node: AgentNode | PlantNode, links: Links | None) -> None:
         self.node, self.links = node, links
         self._root = node.keys.prefix
         self._sent = _Outbox(len(self._root))  # type: ignore[abstract]  # methods of the protocol do nothing
@@ -232,11 +232,11 @@ class ReplayedProcess:
             assert message is not None
             return self.hear(message, at)
         elif entry.kind != "leave":
-            if entry.kind == "session" and isinstance(node, RealtimeAgent):
+            if entry.kind == "session" and isinstance(node, AgentNode):
                 node.session_broken = True  # also of an agent whose session was sound, but not that of its process
             node.start(at)
-        elif isinstance(node, RealtimeAgent):
-            node.asked_to_leave(entry.text)
+        elif isinstance(node, AgentNode):
+            node.leave(entry.text)
         return self._take()
 
     def hear(self, message: KeyedMessage, at: float) -> list[KeyedMessage]:
@@ -246,7 +246,7 @@ class ReplayedProcess:
     def end(self) -> list[KeyedMessage]:
         """Have a node whose journal ends before it does report the rest of its rows, or on its links; return that."""
         node = self.node
-        if isinstance(node, RealtimeAgent):
+        if isinstance(node, AgentNode):
             node.leave("its record ends")
         elif node.phase == "closing":
             node.expire(inf)
@@ -276,7 +276,7 @@ def agent_again(
 ) -> ReplayedProcess:
     laws.append(law_again(config))
     with made_here(f"{config.name}: cannot be made again here"):
-        return ReplayedProcess(RealtimeAgent(agent_as_run(config, recorded.epoch), instance, links, laws[-1]), links)
+        return ReplayedProcess(AgentNode(agent_as_run(config, recorded.epoch), instance, links, laws[-1]), links)
 
 
 def law_again(config: AgentConfig) -> Law:

@@ -18,9 +18,10 @@ import msgspec
 
 from gridpeers.agents.agent_config import AgentConfig, Control
 from gridpeers.agents.agent_group import AgentGroup
+from gridpeers.agents.agent_node import AgentNode
 from gridpeers.agents.carriers.law_registry import close_laws, make_law
 from gridpeers.agents.laws.law import Law
-from gridpeers.agents.lockstep_agent import KnownAgents, LockstepAgent
+from gridpeers.agents.roster_meeting import KnownAgents
 from gridpeers.plant.direct_plant import DirectPlant
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_interface import PlantLike
@@ -63,7 +64,7 @@ COLLECTED = 20
 
 _runs = count(1)
 
-_Node = PlantNode | LockstepAgent
+_Node = PlantNode | AgentNode
 
 
 class InprocessBus:
@@ -72,10 +73,10 @@ class InprocessBus:
     def __init__(
         self,
         plant: PlantNode,
-        agents: Iterable[LockstepAgent],
+        agents: Iterable[AgentNode],
         on_telemetry: Callable[[Telemetry], None],
         on_other: Callable[[Other], None],
-        newcomer: Callable[[str], LockstepAgent],
+        newcomer: Callable[[str], AgentNode],
         known: KnownAgents,
     ) -> None:
         self._plant, self._agents = plant, list(agents)
@@ -112,7 +113,7 @@ class InprocessBus:
                 raise AssertionError(f"stalled in phase {plant.phase} at tick {plant.stepper.tick} without {missing}")
         self._do(plant, plant.take_actions())
 
-    def _start(self, agent: LockstepAgent) -> None:
+    def _start(self, agent: AgentNode) -> None:
         """Start an agent: it and the plant see each other, and it is introduced to all agents at once."""
         agent.start(0.0)
         keys = self._plant.keys
@@ -207,7 +208,7 @@ def run_inprocess(
         stack.callback(close_laws, laws)
         stack.enter_context(_all_so_far_stays())
         plant_config = msgspec.structs.replace(plant_config, recorders=())
-        agents: list[LockstepAgent] = []
+        agents: list[AgentNode] = []
         nodes: tuple[_Node, ...] = ()
         if messages or messages_decide(plant_config, tuple(known.values())):
             node = _run_on_bus(plant_config, known, laws, agents, plant, note, on_other)
@@ -253,7 +254,7 @@ def _run_on_bus(
     plant_config: PlantConfig,
     known: dict[str, AgentConfig],
     laws: list[Law],
-    agents: list[LockstepAgent],
+    agents: list[AgentNode],
     plant: PlantLike,
     on_telemetry: Callable[[Telemetry], None],
     on_other: Callable[[Other], None],
@@ -263,16 +264,16 @@ def _run_on_bus(
     control = next((config.control for config in known.values()), Control(secondary="none", graph="none"))
     known_agents = KnownAgents(control)
 
-    def agent_of(config: AgentConfig, instance: str) -> LockstepAgent:
+    def agent_of(config: AgentConfig, instance: str) -> AgentNode:
         assert config.control == known_agents.control
         laws.append(make_law(config.control))
-        return LockstepAgent(config, instance, links_of(config.name, config.links), laws[-1], known_agents)
+        return AgentNode(config, instance, links_of(config.name, config.links), laws[-1], known_agents)
 
     agents += [
         agent_of(config, f"p{i}") for i, config in enumerate(known.values()) if config.name in plant_config.agents
     ]
 
-    def newcomer(name: str) -> LockstepAgent:
+    def newcomer(name: str) -> AgentNode:
         known[name] = msgspec.structs.replace(known[name], epoch=known[name].epoch + 1)
         agents.append(agent_of(known[name], f"p{len(known) + len(agents)}"))
         return agents[-1]

@@ -16,7 +16,7 @@ import msgspec
 from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.agents.realtime_agent import RealtimeAgent
+from gridpeers.agents.agent_node import AgentNode
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.plant.plant_config import PlantConfig
@@ -33,8 +33,8 @@ from gridpeers.wire.codec import CRC, RejectedError, decode, encode
 from gridpeers.wire.keys import Keys, epoch_of, run_of_plant
 from gridpeers.wire.messages import AgentStatus, Answer, LinkAcknowledgement, LinkReport, Telemetry
 from tests.fuzz.journals import Journals
+from tests.fuzz.mutation import EPOCH
 from tests.hostile.scenes import (
-    EPOCH,
     INSTANCES,
     KEYS,
     NAMES,
@@ -143,7 +143,7 @@ class LinkedAgentScene(RealtimeAgentScene):
     def __init__(self) -> None:
         super().__init__()
         config = replace(agent_config("inv1"), clock="wall", epoch=EPOCH, links=LATE, record="all")
-        self.side = RealtimeAgent(config, "a", links_of("inv1", LATE))
+        self.side = AgentNode(config, "a", links_of("inv1", LATE))
         self.side.start(self.now)
         self.join()
 

@@ -7,8 +7,7 @@ from typing import Any
 from msgspec.structs import replace
 
 from gridpeers.agents.agent import Agent
-from gridpeers.agents.lockstep_agent import LockstepAgent
-from gridpeers.agents.realtime_agent import RealtimeAgent
+from gridpeers.agents.agent_node import AgentNode
 from gridpeers.plant.plant_node import PlantNode
 from gridpeers.wire.codec import decode, encode
 from gridpeers.wire.keys import Keys
@@ -48,7 +47,7 @@ def measurement(k: int) -> Measurement:
 class Scene:
     """A core in the middle of a run: what it is told, and what it does."""
 
-    def __init__(self, side: RealtimeAgent | PlantNode | LockstepAgent | PlantNode) -> None:
+    def __init__(self, side: AgentNode | PlantNode | AgentNode | PlantNode) -> None:
         self.side: Any = side
         self.now = 100.0
         self.done: list[object] = []
@@ -83,7 +82,7 @@ class RealtimeAgentScene(Scene):
     """inv1 in wall-clock time."""
 
     def __init__(self) -> None:
-        super().__init__(RealtimeAgent(replace(agent_config("inv1"), clock="wall", epoch=EPOCH), "a"))
+        super().__init__(AgentNode(replace(agent_config("inv1"), clock="wall", epoch=EPOCH), "a"))
         self.side.appeared(KEYS.alive_plant(EPOCH), self.now)
         for name in NAMES[1:]:
             self.side.appeared(KEYS.alive_agent(name, INSTANCES[name]), self.now)
@@ -103,7 +102,7 @@ class AgentScene(Scene):
     """inv1 in simulated time."""
 
     def __init__(self) -> None:
-        super().__init__(LockstepAgent(replace(agent_config("inv1"), epoch=EPOCH), "a"))
+        super().__init__(AgentNode(replace(agent_config("inv1"), epoch=EPOCH), "a"))
         self.side.appeared(KEYS.alive_plant(EPOCH), self.now)
         for name in NAMES[1:]:
             self.side.appeared(KEYS.alive_agent(name, INSTANCES[name]), self.now)

@@ -17,8 +17,8 @@ import pytest
 from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import AgentConfig, Control
+from gridpeers.agents.agent_node import AgentNode
 from gridpeers.agents.carriers.law_registry import make_law
-from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_node import PlantNode
@@ -36,7 +36,7 @@ from gridpeers.wire.node import Fetch, Listen, Log, Loss, Publish
 from tests.toy.toy_configs import ALL_FULL, toy_configs
 from tests.toy.toy_plant import ToyPlant
 
-Node = PlantNode | RealtimeAgent
+Node = PlantNode | AgentNode
 
 Delay = Callable[[str, str, str, int], float | None]
 """Returns how long (s) a message is on the wire, by sender, receiver, key and number on that link; None: it is lost."""
@@ -89,14 +89,14 @@ class FakeClockRun:
         self._lives[name] = self._lives.get(name, 0) + 1
         config = replace(self._configs[name], epoch=int(self.now * 1000.0))
         links, law = links_of(name, config.links), make_law(config.control)
-        agent = RealtimeAgent(config, f"{name}x{self._lives[name]}", links, law)
+        agent = AgentNode(config, f"{name}x{self._lives[name]}", links, law)
         self._join(agent, agent.subscriptions)
 
     def stop(self, name: str) -> None:
         """Have an agent leave, as by Ctrl-C in its terminal."""
         agent = self._nodes[name]
-        assert isinstance(agent, RealtimeAgent)
-        agent.asked_to_leave("asked to leave: SIGINT")
+        assert isinstance(agent, AgentNode)
+        agent.leave("asked to leave: SIGINT")
         self._work(name)
 
     def kill(self, name: str) -> None:
@@ -228,7 +228,7 @@ class FakeClockRun:
 
     def _fetch(self, name: str, key: str) -> None:
         for node in self._nodes.values():
-            if isinstance(node, RealtimeAgent) and node.nameplate[0] == key:
+            if isinstance(node, AgentNode) and node.nameplate[0] == key:
                 self._later(0.002, partial(self._receive, name, key, node.nameplate[1]))
 
 

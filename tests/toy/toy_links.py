@@ -13,7 +13,7 @@ from functools import partial
 import msgspec
 
 from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.agents.lockstep_agent import LockstepAgent
+from gridpeers.agents.agent_node import AgentNode
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_node import PlantNode
 from gridpeers.wire.codec import decode
@@ -21,7 +21,7 @@ from gridpeers.wire.messages import PlantEvent, Telemetry
 from gridpeers.wire.node import Fetch, Listen, Publish
 from tests.toy.toy_plant import ToyPlant
 
-EndSet = PlantNode | LockstepAgent
+EndSet = PlantNode | AgentNode
 
 
 class Links:
@@ -59,7 +59,7 @@ class Links:
         """All events."""
         return [event for message in self.telemetry for event in message.events]
 
-    def agent(self, name: str) -> LockstepAgent:
+    def agent(self, name: str) -> AgentNode:
         """The first agent of a name."""
         return next(agent for agent in self.agents if self.plant.keys.parts(agent.token)[2] == name)
 
@@ -95,9 +95,9 @@ class Links:
                     self._to_all(token, lambda to, a=action, b=token: partial(self._subscribed.add, (to, b, a.key)))
         return True
 
-    def _bear(self, config: AgentConfig) -> LockstepAgent:
+    def _bear(self, config: AgentConfig) -> AgentNode:
         self._born += 1
-        return LockstepAgent(config, f"p{self._born}")
+        return AgentNode(config, f"p{self._born}")
 
     def start(self, name: str) -> None:
         """Start an agent, perhaps once more: all others hear of it, and it of them, each at another time."""
@@ -115,7 +115,7 @@ class Links:
                     self._send(a, b, partial(self._subscribed.add, (b, a, key)))
                 self._send(a, b, partial(self._living[b].appeared, a, 0.0))
 
-    def _leave(self, agent: LockstepAgent) -> None:
+    def _leave(self, agent: AgentNode) -> None:
         del self._living[agent.token]
         self.agents.remove(agent)
         self._to_all(agent.token, lambda to: partial(self._living[to].vanished, agent.token, 0.0))
@@ -130,7 +130,7 @@ class Links:
 
     def _answer(self, token: str, asker: str, key: str) -> None:
         side = self._living[token]
-        if isinstance(side, LockstepAgent) and side.nameplate[0] == key and asker in self._living:
+        if isinstance(side, AgentNode) and side.nameplate[0] == key and asker in self._living:
             self._send(token, asker, partial(self._living[asker].received, *side.nameplate, 0.0))
 
     def _publish(self, sender: str, key: str, payload: bytes) -> None:

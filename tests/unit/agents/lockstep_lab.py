@@ -8,7 +8,7 @@ from msgspec.structs import replace
 
 from gridpeers.agents.agent import Agent
 from gridpeers.agents.agent_config import Control, GraphRule
-from gridpeers.agents.lockstep_agent import LockstepAgent
+from gridpeers.agents.agent_node import AgentNode
 from gridpeers.wire.codec import decode, encode
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import Measurement, Message, Nameplate, Prepare, Ready, State
@@ -27,7 +27,7 @@ class Lab:
 
     def __init__(self, graph: GraphRule = "full", **changes: Any) -> None:
         config = replace(agent_config("inv1", Control(secondary="all", graph=graph)), **changes)
-        self.node = LockstepAgent(config, "me")
+        self.node = AgentNode(config, "me")
         self.done: list[tuple[str, str]] = []
         """("listen", name), ("ask", process) and ("ready", number), in the order of the actions."""
         self.decided: list[State] = []
@@ -89,7 +89,7 @@ class Lab:
 
     @property
     def missing(self) -> list[tuple[str, str]]:
-        return [(what, who) for what, who in self.node.missing_messages()]
+        return [(what, who) for what, who in self.node.policy.missing()]
 
 
 def ticking(*names: str, tick: int = 0) -> Lab:

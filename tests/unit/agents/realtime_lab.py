@@ -7,8 +7,8 @@ from typing import Any
 from msgspec.structs import replace
 
 from gridpeers.agents.agent import Agent
+from gridpeers.agents.agent_node import AgentNode
 from gridpeers.agents.laws.law import Law
-from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.wire.codec import decode, encode
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import AgentStatus, Measurement, Message, State
@@ -25,7 +25,7 @@ class Lab:
     def __init__(self, law: Law | None = None, **changes: Any) -> None:
         config = replace(agent_config("inv1"), clock="wall", **changes)
         self.now = 100.0
-        self.side = RealtimeAgent(config, "me", law=law)
+        self.side = AgentNode(config, "me", law=law)
         self.listened: list[str] = []
         self.fetched: list[str] = []
         self.said: list[str] = []
@@ -84,7 +84,7 @@ class Lab:
         self.do()
 
     def age(self, name: str) -> float:
-        return self.side.states.age(name, self.now)
+        return self.side.heard.age(name, self.now)
 
     def decided(self) -> list[State]:
         states = [message for message in self.published if isinstance(message, State)]

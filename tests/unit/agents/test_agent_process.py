@@ -11,8 +11,8 @@ import pytest
 from msgspec.structs import replace
 
 from gridpeers.agents import agent_process
+from gridpeers.agents.agent_node import AgentNode
 from gridpeers.agents.agent_process import _opened, take_part
-from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.wire.codec import encode
 from gridpeers.wire.driver.drive import StoppedError
 from gridpeers.wire.driver.inbox import Inbox, Stamped
@@ -55,7 +55,7 @@ class Played:
 
 
 def ended(*events: Stamped | BaseException) -> Played:
-    agent = RealtimeAgent(replace(agent_config("inv1"), clock="wall"), "me")
+    agent = AgentNode(replace(agent_config("inv1"), clock="wall"), "me")
     session = Played(("appeared", PLANT_TOKEN, b"", monotonic()), *events)
     with pytest.raises(StoppedError):
         take_part(agent, (agent,), cast(Session, session), logging.getLogger("test"))

@@ -12,8 +12,8 @@ from msgspec.structs import replace
 
 from gridpeers.agents.agent import Agent
 from gridpeers.agents.agent_config import Control, DegradedCommunication, Gains
+from gridpeers.agents.agent_node import AgentNode
 from gridpeers.agents.degraded_communication import IslandDetector, SaturationDetector, StalenessWeights, gains_in_force
-from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.sweep.sweep_case import run_one
 from gridpeers.wire.codec import decode, encode
@@ -218,7 +218,7 @@ def test_the_default_is_the_papers() -> None:
 def test_in_wall_clock_time_the_age_is_that_on_the_own_clock(max_age: float, pulls: bool) -> None:
     """A state that came 0.3 s ago is out by default, and counts where max_age is more; its own time is no matter."""
     control = Control(secondary="all", graph="full", degraded_communication=DegradedCommunication(max_age=max_age))
-    side = RealtimeAgent(replace(agent_config("inv1", control), clock="wall"), "me")
+    side = AgentNode(replace(agent_config("inv1", control), clock="wall"), "me")
     keys = side.keys
     side.start(0.0)
     side.appeared(keys.alive_plant(1), 0.0)

@@ -33,5 +33,5 @@ def test_a_plant_whose_certificate_no_link_has_commands_nobody() -> None:
         lab.measure(k)
         lab.go(T_C)
 
-    assert lab.side.phase != "running"
+    assert lab.side.phases.now != "running"
     assert lab.side.rejects.counts["impostor"] == 9

@@ -8,7 +8,7 @@ from typing import Any
 from gridpeers.agents.agent import Agent
 from gridpeers.agents.agent_config import Control
 from gridpeers.agents.graphs import RosterGraph
-from gridpeers.agents.lockstep_agent import KnownAgents
+from gridpeers.agents.roster_meeting import KnownAgents
 from gridpeers.wire.messages import Prepare
 from tests.toy.toy_configs import agent_config
 

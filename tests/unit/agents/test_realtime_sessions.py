@@ -16,7 +16,7 @@ def test_an_agent_whose_plant_is_there_but_mute_begins_again_with_a_new_session(
 
     lab.measure(1)
     lab.go(T_C)
-    assert lab.side.phase == "running"
+    assert lab.side.phases.now == "running"
     for _ in range(8):
         lab.go(0.5)
     assert not lab.side.finished
@@ -29,7 +29,7 @@ def test_an_agent_whose_plant_is_there_but_mute_begins_again_with_a_new_session(
 def test_an_agent_whose_host_has_another_address_opens_a_new_session_at_once() -> None:
     """The others know only the old address; to wait until nothing comes from them would cost seconds."""
     lab = running("inv2")
-    lab.side.host_moved = lambda: True
+    lab.side.upkeep.host_moved = lambda: True
     lab.go(T_C)
 
     assert lab.side.session_broken
@@ -88,7 +88,7 @@ def test_an_agent_that_has_lost_its_plant_seeks_it_with_new_sessions_now_and_the
         lasted.append(lab.now - began)
         lab.side.start(lab.now)
 
-    assert lab.side.phase == "seeking"
+    assert lab.side.phases.now == "seeking"
     assert lasted == pytest.approx([4.5, 7.0, 14.0, 28.0, 56.0, 60.0], abs=1.1)
     assert lab.said[-1] == "inv1: nothing comes from the plant; opens a new session"
 

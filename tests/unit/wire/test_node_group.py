@@ -19,7 +19,7 @@ class Node:
         self.publications: tuple[str, ...] = (f"state/{name}",)
         self.watched = "alive/*"
         self.messages_needed, self.deadline = 1, 10.0
-        self.siblings: frozenset[str] = frozenset()
+        self.siblings: set[str] = set()
         self.to_do: list[Action | Log] = []
         self.heard: list[tuple[str, bytes]] = []
         self.known: set[str] = set()
@@ -28,9 +28,6 @@ class Node:
     @property
     def subscriptions(self) -> tuple[str, ...]:
         return tuple(self.routes)
-
-    def note_siblings(self, names: frozenset[str]) -> None:
-        self.siblings = names
 
     def start(self, now: float) -> None:
         self.starts += 1

@@ -13,17 +13,9 @@ import pytest
 
 from gridpeers.wire.codec import KINDS
 from gridpeers.wire.node import Fetch, Listen, Log
+from tests.fuzz.mutation import EPOCH
 from tests.hostile.cases import hostile
-from tests.hostile.scenes import (
-    EPOCH,
-    KEYS,
-    NAMES,
-    AgentScene,
-    PlantScene,
-    RealtimeAgentScene,
-    RealtimePlantScene,
-    Scene,
-)
+from tests.hostile.scenes import KEYS, NAMES, AgentScene, PlantScene, RealtimeAgentScene, RealtimePlantScene, Scene
 
 TOKENS = tuple(
     f"gridpeers/toy/alive/{tail}"

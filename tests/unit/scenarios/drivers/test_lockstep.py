@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gridpeers.agents.agent_config import AgentConfig, Control, GraphRule
-from gridpeers.agents.lockstep_agent import LockstepAgent
+from gridpeers.agents.agent_node import AgentNode
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_node import PlantNode
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
@@ -120,7 +120,7 @@ def test_the_plant_refuses_agents_without_inverters() -> None:
 
 def test_an_agent_without_a_plant_says_so() -> None:
     """It waits twice the deadline, so that a plant would complain first."""
-    agent = LockstepAgent(agent_config("inv1"), "a")
+    agent = AgentNode(agent_config("inv1"), "a")
     agent.start(0.0)
     agent.expire(19.9)
     assert not agent.finished

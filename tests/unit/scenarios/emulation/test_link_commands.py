@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
+from gridpeers.agents.agent_node import AgentNode
 from gridpeers.agents.link_command_receiver import LinkCommandReceiver
-from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.netem.fault_schedule import Heal
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem, NodeFault
@@ -36,7 +36,7 @@ CUT = LinkCommand(fault=Fault(on="inv2 -> inv1", cut=True)).to_tree()
 def agent_lab() -> agent_side.Lab:
     """The agent of inv1, which ticks and hears inv2, behind links without a fault."""
     lab = agent_side.Lab()
-    lab.side = RealtimeAgent(replace(agent_config("inv1"), clock="wall"), "me", EmulatedLinks("inv1", SETUP))
+    lab.side = AgentNode(replace(agent_config("inv1"), clock="wall"), "me", EmulatedLinks("inv1", SETUP))
     lab.side.start(lab.now)
     lab.token("plant")
     lab.meet("inv2")
