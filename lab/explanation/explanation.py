@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
 
+from gridpeers.agents.laws.call import objection_to
 from gridpeers.agents.laws.law import Neighbour
 from gridpeers.lab.explanation.law_step import LawStep, law_step
 from gridpeers.netem.ledger import Outcome, copies_of
@@ -220,9 +221,12 @@ def missed(
     since = 0.0 if each.state is None else each.state.t
     last = -1 if each.number is None else each.number
     counts: Counter[str] = Counter()
+    declared = {quantity.name: quantity for quantity in decision.config.control.law.shared}
     for message in record.messages(each.name, since=since, until=decision.t - 0.5 * decision.config.T_c, kind="State"):
         if message.number > last or (each.state is not None and message.epoch != each.state.epoch):
-            counts[_fate(message, fates)] += 1
+            fate, state = _fate(message, fates), message.message
+            beyond = isinstance(state, State) and not fate and objection_to(state.shared, declared)
+            counts['rejected as "implausible"' if beyond else fate] += 1
     others: Counter[str] = Counter()
     for number, kind, count in sorted(rejected.get(each.name, ()), reverse=True):
         if number > last or (number < 0 and kind != "stale"):  # a stale one is older than the last one heard

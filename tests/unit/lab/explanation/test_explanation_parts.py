@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from gridpeers.agents.agent_config import LawChoice
+from gridpeers.agents.agent_config import LawChoice, SharedQuantity
 from gridpeers.agents.laws.law import Law, Neighbour, Own, SetPoints, Term, Terms
 from gridpeers.lab.explanation import law_step as module
 from gridpeers.lab.explanation.explanation import WORDS, missed, reason, verdicts
@@ -83,6 +83,18 @@ def test_messages_that_were_dropped_unread_are_all_told() -> None:
     )
     text = missed(none, EVERY, EVERY.neighbours[0], {}, {"inv2": [(-1, "excess", 1)]})
     assert text == 'no state since; 1 message on its key rejected as "excess"'
+
+
+def test_a_state_with_a_value_beyond_the_range_of_the_law_was_rejected() -> None:
+    """The agent that heard it dropped it, unless it did not even come."""
+    law = LawChoice(shared=(SharedQuantity(name="x", low=0.0, high=1.0),))
+    config = agent_config("inv1", replace(ALL_FULL, law=law))
+    decided = RecordedDecision(**vars(EVERY) | {"config": config})
+    record = record_of(messages=lambda *words, **more: iter(sent("inv2", 6, 7, shared={"x": 2.0})))
+
+    text = missed(record, decided, decided.neighbours[0], {("inv2", 6): [(0.12, "loss")]}, {})
+
+    assert text == f'2 states since: 1 {WORDS["loss"]}, 1 rejected as "implausible"'
 
 
 def test_each_reason_has_its_words() -> None:
