@@ -95,7 +95,7 @@ class ProgramReady(msgspec.Struct, frozen=True, kw_only=True):
     error: str = ""
 
 
-class Decision(msgspec.Struct, frozen=True, kw_only=True):
+class ProgramDecision(msgspec.Struct, frozen=True, kw_only=True):
     P_set: float | None = None
     V_set: float | None = None
     shared: dict[str, float] = {}
@@ -134,7 +134,7 @@ class ProgramLaw(Law):
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
         around = [other._asdict() | {"shared": dict(other.shared)} for other in neighbours]
         line = {"type": "step", "own": own._asdict(), "neighbours": around, "T": T}
-        decision = self._ask(line, Decision, own.t)
+        decision = self._ask(line, ProgramDecision, own.t)
         if decision.P_set is None or decision.V_set is None:
             missing = "P_set" if decision.P_set is None else "V_set"
             raise LawError(f"{self._name} answered a step at t = {own.t:.6g} s without {missing}; e.g. {EXAMPLE}")

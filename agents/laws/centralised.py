@@ -25,6 +25,25 @@ from typing import Annotated, Any
 from gridpeers.agents.laws.law import Law, Neighbour, Own, SetPoints, Term, Terms
 from gridpeers.wire.schema.table_schema import SHARED, Range, Unit
 
+_Step = tuple[float, float, float]  # A correction before, the change of its integral, the correction after (pu)
+
+
+class _Correction:
+    """Proportional-integral control of one error (pu)."""
+
+    def __init__(self, k_p: float, k_i: float) -> None:
+        self._k_p, self._k_i = k_p, k_i
+        self.start(0.0)
+
+    def start(self, correction: float) -> None:
+        self._integral, self._error = correction, 0.0
+
+    def step(self, error: float, T: float) -> _Step:
+        before, more = self._integral + self._k_p * self._error, self._k_i * T * error
+        self._integral += more
+        self._error = error
+        return before, more, self._integral + self._k_p * error
+
 
 class Centralised(Law):
     """PI control of frequency and mean voltage at one inverter, whose corrections all others take over."""
@@ -42,35 +61,23 @@ class Centralised(Law):
 
     def __init__(self, **parameters: Any) -> None:
         super().__init__(**parameters)
-        self._omega = self._E = 0.0
-        """Integrals of the centre (pu)."""
-        self._errors = 0.0, 0.0
-        """Errors of frequency and voltage at its last step (pu)."""
+        self._of_omega, self._of_E = _Correction(self.k_p, self.k_i), _Correction(self.k_pE, self.k_iE)
 
     def start(self, own: Own) -> None:
-        self._omega, self._E = own.m_p * own.P_set, own.V_set - 1.0
-        self._errors = 0.0, 0.0
+        self._of_omega.start(own.m_p * own.P_set)
+        self._of_E.start(own.V_set - 1.0)
 
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
         if own.name == self.centre:
-            return self._centre_step(own, self._mean_error(own, neighbours), T)
+            of_omega, of_E = self._of_omega.step(-own.e, T), self._of_E.step(self._mean_error(own, neighbours), T)
+            P_set, V_set, shared = of_omega[2] / own.m_p, 1.0 + of_E[2], {"omega": of_omega[2], "E": of_E[2]}
+            return SetPoints(P_set, V_set, shared, True, partial(_terms_of_centre, own, of_omega, of_E))
         for other in neighbours:
             if other.name == self.centre and "omega" in other.shared:
                 P_set, V_set = other.shared["omega"] / own.m_p, 1.0 + other.shared["E"]
                 terms = partial(_terms_of_correction, own, P_set, V_set, other.name)
                 return SetPoints(P_set, V_set, {"V": own.V}, True, terms)
         return SetPoints(own.P_set, own.V_set, {"V": own.V}, True, Terms)
-
-    def _centre_step(self, own: Own, V_error: float, T: float) -> SetPoints:
-        f_before, V_before = self._errors
-        omega_before, E_before = self._omega - self.k_p * f_before, self._E + self.k_pE * V_before
-        more_omega, more_E = -self.k_i * T * own.e, self.k_iE * T * V_error
-        self._omega += more_omega
-        self._E += more_E
-        self._errors = own.e, V_error
-        omega, E = self._omega - self.k_p * own.e, self._E + self.k_pE * V_error
-        terms = partial(_terms_of_centre, own, (omega_before, more_omega, omega), (E_before, more_E, E))
-        return SetPoints(omega / own.m_p, 1.0 + E, {"omega": omega, "E": E}, True, terms)
 
     def _mean_error(self, own: Own, neighbours: Sequence[Neighbour]) -> float:
         """Return the error of the mean of the voltages that the centre knows (pu)."""
@@ -83,19 +90,13 @@ def _terms_of_correction(own: Own, P_set: float, V_set: float, centre: str) -> T
     return Terms((Term(name, P_set - own.P_set, centre),), (Term(name, V_set - own.V_set, centre),))
 
 
-def _terms_of_centre(own: Own, of_omega: tuple[float, float, float], of_E: tuple[float, float, float]) -> Terms:
-    """Return the terms of a step from each correction before, the change of its integral, and the correction after."""
-    (omega_before, more_omega, omega), (E_before, more_E, E) = of_omega, of_E
-    beyond = "integral beyond the limit"  # 0 but after a limit: the integrals go on, while the set-points stay
-    return Terms(
-        (
-            Term("integral of frequency error", more_omega / own.m_p),
-            Term("change of frequency error", (omega - omega_before - more_omega) / own.m_p),
-            Term(beyond, omega_before / own.m_p - own.P_set),
-        ),
-        (
-            Term("integral of voltage error", more_E),
-            Term("change of voltage error", E - E_before - more_E),
-            Term(beyond, 1.0 + E_before - own.V_set),
-        ),
-    )
+def _terms_of_centre(own: Own, of_omega: _Step, of_E: _Step) -> Terms:
+    found = []
+    for name, (before, more, after), base, beyond in (
+        ("frequency error", of_omega, own.m_p, of_omega[0] / own.m_p - own.P_set),
+        ("voltage error", of_E, 1.0, 1.0 + of_E[0] - own.V_set),
+    ):
+        change = Term(f"change of {name}", (after - before - more) / base)
+        # The last is 0 but after a limit: the integral goes on beyond it, while the set-point stays.
+        found.append((Term(f"integral of {name}", more / base), change, Term("integral beyond the limit", beyond)))
+    return Terms(found[0], found[1])

@@ -64,3 +64,31 @@ def test_a_run_folder_has_its_figure(law: dict[str, str], tmp_path: Path) -> Non
 
     assert (tmp_path / "run" / "plots" / "Omega.png").exists()
     assert np.isfinite(gp.read(tmp_path / "run").quantity("Omega").to_numpy()).all()
+
+
+PROGRAM = """
+import json, sys
+for line in sys.stdin:
+    asked = json.loads(line)
+    own = asked["own"]
+    if asked["type"] == "start":
+        Omega = own["m_p"] * own["P_set"]
+        print('{"type": "ready"}', flush=True)
+        continue
+    others = [n["shared"]["Omega"] for n in asked["neighbours"] if "Omega" in n["shared"]]
+    Omega += 0.5 * (sum(others) / len(others) - Omega if others else 0.0) - asked["T"] / 0.2 * own["e"]
+    print(json.dumps({"P_set": Omega / own["m_p"], "V_set": own["V_set"], "shared": {"Omega": Omega}}), flush=True)
+"""
+
+
+def test_a_program_shares_what_the_class_does(law: dict[str, str], tmp_path: Path) -> None:
+    """Declared in the scenario: the same quantity, to the last bit, with the same unit."""
+    (tmp_path / "law.py").write_text(PROGRAM, encoding="utf-8")
+    declared = [{"name": "Omega", "unit": "pu", "low": -0.05, "high": 0.05}]
+    program = {"command": [sys.executable, str(tmp_path / "law.py")], "time_limit_s": 30.0, "shared": declared}
+
+    one, other = (gp.load("islanding").replace({**SHORT, "case.IV.law": of}).run("IV") for of in (law, program))
+
+    assert one.sha256 == other.sha256
+    assert one.quantity("Omega").equals(other.quantity("Omega"))
+    assert other.quantity("Omega").attrs["units"]["Omega"] == "pu"
