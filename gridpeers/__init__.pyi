@@ -16,6 +16,10 @@ from gridpeers.lab.replay.counterfactual import counterfactual as counterfactual
 from gridpeers.lab.replay.replay import replay as replay
 from gridpeers.netem.models.own_fault import FAULTS
 from gridpeers.netem.models.own_fault import LinkFault as LinkFault
+from gridpeers.plant.inverters.inverter_model import InverterModel as InverterModel
+from gridpeers.plant.inverters.inverter_model import heun as heun
+from gridpeers.plant.inverters.inverter_model import inject as inject
+from gridpeers.plant.inverters.inverter_registry import INVERTERS
 from gridpeers.runs.comparison import Comparison as Comparison
 from gridpeers.runs.comparison import compare as compare
 from gridpeers.runs.result import Result as Result
@@ -54,6 +58,7 @@ from gridpeers.wire.schema.table_schema import Unit as Unit
 check = CHECKS.register
 claim = CLAIMS.register
 graph = GRAPHS.register
+inverter = INVERTERS.register
 law = LAWS.register
 link_fault = FAULTS.register
 metric = METRICS.register

@@ -12,8 +12,8 @@ from msgspec.structs import replace
 from gridpeers.plant.equipment import NODES, PHASES, InverterRow
 from gridpeers.plant.equipment import Feeder as Tables
 from gridpeers.plant.equipment.imported_equipment import is_behind
-from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters
 from gridpeers.plant.equipment.neutrals import neutral_for, neutrals_of
+from gridpeers.plant.inverters.inverter_model import InverterModel
 from gridpeers.rooms import READERS
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ class Feeder(Tables, frozen=True, kw_only=True):
         microgrid: str = "MG1",
         m_p: float = 0.01,
         m_q: float = 0.05,
-        params: str | Mapping[str, Any] | GfmParameters | GflParameters | None = None,
+        params: str | Mapping[str, Any] | InverterModel | None = None,
     ) -> Feeder:
         """Return the feeder with one inverter more; ValueError says why there can be none.
 

@@ -6,9 +6,10 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
-from gridpeers.plant.equipment.inverter_parameters import GflParameters as GflParameters
-from gridpeers.plant.equipment.inverter_parameters import GfmParameters as GfmParameters
-from gridpeers.plant.equipment.inverter_parameters import OwnParameters
+from gridpeers.plant.inverters.gfl import Gfl
+from gridpeers.plant.inverters.gfm_droop import GfmDroop
+from gridpeers.plant.inverters.inverter_model import Kind, Method
+from gridpeers.plant.inverters.inverter_registry import ParameterSet, model_of
 from gridpeers.wire.journal import RecordLevel
 from gridpeers.wire.messages import LoadSetting
 from gridpeers.wire.schema.table_schema import Example, Plausible, Unit
@@ -86,7 +87,7 @@ class InverterChange(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
     m_q: float | None = None  # Q-V droop (pu voltage per pu reactive power)
     P_rated: float | None = None  # rated power (W)
     parameters: str | None = None  # name of the feeder's set of parameters, in place of the one that its table names
-    own: OwnParameters = OwnParameters()  # parameters that replace those of that set and of its kind
+    own: ParameterSet = {}  # parameters that replace those of that set and of its kind
 
 
 class FeederChanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -97,9 +98,6 @@ class FeederChanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     m_p_factor: float = 1.0  # factor on the P-f droops of all inverters without an m_p below
     m_q_factor: float = 1.0  # factor on the Q-V droops of all inverters without an m_q below
     inverters: dict[str, InverterChange] = {}  # changes by inverter
-
-
-Method = Literal["first-order", "second-order"]
 
 
 class PlantSettings(msgspec.Struct, frozen=True, kw_only=True):
@@ -113,8 +111,8 @@ class PlantSettings(msgspec.Struct, frozen=True, kw_only=True):
     method: Method = "first-order"  # method of time stepping
     P_set0: float = 0.647  # first P_set of every inverter (pu of its rating)
     V_set0: float = 1.0  # first V_set of every inverter (pu of its nominal voltage)
-    gfm: GfmParameters = GfmParameters()
-    gfl: GflParameters = GflParameters()
+    gfm: Any = GfmDroop()  # an `InverterModel`: that of the GFM that have no other; in JSON, its parameters
+    gfl: Any = Gfl()  # that of the GFL
     protection: Protection = Protection()
     events: tuple[SwitchEvent, ...] = ()  # switches operated on schedule
     sync_check: SyncCheck = SyncCheck()
@@ -122,6 +120,12 @@ class PlantSettings(msgspec.Struct, frozen=True, kw_only=True):
     loads: tuple[LoadEvent, ...] = ()  # scheduled changes of loads
     changes: FeederChanges = FeederChanges()  # changes to the feeder's tables
     spares: tuple[str, ...] = ()  # spare inverters of the run, off at the start
+
+    def __post_init__(self) -> None:
+        for name in ("gfm", "gfl"):
+            if isinstance(values := getattr(self, name), dict):
+                kind: Kind = "GFM" if name == "gfm" else "GFL"
+                msgspec.structs.force_setattr(self, name, model_of(values, kind))
 
 
 OnLawFailure = Literal["droop", "stop"]

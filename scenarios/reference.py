@@ -16,6 +16,7 @@ import msgspec
 from gridpeers.agents import graphs
 from gridpeers.agents.carriers.law_registry import LAWS
 from gridpeers.netem.models import own_fault
+from gridpeers.plant.inverters.inverter_registry import INVERTERS
 from gridpeers.plant.tables.feeder_columns import TABLES, LoadColumns, Manifest
 from gridpeers.scenarios.checks import check_registry
 from gridpeers.scenarios.results import claims, metric
@@ -110,8 +111,18 @@ _LAW = """A class derived from gridpeers.Law; `docs/laws.md` has the contract.
             return gridpeers.SetPoints(P_set=own.P_set, V_set=own.V_set)
 """
 
+_INVERTER = """A class derived from gridpeers.InverterModel; `docs/inverter-models.md` has the contract and an example.
+
+    class Mine(gridpeers.InverterModel):
+        H: Annotated[float, Unit("s"), Plausible("an inertia constant", 0.01, 20.0), "Inertia."] = 0.1
+        STATES: ClassVar = ("q",)
+        def advance(g, t, x0, x, d, h, second): ...
+        def rest(g, x, V, I, J, S, v): ...
+"""
+
 _REGISTRIES: dict[str, tuple[Registry[Any], str, str]] = {
     "laws": (LAWS, _LAW, 'law = "mine:Mine", or law = { use = "mine:Mine", gain = 2.0 }, for all cases or in one'),
+    "inverters": (INVERTERS, _INVERTER, 'model = "mine:Mine" in [plant.gfm], [plant.gfl] or [plant.inverter.NAME]'),
     "metrics": (
         metric.METRICS,
         metric.__doc__ or "",

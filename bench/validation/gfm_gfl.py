@@ -15,7 +15,8 @@ from gridpeers.bridges.gridlabd.glm import inverter_blocks
 from gridpeers.bridges.gridlabd.glm_network import block
 from gridpeers.plant.dynamics import Circuit, Dynamics, Inverter
 from gridpeers.plant.dynamics.circuit import LoadLaw
-from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters
+from gridpeers.plant.inverters.gfl import Gfl
+from gridpeers.plant.inverters.gfm_droop import GfmDroop
 
 H = 0.002
 """Step (s)."""
@@ -55,8 +56,8 @@ TERMINALS = {"GFM": "Meter1", "GFL": "Load2"}
 START_POWER = {"GFM": 60e3 + 0j, "GFL": 60e3 + 10e3j}
 """Powers at the start (VA); that of the GFM, which holds the voltage, is a first guess."""
 
-GFM = GfmParameters(R_f=0.014, X_f=0.1636, P_max=1.0, k_pp=0.0, k_ip=90.9)
-GFL = GflParameters(X_f=0.10, F_current=0.0, T_ff=0.05, T_pf=0.5, T_vf=0.05, T_qf=0.2, S_max=1.0, i_max=1.0)
+GFM = GfmDroop(R_f=0.014, X_f=0.1636, P_max=1.0, k_pp=0.0, k_ip=90.9)
+GFL = Gfl(X_f=0.10, F_current=0.0, T_ff=0.05, T_pf=0.5, T_vf=0.05, T_qf=0.2, S_max=1.0, i_max=1.0)
 
 
 def gfm_gfl_circuit(z_load4: complex) -> Circuit:
@@ -83,7 +84,7 @@ def gfm_gfl_circuit(z_load4: complex) -> Circuit:
     )
 
 
-def gfm_gfl_dynamics(gfl: GflParameters = GFL) -> Dynamics:
+def gfm_gfl_dynamics(gfl: Gfl = GFL) -> Dynamics:
     """Return our plant of the case at rest, perhaps with another GFL."""
     units = (
         Inverter(name="GFM", kind="GFM", S_b=S_B, V_b=V_B, m_p=M_P, m_q=0.05, parameters=GFM),

@@ -22,8 +22,8 @@ from gridpeers.plant.dynamics import Circuit, Dynamics, Inverter
 from gridpeers.plant.dynamics.circuit import aligned_sum
 from gridpeers.plant.equipment import Bus, Feeder, Source
 from gridpeers.plant.equipment.imported_equipment import LinearElement
-from gridpeers.plant.equipment.inverter_parameters import GfmParameters
 from gridpeers.plant.feeder.circuits import circuit_of
+from gridpeers.plant.inverters.gfm_droop import GfmDroop
 from gridpeers.plant.network import Network, solve_power_flow
 from gridpeers.plant.tables import read_feeder
 
@@ -203,7 +203,7 @@ class GridFormingIsland:
         """Return our plant at rest at these terminal phasors (V)."""
         V_b = V_LL / sqrt(3.0)
         # the limit is estimated at the last step's voltages, where so small an impedance shows more current than flows
-        parameters = GfmParameters(R_f=Z_GFM.real, X_f=Z_GFM.imag, I_max=100.0)
+        parameters = GfmDroop(R_f=Z_GFM.real, X_f=Z_GFM.imag, I_max=100.0)
         unit = Inverter(name="gfm", kind="GFM", S_b=S_RATED, V_b=V_b, m_p=0.01, m_q=M_Q, parameters=parameters)
         dynamics = Dynamics(self._circuit(self._islanded), (unit,), 0.002)
         dynamics.start(np.zeros(1), np.zeros(1), swing_voltage=V / V_b)

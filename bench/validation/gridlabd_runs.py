@@ -9,7 +9,8 @@ import msgspec
 from msgspec.structs import replace
 
 from bench.validation.validation_part import Kind
-from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters
+from gridpeers.plant.inverters.gfl import Gfl
+from gridpeers.plant.inverters.gfm_droop import GfmDroop
 from gridpeers.plant.plant_config import PlantConfig, SwitchEvent
 
 SHORT = 0.2
@@ -49,9 +50,9 @@ class ComparedRun(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Case of the scenario."""
     scenario: str = "islanding"
     """Scenario of the catalogue that it starts from."""
-    gfl: GflParameters | None = None
+    gfl: Gfl | None = None
     """S_max 1 pu is GridLAB-D's one rating of a GFL's reference and apparent power; it has no bound of V_set."""
-    gfm: GfmParameters | None = None
+    gfm: GfmDroop | None = None
     events: tuple[SwitchEvent, ...] = ()
     set_points: tuple[TimedSetPoints, ...] = ()
     reclosing: Reclosing | None = None

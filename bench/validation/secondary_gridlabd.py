@@ -19,7 +19,8 @@ from bench.validation.delta_mode import COMPLEX, REAL, RecordedRun, delta_header
 from bench.validation.secondary_feeder import INVERTERS, island_tables
 from gridpeers.bridges.gridlabd.glm import inverter_blocks
 from gridpeers.bridges.gridlabd.glm_network import block, network_blocks
-from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters
+from gridpeers.plant.inverters.gfl import Gfl
+from gridpeers.plant.inverters.gfm_droop import GfmDroop
 
 Z_0, Z_2 = 0.005 + 0.05j, 0.0072 + 0.254j
 """Impedances of zero and negative sequence of a machine (pu), those of GridLAB-D's class."""
@@ -93,8 +94,8 @@ H = 1e-3
 SWITCH = "250-251"
 """It connects the load."""
 
-GFM = GfmParameters(R_f=0.0025, X_f=0.05, P_max=1.2, k_pp=20.0, k_ip=60.0)
-GFL = GflParameters(model="current_source", frequency_watt=False, volt_var=False, P_min=0.0, S_max=1.0, i_max=1.0)
+GFM = GfmDroop(R_f=0.0025, X_f=0.05, P_max=1.2, k_pp=20.0, k_ip=60.0)
+GFL = Gfl(model="current_source", frequency_watt=False, volt_var=False, P_min=0.0, S_max=1.0, i_max=1.0)
 
 START_POWER = {"Inv1": 240e3 + 0j, "Inv2": 700e3 + 500e3j, "Inv3": 0j, "Inv4": 0j}
 """Powers of the inverters at the start (VA)."""

@@ -157,26 +157,21 @@ class ReplayedMachines(Dynamics):
         super().__init__(circuit, inverters, h)
         self._machines = machines
 
-    def release(self) -> None:
-        """Take out the machines' controllers, which only `start` needs."""
-        units = self.inverters
-        kept = units.gfl_at < len(units) - self._machines
-        units.gfl_at, units.gfl, units.gfl_state = units.gfl_at[kept], units.gfl[kept], units.gfl_state[kept]
-        self._gfl_0, self._gfl_d = units.gfl_state.copy(), units.gfl_state.copy()
-
     def solve(self, J: NDArray[np.complex128], *, second: bool) -> NDArray[np.float64]:
         """Solve the network with the machines' injections J (A, machines x 3), and pass the inverters' controllers.
 
         Readings are those of `Dynamics.run`, of this solution; 0 for the machines.
         """
         units, network, net = self.inverters, self.network, self.network.net
-        arrays = self.arrays()
         n = len(units)
+        arrays = self.arrays()
+        controlled = arrays.online & (np.arange(n) < n - self._machines)  # only `start` needs the machines' controllers
+        arrays = arrays._replace(online=controlled)
         if not second:
             keep_start(arrays)
         units.J[n - self._machines :] = J
         rotation = np.empty(net.leader.size, complex)
-        turn_frames(arrays, net, np.zeros(n), rotation)
+        turn_frames(arrays, net, rotation)
         tolerance, I_b = TOLERANCE * float(units.V_b.max()), np.empty(net.S.size, complex)
         if solve_within_limits(net, arrays, rotation, network.x, I_b, tolerance) < 0:
             raise RuntimeError("the network has no solution with the replayed machines")
@@ -228,7 +223,6 @@ class SecondaryPlant:
             S[name] = complex(np.vdot(J[i] * PHASES, V[name]))
         power = np.array([S[name] for name in DEVICES]) / dynamics.inverters.S_b
         dynamics.start(power.real, power.imag, swing_voltage=V["Inv2"] / V_NOM)
-        dynamics.release()
         self._inverters = dict(START_POWER)
         self._machines = self._machine_powers(J)
         P_set0 = {**_per_unit(START_POWER), **_per_unit(self._machines)}

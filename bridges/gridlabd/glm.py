@@ -8,11 +8,11 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from math import pi, sqrt
 from pathlib import Path
+from typing import Any
 
 from gridpeers.bridges.gridlabd.glm_network import F_NOM, TableRow, block, network_blocks
-from gridpeers.bridges.gridlabd.gridlabd_simulator import beyond_gridlabd, unrepresentable
+from gridpeers.bridges.gridlabd.gridlabd_simulator import unrepresentable
 from gridpeers.plant.equipment import Feeder
-from gridpeers.plant.equipment.inverter_parameters import GfmParameters, InverterParameters
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings
@@ -41,16 +41,14 @@ GFL_KEYS = {
 GFL_IMPEDANCES = {"Rfilter": "R_f", "Xfilter": "X_f", "kpc": "k_pc", "kic": "k_ic"}
 
 
-def inverter_blocks(
-    rows: Sequence[TableRow], start: Mapping[str, complex], parameters: Mapping[str, InverterParameters]
-) -> list[str]:
+def inverter_blocks(rows: Sequence[TableRow], start: Mapping[str, complex], parameters: Mapping[str, Any]) -> list[str]:
     """Return the objects of inverters, with the powers (VA) that they deliver at the start."""
     blocks = []
     for row in rows:
         S, own = start[row["name"]], parameters[row["name"]]
         rated, m_p, m_q = float(row["P_rated_kW"]) * 1e3, float(row["m_p_pu"]), float(row["m_q_pu"])
         unit: dict[str, str | float]
-        if isinstance(own, GfmParameters):
+        if row["kind"] == "GFM":
             unit = {
                 "control_mode": "GRID_FORMING",
                 "P_f_droop_setting_mode": "PSET_MODE",
@@ -101,7 +99,7 @@ def write_glm(
     folder: Path,
     load_set: str,
     start: Mapping[str, complex],
-    parameters: Mapping[str, InverterParameters],
+    parameters: Mapping[str, Any],
     h: float,
     seconds: int,
 ) -> str:
@@ -211,7 +209,7 @@ def export_glm(feeder: Feeder, settings: PlantSettings, seconds: int, voltages: 
     problems = unrepresentable(feeder)
     parameters = {row.name: feeder.parameters_of(row, settings.gfm, settings.gfl) for row in feeder.inverters}
     for row in feeder.inverters:
-        for key, value in beyond_gridlabd(parameters[row.name]).items():
+        for key, value in parameters[row.name].beyond_gridlabd().items():
             problems.append(f"{row.name} has {key} = {value}, which no {row.kind} of GridLAB-D has; leave it out")
     if problems:
         raise FeederError(feeder.name, tuple(problems))

@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from gridpeers.bridges.gridlabd.glm import write_glm
 from gridpeers.bridges.gridlabd.glm_text import messages
 from gridpeers.plant.dynamics.reduction import Reduction
-from gridpeers.plant.equipment.inverter_parameters import GflParameters
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.feeder.circuits import Circuits
 from gridpeers.plant.feeder.islands import Islands
 from gridpeers.plant.feeder.limit_events import SetPointLimits
 from gridpeers.plant.feeder.protection import Relays
 from gridpeers.plant.feeder.switchboard import Switchboard
+from gridpeers.plant.inverters.gfl import Gfl
 from gridpeers.plant.plant_config import PlantSettings, PowerLimit
 from gridpeers.plant.plant_interface import Reading, RecordedPlant, SimulatedPlant
 from gridpeers.plant.request_process import ProcessEndedError, RequestProcess, TransientFolder
@@ -121,7 +121,7 @@ class GridlabdPlant(SimulatedPlant, RecordedPlant):
         V = min(max(V_set / unit.V_nom, own.V_set_min), own.V_set_max)
         self._events += self._set_points.held(name, t, "P_set", P_set / 1e3, P * unit.P_rated / 1e3)
         self._events += self._set_points.held(name, t, "V_set", V_set, V * unit.V_nom)
-        if not isinstance(own, GflParameters):
+        if not isinstance(own, Gfl):
             self._writes.append((name, "Pset", P))
         else:  # GridLAB-D bounds it at S_max itself
             self._writes.append((name, "Pref", P_set if own.P_set_lim == own.S_max else P * unit.P_rated))
@@ -174,7 +174,7 @@ class GridlabdPlant(SimulatedPlant, RecordedPlant):
             self._events += self._islands.report(t, self._switchboard.closed, self._state)
         for limit in self._limits.pop(step, ()):
             name, own = limit.inverter, self._parameters[limit.inverter]
-            assert isinstance(own, GflParameters), "a scenario limits the power of a GFL alone"
+            assert isinstance(own, Gfl), "a scenario limits the power of a GFL alone"
             self._writes.append((name, "Pref_max", limit.P_max / (self._units[name].P_rated * own.S_max)))
             text = f"{name} has {limit.P_max / 1e3:g} kW available"
             self._events.append(PlantEvent(t=round(limit.t, 9), kind="limit", subject=name, text=text))

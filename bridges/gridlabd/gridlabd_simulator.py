@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from gridpeers.bridges.gridlabd.glm_network import F_NOM
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.equipment.connectivity import Node
-from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters, InverterParameters
+from gridpeers.plant.inverters.gfl import Gfl
 from gridpeers.plant.plant_config import FeederChanges, PlantConfig
 from gridpeers.plant.plant_interface import LivePlant
 from gridpeers.plant.simulators import Simulator
@@ -67,11 +67,11 @@ class GridlabdSimulator(Simulator):
         beyond: dict[str, str] = {}
         for row in feeder.inverters:
             own = feeder.parameters_of(row, scenario.plant.gfm, scenario.plant.gfl)
-            kind = "gfm" if isinstance(own, GfmParameters) else "gfl"
-            for key, value in beyond_gridlabd(own).items():
-                text = f"GridLAB-D has no such {kind.upper()}, got {value} at {row.name}; leave it out"
+            kind = row.kind.lower()
+            for key, value in own.beyond_gridlabd().items():
+                text = f"GridLAB-D has no such {row.kind}, got {value} at {row.name}; leave it out"
                 beyond.setdefault(f"plant.{kind}.{key}", text)
-            if isinstance(own, GflParameters) and own.P_set_lim > own.S_max:
+            if isinstance(own, Gfl) and own.P_set_lim > own.S_max:
                 beyond.setdefault(
                     "plant.gfl.P_set_lim_pu",
                     f"GridLAB-D clips P_set at S_max_pu = {own.S_max:g} pu, got {own.P_set_lim:g} pu at {row.name}; "
@@ -160,26 +160,3 @@ def unrepresentable(feeder: Feeder) -> list[str]:
             if not GLM_NAME.fullmatch(prefix + name):
                 problems.append(f'{kind} "{name}": GridLAB-D takes letters, digits, _ and - for a name; rename it')
     return problems
-
-
-def beyond_gridlabd(own: InverterParameters) -> dict[str, str]:
-    """Return, by their keys in a file, the values that no inverter of GridLAB-D has.
-
-    `glm.inverter_blocks` writes every other parameter, but for bounds of set-points, which are applied before GridLAB-D
-    gets these.
-    """
-    found: dict[str, str] = {}
-    if isinstance(own, GfmParameters):
-        if own.model != "gridlabd":
-            found["model"] = f'"{own.model}"'
-        if not own.voltage_control:
-            found["voltage_control"] = "false"
-        if own.V_lim != GfmParameters().V_lim:  # fixed in GridLAB-D
-            found["V_lim_pu"] = f"{own.V_lim:g}"
-    else:
-        if own.dead_band != "gridlabd":
-            found["dead_band"] = f'"{own.dead_band}"'
-        for key in ("Q_max", "Q_min"):  # GridLAB-D overwrites its own with what P leaves
-            if getattr(own, key) != getattr(GflParameters(), key):
-                found[f"{key}_pu"] = f"{getattr(own, key):g}"
-    return found

@@ -13,7 +13,7 @@ from scipy.linalg import expm
 from gridpeers.agents.agent_config import Control, Gains
 from gridpeers.agents.graphs import in_neighbours
 from gridpeers.plant.equipment import Feeder
-from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters, InverterParameters
+from gridpeers.plant.inverters.inverter_model import DroopLag, FollowerLag, InverterModel
 from gridpeers.scenarios.results.history import Flags, Floats
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.scenarios.schema.configs import configs
@@ -38,20 +38,20 @@ class InverterGroup:
     """Of the law; its limits are not part of a linear model."""
     f_nom: float
     T_c: float
-    parameters: tuple[InverterParameters, ...]
+    parameters: tuple[InverterModel, ...]
 
     @property
     def n(self) -> int:
         return len(self.names)
 
     @property
-    def gfl(self) -> tuple[GflParameters, ...]:
-        return tuple(it for it in self.parameters if isinstance(it, GflParameters))
+    def followers(self) -> tuple[FollowerLag, ...]:
+        return tuple(lag for lag in map(response_of, self.parameters) if isinstance(lag, FollowerLag))
 
     @property
     def T_p(self) -> float:
         """Time constant (s) of the sum of the GFM's filtered powers: the mean of their own ones by weight."""
-        T_p = np.array([it.T_p for it in self.parameters if isinstance(it, GfmParameters)])
+        T_p = np.array([lag.T_p for lag in map(response_of, self.parameters) if isinstance(lag, DroopLag)])
         own = self.weight[self.GFM]
         return float(T_p[0] if (T_p == T_p[0]).all() else T_p @ own / own.sum())
 
@@ -89,6 +89,17 @@ class InverterGroup:
             A=self.A[np.ix_(at, at)],
             **arrays,
         )
+
+
+def response_of(model: InverterModel) -> DroopLag | FollowerLag:
+    """Return a model's linear response; ValueError says that it has none, so that nothing can be predicted."""
+    found = model.response()
+    if found is None:
+        raise ValueError(
+            f'the model "{model.model}" has no linear response (`InverterModel.response`), by which predictions are '
+            "made; run it instead"
+        )
+    return found
 
 
 def inverter_group_of(
@@ -181,8 +192,8 @@ def response(inverters: InverterGroup, plant: PlantModel = "lagged") -> Response
 
 def _quasi_steady(inverters: InverterGroup) -> Response:
     n, w = inverters.n, inverters.weight
-    droops = [isinstance(it, GfmParameters) or it.frequency_watt for it in inverters.parameters]
-    follows = np.array(droops, float)
+    lags = map(response_of, inverters.parameters)
+    follows = np.array([isinstance(lag, DroopLag) or lag.frequency_watt for lag in lags], float)
     stiffness = float(w @ follows)
     D, F = w / stiffness, -1.0 / stiffness
     return Response(
@@ -199,10 +210,10 @@ def _quasi_steady(inverters: InverterGroup) -> Response:
 
 
 def _lagged(inverters: InverterGroup) -> Response:
-    n, w, gfl = inverters.n, inverters.weight, inverters.gfl
+    n, w, followers = inverters.n, inverters.weight, inverters.followers
     forming, following = np.flatnonzero(inverters.GFM), np.flatnonzero(~inverters.GFM)
     w_F = float(w[forming].sum())
-    locks = dict.fromkeys((it.k_pPLL, it.k_iPLL, it.T_ff) for it in gfl)  # GFL with equal ones see the same
+    locks = dict.fromkeys((it.k_pPLL, it.k_iPLL, it.T_ff) for it in followers)  # GFL with equal ones see the same
     phi_of = {lock: 3 + 3 * k for k, lock in enumerate(locks)}
     u, first = 0, 1 + 3 * len(locks)
     size = first + following.size
@@ -221,7 +232,7 @@ def _lagged(inverters: InverterGroup) -> Response:
         A[delta, zeta] -= 1.0
         A[zeta, delta] = k_i
         A[phi, [delta, zeta, phi]] = k_p / T_ff, 1.0 / T_ff, -1.0 / T_ff
-    for power, unit, it in zip(powers, following, gfl, strict=True):
+    for power, unit, it in zip(powers, following, followers, strict=True):
         A[power, phi_of[it.k_pPLL, it.k_iPLL, it.T_ff]] = -1.0 / it.T_pf if it.frequency_watt else 0.0
         A[power, power] = -1.0 / it.T_pf
         B[power, unit] = 1.0 / it.T_pf

@@ -31,7 +31,7 @@ from gridpeers.lab.predict.droop_runs import (
     var_response,
     var_spectral_radius,
 )
-from gridpeers.lab.predict.inverter_group import InverterGroup, inverter_group_of
+from gridpeers.lab.predict.inverter_group import InverterGroup, inverter_group_of, response_of
 from gridpeers.lab.predict.linear_model import Loop, delay_limit
 from gridpeers.lab.predict.times import Times, predicted_times
 from gridpeers.plant.dynamics import PlantError
@@ -40,7 +40,7 @@ from gridpeers.runs.choices import with_cases
 from gridpeers.scenario import Scenario, as_scenario
 from gridpeers.scenarios.run_request import BrokenRunError
 from gridpeers.scenarios.schema import ScenarioError, ScenarioModel
-from gridpeers.scenarios.schema.participants import is_calm, netem_of
+from gridpeers.scenarios.schema.participants import inverters_of, is_calm, netem_of
 from gridpeers.scenarios.schema.plugin_keys import law_of
 
 LIMITS: dict[DelayKind, str] = {
@@ -56,7 +56,7 @@ def predict(scenario: Scenario | str | Path, case: str, *, voltage: bool = True)
     """Predict how a case of an experiment will go, without running it; its text has the modes of vars with `voltage`.
 
     Raise ScenarioError if there is no such case, or it runs another law than "consensus", of which theory knows
-    nothing; BrokenRunError if the plant has no solution on droop alone.
+    nothing, or an inverter's model has no linear response; BrokenRunError if the plant has no solution on droop alone.
     """
     known = as_scenario(scenario)
     return predictions(with_cases(known.spec, [case]), known.feeder, voltage=voltage)[case]
@@ -69,6 +69,11 @@ def predictions(spec: ScenarioModel, feeder: Feeder, *, voltage: bool) -> dict[s
             f'case {case}: runs the law {name}, and the predictions are of the law "{PAPER}" alone; run it instead'
             for case, name in others.items()
         )
+    for row in inverters_of(spec, feeder):
+        try:
+            response_of(feeder.parameters_of(row, spec.plant.gfm, spec.plant.gfl))
+        except ValueError as error:
+            raise ScenarioError([f"{row.name}: {error}"]) from None
     try:
         steps, plant = load_steps(spec, feeder), var_response(spec, feeder) if voltage else None
     except PlantError as error:

@@ -110,7 +110,7 @@ def _beyond_limits(inverters: InverterGroup, path: Path) -> str:
     acts, s, gains = inverters.acts, inverters.s, inverters.gains
     if not acts.any():
         return ""
-    highest = np.minimum(gains.P_set_max, [it.P_max for it in inverters.parameters])
+    highest = np.minimum(gains.P_set_max, [getattr(it, "P_max", math.inf) for it in inverters.parameters])
     needed = float((path.power[-1] / inverters.m_p * s)[acts].sum() / s[acts].sum())
     limit = float((highest * s)[acts].sum() / s[acts].sum())
     if needed <= limit:

@@ -107,22 +107,21 @@ def set_equilibrium(units: Inverters, point: OperatingPoint, online: Flags, P: R
 
 def require_within_limits(units: Inverters, online: Flags) -> None:
     """Raise PlantError if the start is no equilibrium: a GFM that forms an island must be within its limits."""
-    for k, i in enumerate(units.gfm_at.tolist()):
-        if not online[i]:
-            continue
-        unit, limits, state = units.units[i], units.gfm[k], units.gfm_state[k]
-        for what, value, base, symbol, low, high in (
-            ("give", units.set_points[i, 0], unit.S_b / 1e3, "kW", "P_min", "P_max"),
-            ("give", state["q"], unit.S_b / 1e3, "kvar", "Q_min", "Q_max"),
-            ("have an internal voltage of", state["E"], 1.0, "pu", "E_min", "E_max"),
-        ):
-            if not limits[low] - 1e-9 <= value <= limits[high] + 1e-9:
+    S, _ = units.measured(units.V, units.I)
+    words = {"P": "give", "Q": "give", "E": "have an internal voltage of"}
+    for i in np.flatnonzero(units.forming & online).tolist():
+        unit, E = units.units[i], abs(units.J[i, 0] / units.y_f[i]) / units.V_b[i]
+        values = {"P": units.set_points[i, 0], "Q": S[i].imag, "E": E}
+        for what, symbol, lowest, highest in unit.parameters.BOUNDS_AT_REST:
+            value, base = values[what], 1.0 if symbol == "pu" else unit.S_b / 1e3
+            low, high = getattr(unit.parameters, lowest), getattr(unit.parameters, highest)
+            if not low - 1e-9 <= value <= high + 1e-9:
                 raise PlantError(
-                    f"no equilibrium at t = 0: {unit.name} would have to {what} {value * base:.5g} {symbol}, "
-                    f"it can from {limits[low] * base:.5g} to {limits[high] * base:.5g} {symbol} ({low}_pu, "
-                    f"{high}_pu of [plant.gfm]); set another P_set0_pu or V_set0_pu, or change its load"
+                    f"no equilibrium at t = 0: {unit.name} would have to {words[what]} {value * base:.5g} {symbol}, "
+                    f"it can from {low * base:.5g} to {high * base:.5g} {symbol} ({lowest}_pu, "
+                    f"{highest}_pu of [plant.gfm]); set another P_set0_pu or V_set0_pu, or change its load"
                 )
-        current, most = float(np.max(np.abs(units.I[i]))), float(limits["I_limit"])
+        current, most = float(np.max(np.abs(units.I[i]))), float(units.I_limit[i])
         if current > most * (1.0 + 1e-9):
             raise PlantError(
                 f"no equilibrium at t = 0: {unit.name} would have to carry {current:.5g} A in a phase, it can carry "

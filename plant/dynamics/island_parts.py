@@ -8,23 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from gridpeers.plant.dynamics.kernel.compiled import Flags, Integers, Real
-from gridpeers.plant.dynamics.kernel.controller_pass import READING, Units
+from gridpeers.plant.dynamics.kernel.controller_pass import ADVANCED, READING, Units
 from gridpeers.plant.dynamics.kernel.network_arrays import BlockFactors, Reduced, SparseMaps
 from gridpeers.plant.dynamics.kernel.step import run_steps_unlocked
 from gridpeers.plant.dynamics.threads import each_on_a_core
 
 PART = 1000  # nodes from which on a part is large enough: 0.3 MB of factors, and some 50 inverters
-_OF_GFM = ("gfm", "gfm_state", "gfm_0", "gfm_d")
-_OF_GFL = ("gfl", "gfl_state", "gfl_0", "gfl_d")
-_OF_INVERTERS = ("online", "set_points", "J", "J_0", "V", "I", "limiting")
-_ADVANCED = ("gfm_state", "gfl_state", "J", "V", "I", "limiting")
-"""Arrays of the inverters that the steps advance."""
-
 Which = Integers | slice  # some of the inverters: a slice where they are neighbours, which needs no copy
 
 
@@ -35,21 +28,14 @@ class Part:
     nodes: int
     size: int
     inverters: Which
-    gfm: Which  # its grid-forming inverters, among all of them
-    gfm_at: Integers  # the inverter of the part that each is
-    gfl: Which
-    gfl_at: Integers
 
     def take(self, units: Units) -> Units:
-        own: dict[str, Any] = {"gfm_at": self.gfm_at, "gfl_at": self.gfl_at}
-        for which, names in ((self.gfm, _OF_GFM), (self.gfl, _OF_GFL), (self.inverters, _OF_INVERTERS)):
-            own |= {name: getattr(units, name)[which] for name in names}
-        return units._replace(**own | {name: own[name].copy() for name in _ADVANCED})
+        own = {name: getattr(units, name)[self.inverters] for name in units._fields[1:]}  # all but f_nom
+        return units._replace(**own | {name: own[name].copy() for name in ADVANCED})
 
     def put(self, own: Units, units: Units) -> None:
-        units.gfm_state[self.gfm], units.gfl_state[self.gfl] = own.gfm_state, own.gfl_state
-        units.J[self.inverters], units.V[self.inverters], units.I[self.inverters] = own.J, own.V, own.I
-        units.limiting[self.inverters] = own.limiting
+        for name in ADVANCED:
+            getattr(units, name)[self.inverters] = getattr(own, name)
 
 
 class IslandParts:
@@ -121,7 +107,6 @@ def _part(net: Reduced, islands: Integers, of_part: Flags, node_island: Integers
     entries = np.flatnonzero(np.repeat(of_part[node_island], count))
     limited = np.flatnonzero(branch_at[net.limited_at] >= 0)
     terminals = maps.terminals[inverters]
-    gfm, gfl = (np.flatnonzero(inverter_at[at] >= 0) for at in (units.gfm_at, units.gfl_at))
     leader = net.leader[islands]
     sparse = SparseMaps(
         factored=BlockFactors(
@@ -160,10 +145,6 @@ def _part(net: Reduced, islands: Integers, of_part: Flags, node_island: Integers
         nodes=nodes.size,
         size=inverters.size,
         inverters=_which(inverters),
-        gfm=_which(gfm),
-        gfm_at=inverter_at[units.gfm_at[gfm]],
-        gfl=_which(gfl),
-        gfl_at=inverter_at[units.gfl_at[gfl]],
     )
 
 

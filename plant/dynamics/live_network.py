@@ -176,7 +176,7 @@ def unsettled_island(net: Reduced, units: Units, x: Real, tolerance: float) -> i
     still = np.ones(net.leader.size, complex)
     with np.errstate(all="ignore"):  # what diverges is not finite in the end
         for _ in range(MAX_LIMITING):
-            surplus = limit_currents(units.gfm, units.gfm_at, units.online, J, V, limiting)
+            surplus = limit_currents(units, J, V, limiting)
             before = x.copy(), V.copy()
             status = solve_network(net, J, still, x, I_b, V, tolerance)
             if status < 0 or surplus <= tolerance:

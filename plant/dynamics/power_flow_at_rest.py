@@ -167,9 +167,10 @@ def solve_by_droop(
     """
     units = flow.units
     free = ~swing & flow.reduction.online
-    limit = np.sqrt(np.maximum(units.S_max**2 - P**2, 0.0))
-    low, high = np.maximum(-limit, units.Q_min), np.minimum(limit, units.Q_max)
-    at_rest = VoltVarAtRest(V_set, units.m_q, units.db_UV, units.db_OV, units.from_edge, low, high)
+    S_max, Q_min, Q_max, db_UV, db_OV, from_edge = units.volt_var
+    limit = np.sqrt(np.maximum(S_max**2 - P**2, 0.0))
+    low, high = np.maximum(-limit, Q_min), np.minimum(limit, Q_max)
+    at_rest = VoltVarAtRest(V_set, units.m_q, db_UV, db_OV, from_edge > 0.0, low, high)
     place = np.where(free, at_rest.first_places(), DROOP)
     for rounds in range(MOST_PLACE_ROUNDS):
         J, V, Q = _at_places(flow, J, P, Q, at_rest, place, np.flatnonzero(free), swing)

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gridpeers.plant.dynamics.circuit import PHASES, Circuit, NoSolutionError, aligned_sum
 from gridpeers.plant.dynamics.equilibrium import OperatingPoint, equilibrium, set_equilibrium
@@ -14,10 +13,11 @@ from gridpeers.plant.dynamics.inverters import Inverter, Inverters
 from gridpeers.plant.dynamics.island_parts import is_large
 from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Real
 from gridpeers.plant.dynamics.kernel.controller_pass import READING, Units
-from gridpeers.plant.dynamics.kernel.second_order_step import Slopes, run_second_order_steps
+from gridpeers.plant.dynamics.kernel.model_pass import W, address_of
+from gridpeers.plant.dynamics.kernel.second_order_step import run_second_order_steps
 from gridpeers.plant.dynamics.kernel.step import FAILURES, run_steps, run_steps_unlocked
 from gridpeers.plant.dynamics.live_network import TOLERANCE, LiveNetwork, unsettled_island
-from gridpeers.plant.plant_config import Method
+from gridpeers.plant.inverters.inverter_model import Method
 
 MOST_RENEWALS = 20  # tangents of one network solution, while its limited currents shrink; two or three are enough
 
@@ -48,14 +48,7 @@ class Dynamics:
         self.network = LiveNetwork(circuit, self.inverters)
         self._single = np.flatnonzero(self.inverters.single)
         self._trips: list[Trip] = []
-        units = self.inverters
-        self._gfm_0, self._gfm_d = units.gfm_state.copy(), units.gfm_state.copy()
-        self._gfl_0, self._gfl_d = units.gfl_state.copy(), units.gfl_state.copy()
-        self._J_0 = units.J.copy()
-        self._slopes = Slopes(
-            *(_table(each) for each in (units.gfm_state, self._gfm_0, self._gfm_d, self._gfm_d.copy())),
-            *(_table(each) for each in (units.gfl_state, self._gfl_0, self._gfl_d, self._gfl_d.copy())),
-        )
+        self._slope_0 = np.zeros_like(self.inverters.state)
 
     def start(
         self, P: Real, Q: Real | None = None, V_set: Real | None = None, *, swing_voltage: Complex = PHASES
@@ -125,13 +118,7 @@ class Dynamics:
             units.set_points[i] = speed[i] / (units.m_p[i] * w_nom), v if v > 0.1 else 1.0, 0.0
         self.connect(self.network.circuit)
         for i, w in speed.items() if on else ():
-            if units.forming[i]:
-                units.gfm_state["w"][units.gfm_at == i] = w
-            else:  # its PLL has locked to the island's frequency before the contactor closes
-                follower = units.gfl_at == i
-                for name in ("w_i", "w_i_B", "w_i_C"):
-                    units.gfl_state[name][follower] = w
-                units.gfl_state["f"][follower] = units.gfl_state["f_m"][follower] = units.f_nom + w / (2.0 * np.pi)
+            units.lock(i, w)  # a PLL has locked to the island's frequency before the contactor closes
 
     def _trip(self, islands: Iterable[int], step: int) -> None:
         """Disconnect all inverters of these islands; where there are none, the substation, which stays off.
@@ -176,7 +163,7 @@ class Dynamics:
         """Return the speed (rad/s, relative to nominal) of inverter i's island; 0 with a source or if dead."""
         units, reduction = self.inverters, self.network.reduction
         leader = reduction.leader[reduction.inverter_island[i]]
-        return 0.0 if leader < 0 else float(units.gfm_state["w"][units.gfm_at == leader][0])
+        return 0.0 if leader < 0 else float(units.state[leader, W])
 
     def _mean_voltage(self, i: int) -> float:
         return float(np.mean(np.abs(self.inverters.V[i]))) / float(self.inverters.V_b[i])
@@ -216,7 +203,7 @@ class Dynamics:
                 except NoSolutionError as error:
                     islands = set(error.islands)
             units = self.inverters  # go back to the start of the step that failed
-            units.gfm_state[:], units.gfl_state[:], units.J[:] = self._gfm_0, self._gfl_0, self._J_0
+            units.state[:], units.J[:] = units.start, units.J_0
             network.note()
             self._trip(sorted(islands), step)
             self.connect(network.circuit, step)
@@ -228,27 +215,12 @@ class Dynamics:
         return out
 
     def arrays(self) -> Units:
+        """Return the tables of the inverters; the first time a model is compiled, or its machine code loaded."""
         units = self.inverters
-        return Units(
-            units.f_nom,
-            units.gfm,
-            units.gfm_at,
-            units.gfm_state,
-            self._gfm_0,
-            self._gfm_d,
-            units.gfl,
-            units.gfl_at,
-            units.gfl_state,
-            self._gfl_0,
-            self._gfl_d,
-            self.network.reduction.online,
-            units.set_points,
-            units.J,
-            self._J_0,
-            units.V,
-            units.I,
-            units.limiting,
-        )
+        if not units.passes.all():
+            units.passes[:] = [address_of(type(unit.parameters)) for unit in units.units]
+        units.online = self.network.reduction.online
+        return Units._make(getattr(units, name) for name in Units._fields)
 
     def _advance(self, begin: int, steps: int, out: Real) -> int:
         units, network, arrays, tolerance = self.inverters, self.network, self.arrays(), self._tolerance
@@ -261,19 +233,9 @@ class Dynamics:
                     return iterations
                 network.join_parts()
             return run_steps(begin, steps, self.h, tolerance, network.net, arrays, network.x, out)
-        return run_second_order_steps(
-            begin,
-            steps,
-            self.h,
-            tolerance,
-            network.net,
-            arrays,
-            arrays._replace(gfm_0=units.gfm_state, gfl_0=units.gfl_state),
-            self._slopes,
-            units.feed_forward,
-            network.x,
-            out,
-        )
+        present = arrays._replace(start=units.state)
+        own = self._slope_0, units.feed_forward, network.x, out
+        return run_second_order_steps(begin, steps, self.h, tolerance, network.net, arrays, present, *own)
 
     def voltages(self) -> Complex:
         """Return the voltages to earth of all nodes (V); 0 in dead islands and at nodes without any admittance."""
@@ -287,17 +249,11 @@ class Dynamics:
         units, reduction = self.inverters, self.network.reduction
         if reduction.has_source[island]:
             return units.f_nom
-        at = units.gfm_at
-        here = reduction.online[at] & (reduction.inverter_island[at] == island)
+        here = units.forming & reduction.online & (reduction.inverter_island == island)
         if not here.any():
             return 0.0
-        speed = np.average(units.gfm_state["w"][here], weights=units.S_b[at][here])
+        speed = np.average(units.state[here, W], weights=units.S_b[here])
         return units.f_nom + float(speed) / (2.0 * np.pi)
 
     def readings(self) -> Real:
         return self.inverters.readings(self.network.reduction.online)
-
-
-def _table(records: NDArray[np.void]) -> Real:
-    """Return records whose fields are all numbers as a table of the same memory."""
-    return records.view(np.float64).reshape(records.size, len(records.dtype.names or ()))

@@ -6,17 +6,10 @@ from collections.abc import Iterator
 from typing import Literal
 
 import msgspec
-from msgspec.structs import replace
 
 from gridpeers.plant.equipment.imported_equipment import LinearElement, LoadPart, is_behind
-from gridpeers.plant.equipment.inverter_parameters import (
-    GflParameters,
-    GfmParameters,
-    InverterParameters,
-    OwnParameters,
-    given,
-    with_published,
-)
+from gridpeers.plant.inverters.inverter_model import InverterModel, Kind
+from gridpeers.plant.inverters.inverter_registry import ParameterSet, with_own, with_published
 
 Phase = Literal["A", "B", "C"]
 PHASES: tuple[Phase, ...] = ("A", "B", "C")  # order of the phases in every table and vector
@@ -135,7 +128,7 @@ class InverterRow(msgspec.Struct, frozen=True, kw_only=True):
     """An inverter's nameplate and bus."""
 
     name: str  # name, unique: "inv1"
-    kind: Literal["GFM", "GFL"]  # grid-forming or grid-following
+    kind: Kind  # grid-forming or grid-following
     bus: str  # bus of its terminals; each of its nodes has one inverter at most
     microgrid: str
     P_rated: float  # rated power (W, of all its phases), base of its per-unit values
@@ -146,7 +139,7 @@ class InverterRow(msgspec.Struct, frozen=True, kw_only=True):
     neutral: str = ""  # node of the bus to which its phases return, by its letter; empty for earth
     spare: bool = False  # whether it stays off until an agent joins for it
     parameters: str = ""  # name of its set, of `Feeder.parameter_sets` or published; empty for none
-    own: OwnParameters = OwnParameters()  # parameters that a scenario gives it
+    own: ParameterSet = {}  # parameters that a scenario gives it
 
     @property
     def node(self) -> tuple[str, str]:
@@ -175,15 +168,12 @@ class Feeder(msgspec.Struct, frozen=True, kw_only=True):
     places: dict[str, str] = {}
     """File and line of each element, load and "bus NAME" of such a feeder, where its import knows them."""
     spares: tuple[InverterRow, ...] = ()  # inverters that stay off until an agent joins for them
-    parameter_sets: dict[str, OwnParameters] = {}  # parameters in place of the kind's, by the set's name
+    parameter_sets: dict[str, ParameterSet] = {}  # parameters in place of the kind's, by the set's name
 
-    def parameters_of(self, row: InverterRow, gfm: GfmParameters, gfl: GflParameters) -> InverterParameters:
-        """Return the parameters of one inverter: its own, then those of its set, then its kind's."""
-        of_set = with_published(self.parameter_sets).get(row.parameters, OwnParameters())
-        kind: InverterParameters = gfm if row.kind == "GFM" else gfl
-        own = given(of_set) | given(row.own)
-        # what its kind has not, the checks of feeder and scenario refuse; others of their checks come first
-        return replace(kind, **{name: value for name, value in own.items() if name in kind.__struct_fields__})
+    def parameters_of(self, row: InverterRow, gfm: InverterModel, gfl: InverterModel) -> InverterModel:
+        """Return the model of one inverter: its own parameters, then those of its set, then its kind's."""
+        of_set = with_published(self.parameter_sets).get(row.parameters, {})
+        return with_own(gfm if row.kind == "GFM" else gfl, of_set | row.own)
 
     def demands(self) -> Iterator[tuple[str, str, complex]]:
         """Yield the bus, the phases ("A", or "AB" between two) and the nominal power (VA) of each branch of a load."""

@@ -88,9 +88,7 @@ class Plant(RecordedPlant):
             method=settings.method,
         )
         units = self._dynamics.inverters.units
-        self._current_limits = CurrentLimits(
-            self.inverters, tuple(getattr(unit.parameters, "I_max", 0.0) for unit in units)
-        )
+        self._current_limits = CurrentLimits(self.inverters, tuple(unit.parameters.current_limit for unit in units))
         self._closings = Closings(self._switches, network, self._dynamics, settings.sync_check, settings.h)
         self._in_service = InService(
             settings.protection,

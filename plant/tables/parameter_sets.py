@@ -5,17 +5,26 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from gridpeers.plant.equipment.inverter_parameters import InverterParameters, OwnParameters, foreign, with_published
+from gridpeers.plant.inverters.inverter_model import InverterModel, Kind
+from gridpeers.plant.inverters.inverter_registry import (
+    INVERTERS,
+    OwnParameters,
+    ParameterSet,
+    chosen_own,
+    foreign,
+    given,
+    with_published,
+)
 from gridpeers.plant.tables.branches import BusTable
 from gridpeers.plant.tables.feeder_columns import ParameterColumns
 from gridpeers.wire.schema.table_reading import read_table
-from gridpeers.wire.schema.table_schema import contradictions, fields_of
+from gridpeers.wire.schema.table_schema import Problem, contradictions, fields_of
 from gridpeers.wire.wording import suggestion
 
 FILE = "inverter_parameters.csv"
 
 
-def read_parameter_sets(buses: BusTable) -> dict[str, OwnParameters] | None:
+def read_parameter_sets(buses: BusTable) -> dict[str, ParameterSet] | None:
     """Read inverter_parameters.csv, or return None if it is unreadable.
 
     Which inverter has a set decides whether it can have its parameters: `gridpeers.plant.tables.shunts` asks.
@@ -34,9 +43,15 @@ def read_parameter_sets(buses: BusTable) -> dict[str, OwnParameters] | None:
             row.problem(f'set "{it.set}": {path}: {text}')
         if it.key and not found:
             before[it.key] = value
-    sets = {name: read_table(OwnParameters, own)[0] for name, own in values.items()}
-    for name, own in sets.items():
-        buses.problems += [f'{FILE}: set "{name}": {path}: {text}' for path, text in contradictions(OwnParameters, own)]
+    sets: dict[str, ParameterSet] = {}
+    for name, cells in values.items():
+        own = read_table(OwnParameters, cells)[0]
+        sets[name] = given(own)
+        found = contradictions(OwnParameters, own)
+        if (model := sets[name].get("model", "gridlabd")) not in INVERTERS.names:
+            del sets[name]["model"]
+            found.append(Problem("model", f'there is no "{model}"; {suggestion(model, INVERTERS.names, "choices")}'))
+        buses.problems += [f'{FILE}: set "{name}": {path}: {text}' for path, text in found]
     return sets if table.readable else None
 
 
@@ -51,10 +66,10 @@ def _value_of(cell: str) -> float | bool | str:
 
 def as_set(
     name: str,
-    kind: str,
-    params: str | Mapping[str, Any] | InverterParameters | None,
-    sets: Mapping[str, OwnParameters],
-) -> tuple[str, dict[str, OwnParameters]]:
+    kind: Kind,
+    params: str | Mapping[str, Any] | InverterModel | None,
+    sets: Mapping[str, ParameterSet],
+) -> tuple[str, dict[str, ParameterSet]]:
     """Return the name of the set that an inverter's parameters are, and all sets with it.
 
     `name`: its name, which a new set takes; `params`: the name of a set, some parameters by their keys in a file, all
@@ -71,15 +86,16 @@ def as_set(
     else:
         if isinstance(params, Mapping):
             values = {str(key): value for key, value in params.items()}
-        elif isinstance(params, InverterParameters):
-            values = {field.key: getattr(params, field.name) for field in fields_of(type(params))}
+        elif isinstance(params, InverterModel):
+            every = {field.key: getattr(params, field.name) for field in fields_of(type(params))}
+            values = {key: value for key, value in every.items() if value is not None}
         else:
             raise ValueError(
                 f'inverter "{name}": params: must be the name of a set, keys with values such as {{"T_p_s": 0.02}}, '
-                f"GfmParameters or GflParameters, got {params!r}"
+                f"a model such as GfmDroop, got {params!r}"
             )
-        own, noted = read_table(OwnParameters, values)
-        found = [f"{path}: {text}" for path, text in noted]
+        read, noted = read_table(chosen_own(values), values)
+        own, found = given(read), [f"{path}: {text}" for path, text in noted]
         label = next((known for known, other in sets.items() if other == own), name)
     found += [f"{key}: a {kind} has no such parameter" for key in foreign(own, kind)]
     if label in sets and sets[label] != own:

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 from gridpeers.plant.equipment import Bus, Capacitor, Feeder, InverterRow, Load, Source
 from gridpeers.plant.equipment.connectivity import buses_without_ground
 from gridpeers.plant.equipment.imported_equipment import LoadPart
-from gridpeers.plant.equipment.inverter_parameters import OwnParameters, foreign, with_published
 from gridpeers.plant.equipment.neutrals import neutral_for, neutrals_of
+from gridpeers.plant.inverters.inverter_registry import ParameterSet, foreign, with_published
 from gridpeers.plant.tables import feeder_columns as columns
 from gridpeers.plant.tables.branches import BusTable, require_ground, require_phases
 from gridpeers.plant.tables.csv_table import CsvRow
@@ -133,7 +133,7 @@ class InverterPlaces(NamedTuple):
 
 
 def read_inverters(
-    buses: BusTable, load: float, neutrals: Mapping[str, str], sets: Mapping[str, OwnParameters] | None
+    buses: BusTable, load: float, neutrals: Mapping[str, str], sets: Mapping[str, ParameterSet] | None
 ) -> tuple[InverterRow, ...]:
     """Read inverters.csv; `sets`: sets of parameters, None where they are unreadable."""
     inverters: dict[str, InverterRow] = {}

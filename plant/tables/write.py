@@ -10,8 +10,8 @@ from typing import Any
 
 from gridpeers.plant.equipment import Feeder, InverterRow, Line, LineConfig, Regulator, Transformer
 from gridpeers.plant.equipment.imported_equipment import LoadPart
-from gridpeers.plant.equipment.inverter_parameters import OwnParameters, given
 from gridpeers.plant.equipment.neutrals import EARTH, neutrals_of
+from gridpeers.plant.inverters.inverter_registry import ParameterSet, chosen_own
 from gridpeers.plant.tables.feeder_columns import LOAD_SETS, TABLES, InverterColumns
 from gridpeers.wire.schema.table_schema import named
 
@@ -94,9 +94,9 @@ def inverter_cells(it: InverterRow) -> dict[str, str]:
     return dict(zip(InverterColumns.__struct_fields__, map(str, values), strict=True))
 
 
-def _parameters(name: str, own: OwnParameters) -> Iterator[Row]:
-    for field, value in given(own).items():
-        yield name, named(OwnParameters, field).key, str(value).lower() if isinstance(value, bool) else value
+def _parameters(name: str, own: ParameterSet) -> Iterator[Row]:
+    for field, value in own.items():
+        yield name, named(chosen_own(own), field).key, str(value).lower() if isinstance(value, bool) else value
 
 
 def _upper_triangle(config: LineConfig) -> Iterator[Row]:

@@ -8,14 +8,8 @@ import unicodedata
 from itertools import pairwise
 
 from gridpeers.plant.equipment import Feeder, InverterRow
-from gridpeers.plant.equipment.inverter_parameters import (
-    PARAMETERS_OF,
-    GfmParameters,
-    InverterParameters,
-    foreign,
-    given,
-    with_published,
-)
+from gridpeers.plant.inverters.inverter_model import InverterModel
+from gridpeers.plant.inverters.inverter_registry import foreign, given, with_published
 from gridpeers.plant.known_names import DEFAULTS, defaults
 from gridpeers.scenarios.schema.participants import inverters_of
 from gridpeers.scenarios.schema.scenario_errors import Problems, multiple
@@ -32,7 +26,6 @@ TRIPS = "protection.trips"
 
 LONGEST_CLEARING_TIME = 3600.0
 
-_LIMITS_OF_P = {"GFM": ("P_max", "P_set_lim", "P_min"), "GFL": ("P_max", "S_max", "i_max", "P_set_lim", "P_min")}
 _RUN_FOLDER = ("log", "plots", "metrics.json", "report.txt", "scenario.toml", "status.txt")
 """Files and folders of a run folder beside the folders of its cases."""
 
@@ -69,15 +62,15 @@ def check_start(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> 
     if problems.touch("plant.gfm", "plant.gfl"):
         return
     P_known, V_known = (not problems.touch(f"plant.{key}") for key in ("P_set0_pu", "V_set0_pu"))
-    alike: dict[tuple[str, InverterParameters], list[InverterRow]] = {}
+    alike: dict[tuple[str, InverterModel], list[InverterRow]] = {}
     for row in feeder.inverters:
         alike.setdefault((row.kind, feeder.parameters_of(row, plant.gfm, plant.gfl)), []).append(row)
     for (kind, parameters), units in sorted(alike.items(), key=lambda item: item[0][0], reverse=True):
         table, common = f"plant.{kind.lower()}", getattr(plant, kind.lower())
         names = ", ".join(row.name for row in units)
-        for name in _LIMITS_OF_P[kind]:
-            limit, below = getattr(parameters, name), name == "P_min"
-            key = f"{table}.{name}_pu" if limit == getattr(common, name) else f"{name}_pu of {names}"
+        for name in parameters.LIMITS_OF_P:
+            limit, below = getattr(parameters, name), name.endswith("_min")
+            key = f"{table}.{name}_pu" if limit == getattr(common, name, None) else f"{name}_pu of {names}"
             right = limit <= P if below else limit >= P
             if right or not P_known or problems.touch(key):
                 continue
@@ -186,7 +179,8 @@ def check_limits(scenario: ScenarioModel, feeder: Feeder, problems: Problems) ->
         if problems.unknown(path, "inverter", name, rows):
             continue
         row = rows[name]
-        most = row.P_rated * feeder.parameters_of(row, plant.gfm, plant.gfl).P_max / 1e3
+        parameters = feeder.parameters_of(row, plant.gfm, plant.gfl)
+        most = row.P_rated * getattr(parameters, "P_max", 0.0) / 1e3
         if row.kind == "GFM":
             following = ", ".join(other.name for other in rows.values() if other.kind == "GFL")
             problems.add(
@@ -210,7 +204,7 @@ def check_changes(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -
             problems.add(
                 path, f"changes nothing; give it one of {', '.join(keys_of(InverterTable))}, or a key of {kind}"
             )
-        for text in foreign(table.own, kind):
+        for text in foreign(given(table.own), kind):
             key, _, word = text.partition(" = ")
             what = f"{key} {word}" if word else "such parameter"
             problems.add(f"{path}.{key}", f"a {kind} has no {what}; {name} takes those of [plant.{kind.lower()}]")
@@ -255,11 +249,16 @@ def check_protection(scenario: ScenarioModel, f_nom: float, problems: Problems) 
 
 def _check_own(row: InverterRow, scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
     plant, path = scenario.plant, f"plant.inverter.{row.name}"
-    own = row.parameters or given(row.own)
+    own = row.parameters or row.own
     if not own or problems.touch("plant.gfm", "plant.gfl", path, f"{path}.parameters") or problems.below(path):
         return
     table = f"plant.{row.kind.lower()}"
-    for key, text in contradictions(PARAMETERS_OF[row.kind], feeder.parameters_of(row, plant.gfm, plant.gfl)):
+    parameters = feeder.parameters_of(row, plant.gfm, plant.gfl)
+    for key in foreign(
+        {**with_published(feeder.parameter_sets).get(row.parameters, {}), **row.own}, row.kind, type(parameters)
+    ):
+        problems.add(path, f"its model {parameters.model} has no {key}; leave it out, or name another model")
+    for key, text in contradictions(type(parameters), parameters):
         if not problems.touch(f"{table}.{key}"):
             problems.add(f"{path}.{key}", f"{text}; both together are those of [{table}], of its set and of its table")
 
@@ -314,12 +313,17 @@ def check_times(scenario: ScenarioModel, problems: Problems) -> None:
 
 def check_step(scenario: ScenarioModel, feeder: Feeder | None, problems: Problems) -> None:
     gfm, gfl = scenario.plant.gfm, scenario.plant.gfl
-    of = _time_constants("plant.gfm", gfm) | _time_constants("plant.gfl", gfl)
+    of = {
+        (table, name): T
+        for table, model in (("plant.gfm", gfm), ("plant.gfl", gfl))
+        for name, T in model.time_constants().items()
+    }
     if feeder:
         for row in (*feeder.inverters, *feeder.spares):
-            if row.parameters or given(row.own):
-                of |= _time_constants(f"plant.inverter.{row.name}", feeder.parameters_of(row, gfm, gfl))
-    (table, name), least = min(of.items(), key=lambda item: item[1])
+            if row.parameters or row.own:
+                own = feeder.parameters_of(row, gfm, gfl).time_constants()
+                of |= {(f"plant.inverter.{row.name}", name): T for name, T in own.items()}
+    (table, name), least = min(of.items(), key=lambda item: item[1], default=(("", ""), math.inf))
     part, h = PART_OF_T[scenario.time.method], scenario.time.h_s
     most = part * least
     if problems.touch("time.h_s", f"{table}.{name}_s") or h <= most * (1.0 + 1e-9):
@@ -329,11 +333,3 @@ def check_step(scenario: ScenarioModel, feeder: Feeder | None, problems: Problem
         f"{h:g} s is too long a step for {name}_s = {least:g} s of [{table}], which it would not resolve; "
         f"at most {most:g} s, {part:g} of the shortest time constant",
     )
-
-
-def _time_constants(table: str, parameters: InverterParameters) -> dict[tuple[str, str], float]:
-    if isinstance(parameters, GfmParameters):
-        names: tuple[str, ...] = ("T_p", "T_q", "T_v")
-    else:
-        names = ("T_ff", "T_pf", "T_vf", "T_qf", *(("T_if",) if parameters.model == "current_source" else ()))
-    return {(table, name): getattr(parameters, name) for name in names}

@@ -10,6 +10,7 @@ import msgspec
 from gridpeers.agents.agent_config import MAX_AGE, AgentConfig, Control
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.equipment.derived_feeders import changed
+from gridpeers.plant.inverters.inverter_registry import given
 from gridpeers.plant.plant_config import (
     FeederChanges,
     InverterChange,
@@ -162,7 +163,7 @@ def changes_of(scenario: ScenarioModel) -> FeederChanges:
                 m_q=table.m_q_pu,
                 P_rated=None if table.P_rated_kW is None else 1e3 * table.P_rated_kW,
                 parameters=table.parameters,
-                own=table.own,
+                own=given(table.own),
             )
             for name, table in plant.inverter.items()
         },

@@ -16,7 +16,7 @@ from gridpeers.plant.tables import FeederError, feeders, is_folder, read_feeder
 from gridpeers.scenarios.catalogue_files import CATALOGUE, names_in
 from gridpeers.scenarios.schema import checks, participants
 from gridpeers.scenarios.schema.configs import as_in
-from gridpeers.scenarios.schema.plugin_keys import check_plugins, with_folders
+from gridpeers.scenarios.schema.plugin_keys import check_plugins, with_folders, with_model_folders
 from gridpeers.scenarios.schema.scenario_errors import Problems, ScenarioError
 from gridpeers.scenarios.schema.scenario_model import AS_RUN, ScenarioModel
 from gridpeers.scenarios.schema.supply import check_loads, check_supply
@@ -90,7 +90,7 @@ def check_tables(
 
     Relative paths start at the folder of `path`, whose name is that of a scenario without one.
     """
-    scenario = read_tables(data, problems)
+    scenario = read_tables(with_model_folders(data, path.parent), problems)
     if not scenario.name:
         scenario = replace(scenario, name=checks.name_of(path.stem))
     checks.check_times(scenario, problems)

@@ -16,6 +16,7 @@ from gridpeers.agents.graphs import GRAPHS, check_graph, make_graph
 from gridpeers.netem.models.own_fault import FAULTS
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.plant.equipment import Feeder, InverterRow
+from gridpeers.plant.inverters.inverter_registry import INVERTERS, given
 from gridpeers.scenarios.checks.check_registry import ALWAYS as ALWAYS_CHECKED
 from gridpeers.scenarios.checks.check_registry import CHECKS, LAW_FAILED, switched_off
 from gridpeers.scenarios.results.claims import BENCHMARKS, CLAIMS
@@ -70,6 +71,25 @@ def with_folders(scenario: ScenarioModel, folder: Path) -> ScenarioModel:
         return placed(named, registry, folder)
 
     return with_keys(scenario, change)
+
+
+def with_model_folders(data: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
+    """Return the tables of a scenario with the folder of each inverter model beside its file."""
+    plant = data.get("plant")
+    if not isinstance(plant, Mapping):
+        return data
+
+    def change(table: Any) -> Any:
+        name = table.get("model") if isinstance(table, Mapping) else None
+        if not isinstance(name, str):
+            return table
+        key = placed({"use": name, "folder": table.get("folder") or ""}, INVERTERS, folder)
+        return {**table, "model": key["use"], "folder": key["folder"]} if key["folder"] else table  # type: ignore[index]
+
+    tables = {key: change(plant[key]) for key in ("gfm", "gfl") if key in plant}
+    if isinstance(units := plant.get("inverter"), Mapping):
+        tables["inverter"] = {name: change(table) for name, table in units.items()}
+    return {**data, "plant": {**plant, **tables}}
 
 
 def with_keys(scenario: ScenarioModel, change: Callable[[PluginKey, Registry[Any]], PluginKey]) -> ScenarioModel:
@@ -200,6 +220,9 @@ def check_portable(scenario: ScenarioModel, *, measures: bool = False) -> list[s
         used: list[tuple[Registry[Any], str]] = [(LAWS, law_of(scenario, name).use), (GRAPHS, graph_of(case)[0])]
         used += [(FAULTS, it.use) for fault in (*scenario.netem.links, *case.netem.links) for it in fault.own]
         used += [(METRICS, metric.use) for _, metric in metrics_of(scenario) if measures]
+        plant = scenario.plant
+        models = (plant.gfm.model, plant.gfl.model, *(given(it.own).get("model", "") for it in plant.inverter.values()))
+        used += [(INVERTERS, model) for model in models if model]
         for registry, use in used:
             try:
                 registry.portable(use)
@@ -248,6 +271,16 @@ def with_relative_folders(scenario: ScenarioModel, folder: Path) -> ScenarioMode
         return table | {"folder": relative(str(table["folder"]), here)} if table.get("folder") else key
 
     plant = replace(scenario.plant, feeder=relative(scenario.plant.feeder, here))
+    for kind in ("gfm", "gfl"):
+        if place := getattr(plant, kind).folder:
+            plant = replace(plant, **{kind: replace(getattr(plant, kind), folder=relative(place, here))})
+    units = {
+        name: replace(it, own=replace(it.own, folder=relative(place, here)))
+        if (place := given(it.own).get("folder"))
+        else it
+        for name, it in plant.inverter.items()
+    }
+    plant = replace(plant, inverter=units)
     return with_keys(replace(scenario, plant=plant), change)
 
 

@@ -6,20 +6,25 @@ prints this file's sentences.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated, Any, Literal
 
 import msgspec
 
 from gridpeers.agents.agent_config import DegradedCommunication, Gains, Secondary
 from gridpeers.netem.schema.netem import Netem
-from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters, OwnParameters
 from gridpeers.plant.equipment.named_loads import FACTOR
-from gridpeers.plant.plant_config import Method, OnLawFailure, Protection, SyncCheck
+from gridpeers.plant.inverters.gfl import Gfl
+from gridpeers.plant.inverters.gfm_droop import GfmDroop
+from gridpeers.plant.inverters.inverter_model import Method
+from gridpeers.plant.inverters.inverter_registry import OwnParameters, chosen, chosen_own
+from gridpeers.plant.plant_config import OnLawFailure, Protection, SyncCheck
 from gridpeers.plant.simulators import OURS, tables
 from gridpeers.wire.journal import RecordLevel
 from gridpeers.wire.schema.table_schema import (
     INHERITED,
     INLINE,
+    ChosenBy,
     Divides,
     Example,
     MultipleOf,
@@ -90,7 +95,7 @@ class InverterTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     parameters: Annotated[str | None, Example('"fast"')] = None
     """Name of a set of parameters of the feeder (inverter_parameters.csv), or of a published one ("regfm_a1",
     "regfm_a1_vflag0"), in place of the one that inverters.csv names; "" is none."""
-    own: Annotated[OwnParameters, INLINE] = OwnParameters()
+    own: Annotated[OwnParameters, INLINE, ChosenBy("model", chosen_own)] = OwnParameters()
     """Parameters of its kind, in its table."""
 
 
@@ -119,9 +124,9 @@ class PlantTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     """Factor on the Q-V droops of all inverters."""
     inverter: dict[str, InverterTable] = {}
     """Tables `[plant.inverter.NAME]`: changes of single inverters of the feeder's table."""
-    gfm: GfmParameters = GfmParameters()
+    gfm: Annotated[GfmDroop, ChosenBy("model", partial(chosen, "GFM"))] = GfmDroop()
     """Table `[plant.gfm]`: parameters of the grid-forming inverters."""
-    gfl: GflParameters = GflParameters()
+    gfl: Annotated[Gfl, ChosenBy("model", partial(chosen, "GFL"))] = Gfl()
     """Table `[plant.gfl]`: parameters of the grid-following inverters."""
     simulators: Annotated[dict[str, msgspec.Struct], NamedTables(tables)] = {}
     """Tables `[plant.NAME]`: of simulators by their names, e.g. `[plant.helics]`."""

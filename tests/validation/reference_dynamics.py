@@ -19,6 +19,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import lu_factor, lu_solve
 
 from gridpeers.plant.dynamics import Circuit, Dynamics, Inverter
+from gridpeers.plant.dynamics.inverters import Inverters
 from gridpeers.plant.dynamics.kernel.controller_pass import READING
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.network import Network
@@ -246,7 +247,8 @@ class DaeDynamics(Dynamics):
         if not steps:
             return np.zeros((0, len(units), READING))
         self._follow_switching()
-        start = np.concatenate([_states(units.gfm_state, GFM_STATES), _states(units.gfl_state, GFL_STATES)])
+        former, follower = self._places()
+        start = np.concatenate([_states(units, former, GFM_STATES), _states(units, follower, GFL_STATES)])
         rows = self.h * np.arange(1, steps + 1)
         solution = solve_ivp(
             self.slopes, (0.0, rows[-1]), start, "DOP853", rows, rtol=RELATIVE, atol=ABSOLUTE, vectorized=False
@@ -259,13 +261,16 @@ class DaeDynamics(Dynamics):
         """Return the time derivatives of all states."""
         gfm, gfl, _, V = self._algebraic(x)
         P_set, V_set, _ = self.inverters.set_points.T
-        former, follower = self.inverters.gfm_at, self.inverters.gfl_at
+        former, follower = self._places()
         return np.concatenate(
             [
                 self._gfm.slopes(gfm, P_set[former], V_set[former], V[self._network.formed]).ravel(),
                 self._gfl.slopes(gfl, P_set[follower], V_set[follower], V[self._network.fed]).ravel(),
             ]
         )
+
+    def _places(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        return np.flatnonzero(self.inverters.forming), np.flatnonzero(~self.inverters.forming)
 
     def _follow_switching(self) -> None:
         """Take over the present network; its first guess is the plant's own solution."""
@@ -277,22 +282,24 @@ class DaeDynamics(Dynamics):
         if units.single.any():
             raise RuntimeError("the reference has no single-phase inverter")
         self._gfm, self._gfl = GfmEquations(_those(units.units, "GFM")), GflEquations(_those(units.units, "GFL"))
+        former, follower = self._places()
         terminals = circuit.terminals
-        self._network = NetworkEquations(circuit, self._gfm.y_f, terminals[units.gfm_at], terminals[units.gfl_at])
-        angle = float(units.gfm_state["theta"][0]) if self._network.rotates else 0.0
+        self._network = NetworkEquations(circuit, self._gfm.y_f, terminals[former], terminals[follower])
+        angle = float(units.state_of(int(former[0]))["theta"]) if self._network.rotates else 0.0
         self._V = self.voltages()[self._network.nodes] * np.exp(-1j * angle)
         self._solved = circuit
 
     def _algebraic(self, x: Real) -> tuple[Real, Real, float, Complex]:
         """Return the states in the frame of the first GFM, its angle (rad), and the nodes' voltages (V) there."""
         units, network = self.inverters, self._network
-        split = len(GFM_STATES) * units.gfm_at.size
+        former, _ = self._places()
+        split = len(GFM_STATES) * former.size
         gfm = x[:split].reshape(len(GFM_STATES), -1).copy()
         gfl = x[split:].reshape(len(GFL_STATES), -1).copy()
         angle = float(gfm[-1, 0]) if network.rotates else 0.0
         gfm[-1] -= angle
         gfl[1] -= angle
-        P_set, V_set, _ = units.set_points[units.gfm_at].T
+        P_set, V_set, _ = units.set_points[former].T
         E = self._gfm.outputs(gfm, P_set, V_set)[1]
         V = self._V
         weights = np.conj(TURN) * np.exp(-1j * gfl[1])[:, None] / (3.0 * self._gfl.V_b)[:, None]
@@ -310,27 +317,30 @@ class DaeDynamics(Dynamics):
     def _read(self, x: Real) -> Real:
         """Take the states into the inverters, and return their readings."""
         units, network = self.inverters, self._network
+        former, follower = self._places()
         gfm, gfl, angle, V = self._algebraic(x)
-        P_set, V_set, _ = units.set_points[units.gfm_at].T
+        P_set, V_set, _ = units.set_points[former].T
         w, E, _ = self._gfm.outputs(gfm, P_set, V_set)
         readings = np.zeros((len(units), READING))
-        readings[units.gfm_at, 0] = w
-        readings[units.gfl_at, 0] = self._gfl.speed(gfl, V[network.fed])
+        readings[former, 0] = w
+        readings[follower, 0] = self._gfl.speed(gfl, V[network.fed])
         readings[:, 0] = units.f_nom + readings[:, 0] / (2.0 * np.pi)
         back = np.exp(1j * angle)
-        units.V[units.gfm_at], units.V[units.gfl_at] = V[network.formed] * back, V[network.fed] * back
-        units.J[units.gfm_at] = self._gfm.y_f[:, None] * E * back
-        units.J[units.gfl_at] = self._gfl.currents(gfl, V[network.fed])[0] * back
+        units.V[former], units.V[follower] = V[network.formed] * back, V[network.fed] * back
+        units.J[former] = self._gfm.y_f[:, None] * E * back
+        units.J[follower] = self._gfl.currents(gfl, V[network.fed])[0] * back
         S = np.sum(units.V * np.conj(units.J - units.y_f[:, None] * units.V), axis=1)
         magnitude = np.abs(units.V)
         readings[:, 1], readings[:, 2] = S.real, S.imag
         readings[:, 3], readings[:, 4], readings[:, 5] = magnitude.mean(1), magnitude.min(1), magnitude.max(1)
         gfm[-1] += angle
         gfl[1] += angle
-        for states, names, rows in ((units.gfm_state, GFM_STATES, gfm), (units.gfl_state, GFL_STATES, gfl)):
-            for name, row in zip(names, rows, strict=True):
-                states[name] = row
-        units.gfm_state["w"] = w
+        for places, names, rows in ((former, GFM_STATES, gfm), (follower, GFL_STATES, gfl)):
+            for i, column in zip(places.tolist(), rows.T, strict=True):
+                for name, value in zip(names, column, strict=True):
+                    units.state_of(i)[name] = value
+        for i, speed in zip(former.tolist(), w, strict=True):
+            units.state_of(i)["w"] = speed
         self.network.V_branch[network.branches] = network.branch_voltages(V) * back
         return readings
 
@@ -341,8 +351,8 @@ def reference_plant(network: Network, settings: PlantSettings, T_c: float, recor
         return Plant(network, replace(settings, h=record_step, method="second-order"), T_c, record_step)
 
 
-def _states(records: NDArray[np.void], names: tuple[str, ...]) -> Real:
-    return np.concatenate([records[name] for name in names])
+def _states(units: Inverters, places: NDArray[np.int64], names: tuple[str, ...]) -> Real:
+    return np.array([units.state_of(i)[name] for name in names for i in places.tolist()])
 
 
 def _those(units: tuple[Inverter, ...], kind: str) -> list[Inverter]:

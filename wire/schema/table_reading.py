@@ -16,6 +16,7 @@ from gridpeers.wire.schema.table_schema import (
     INHERITED,
     INLINE,
     NO_KEY,
+    ChosenBy,
     Example,
     Field,
     NamedTables,
@@ -98,8 +99,9 @@ class _Reader:
             rest.pop(key, None)
         for field in fields_of(cls):
             if INLINE in field.marks:
-                own = {key: rest.pop(key) for key in keys_of(field.type) if key in rest}
-                values[field.name] = self.table(field.type, own, path)
+                kind, rest = self._kind(field, rest, path)
+                own = {key: rest.pop(key) for key in keys_of(kind) if key in rest}
+                values[field.name] = self.table(kind, own, path)
             elif others := field.mark(OtherKeys):
                 found: list[Problem] = []
                 accepted = [*filter(others.accepts, rest)]
@@ -133,7 +135,7 @@ class _Reader:
         kind = _without_none(field.type)
         structs = _structs_in(kind)
         if structs == [kind]:
-            return self.table(kind, raw, path, base)
+            return self.table(*self._kind(field, raw, path), path, base)
         if structs and isinstance(raw, Mapping):
             before, chosen = len(self.problems), self._chosen(structs, raw, path)
             value = self.table(chosen, raw, path) if chosen else None
@@ -162,6 +164,17 @@ class _Reader:
             self._add(path, wrong)
             return _fallback(field)
         return value
+
+    def _kind(self, field: Field, raw: Any, path: str) -> tuple[type[Any], Any]:
+        """Return the struct as which a table is read, and what to read: of one that names none its known keys."""
+        by, kind = field.mark(ChosenBy), _without_none(field.type)
+        if by is None or not isinstance(raw, Mapping):
+            return kind, raw
+        try:
+            return by.choose(raw), raw
+        except ValueError as error:
+            self._add(_join(path, by.key), str(error))
+            return kind, {key: value for key, value in raw.items() if key in keys_of(kind) and key != by.key}
 
     def _chosen(self, structs: list[type[T]], raw: Mapping[str, Any], path: str) -> type[T] | None:
         if len(structs) == 1:

@@ -209,6 +209,15 @@ class NamedTables:
 
 
 @dataclass(frozen=True)
+class ChosenBy:
+    """The table says by a key which struct it is read as; the field's type is that of a table without the key."""
+
+    key: str
+    choose: Callable[[Mapping[str, Any]], type[msgspec.Struct]]
+    """From the table to its struct; a ValueError says what is wrong with the key."""
+
+
+@dataclass(frozen=True)
 class Label:
     """Words for the field beside its unit: at an axis, or over a column."""
 

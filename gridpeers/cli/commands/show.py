@@ -11,7 +11,9 @@ import typer
 from gridpeers.cli.usage import BAD_INPUT, argument, fail, load, option, refuse, terminal
 from gridpeers.wire.wording import counted, printable
 
-Topic = Literal["keys", "messages", "scenario", "feeder", "laws", "metrics", "claims", "checks", "faults", "graphs"]
+Topic = Literal[
+    "keys", "messages", "scenario", "feeder", "laws", "inverters", "metrics", "claims", "checks", "faults", "graphs"
+]
 
 
 def list_() -> None:
@@ -65,8 +67,8 @@ def doc(
 ) -> None:
     """Print a reference page that is made from the code.
 
-    keys and messages are those of the wire; scenario is the scenario file, with units and defaults; laws, metrics,
-    claims, checks, faults and graphs are what can be plugged in: those that there are, with parameters, and your own.
+    keys and messages are those of the wire; scenario is the scenario file, with units and defaults; laws, inverters,
+    metrics, claims, checks, faults and graphs are what can be plugged in: those that there are, and your own.
 
     Example:  gridpeers doc scenario
     """

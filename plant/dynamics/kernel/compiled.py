@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
@@ -18,6 +18,9 @@ from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.runtime.nrt import rtsys
 from numpy.typing import NDArray
 
+from gridpeers.plant.inverters import inverter_model
+from gridpeers.plant.inverters.inverter_model import A120 as A120
+
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
 
@@ -26,15 +29,16 @@ Real = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-_HERE = Path(__file__).parent
+HERE = Path(__file__).parent
 
 
-def kernel_folder() -> Path | None:
-    """Return where machine code of these sources is kept; None where the user has no home.
+def kernel_folder(of_models: Collection[str] = (inverter_model.__file__,)) -> Path | None:
+    """Return where machine code of this folder, and of files of models, is kept; None where the user has no home.
 
-    Its name carries a hash of all files here, because an edit of `gfm.py` changes the code of its callers in `step.py`.
+    Its name carries a hash of them all, because an edit of `solve.py` changes the code of its callers in `step.py`.
     """
-    digest = hashlib.sha256(b"".join(source.read_bytes() for source in sorted(_HERE.glob("*.py")))).hexdigest()
+    sources = (*sorted(HERE.glob("*.py")), *map(Path, sorted(of_models)))
+    digest = hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()
     try:
         cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "gridpeers"
         base = Path(os.environ.get("NUMBA_CACHE_DIR") or cache)
@@ -53,15 +57,18 @@ def is_compiled(function: str) -> bool:
 class _Place:
     """The folder of machine code as numba's cache asks for it; its name tells the sources."""
 
+    def __init__(self, folder: Path | None) -> None:
+        self._folder = folder
+
     @classmethod
-    def from_function(cls, *_: Any) -> _Place:
-        return cls()
+    def from_function(cls, function: Any, _: Any) -> _Place:
+        return cls(getattr(function, "kept_in", FOLDER))
 
     def ensure_cache_path(self) -> None:
         Path(self.get_cache_path()).mkdir(parents=True, exist_ok=True)
 
     def get_cache_path(self) -> str:
-        return str(FOLDER)
+        return str(self._folder)
 
     def get_source_stamp(self) -> str:
         return ""
@@ -74,7 +81,7 @@ class _Files(CompileResultCacheImpl):
     _locator_classes = [_Place]  # type: ignore[list-item]  # noqa: RUF012
 
 
-class _Cache(FunctionCache):
+class KeptCode(FunctionCache):
     """Numba's cache in our folder, which may also be read-only or full."""
 
     _impl_class = _Files
@@ -85,7 +92,8 @@ class _Cache(FunctionCache):
             rtsys.initialize(target_context)
             found = self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
             # Two processes that compile a function for two types at a time may both give their code the same file.
-            return found if found is not None and tuple(found.signature.args) == tuple(sig) else None
+            same = found is not None and tuple(found.signature.args) == tuple(getattr(sig, "args", sig))
+            return found if same else None
         return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
@@ -100,33 +108,16 @@ def compiled(function: Callable[_P, _R], *, nogil: bool = False) -> Callable[_P,
     """
     dispatcher: Any = njit(error_model="numpy", nogil=nogil)(function)
     if FOLDER:  # `cache=True` would take one of numba's own folders
-        dispatcher._cache = _Cache(function)  # type: ignore[no-untyped-call]  # noqa: SLF001
+        dispatcher._cache = KeptCode(function)  # type: ignore[no-untyped-call]  # noqa: SLF001
     result: Callable[_P, _R] = dispatcher
     return result
 
 
-A120 = complex(-0.5, 0.5 * np.sqrt(3.0))  # a = exp(j 120 deg)
+def keep(code: Any, function: Any, sources: Collection[str]) -> None:
+    """Keep the machine code of a function that calls those of files of models; a cell of a notebook has no file."""
+    if FOLDER and all(map(os.path.isfile, sources)):
+        function.kept_in = kernel_folder(sources)
+        code._cache = KeptCode(function)  # type: ignore[no-untyped-call]  # noqa: SLF001
 
 
-@compiled
-def sat(x: float, low: float, high: float) -> float:
-    return min(max(x, low), high)
-
-
-@compiled
-def magnitude(z: complex) -> float:
-    """Return the magnitude of a phasor; `abs` takes three times as long, for numbers whose square overflows."""
-    return float(np.sqrt(z.real * z.real + z.imag * z.imag))
-
-
-@compiled
-def unit_phasor(angle: float) -> complex:
-    return complex(np.cos(angle), np.sin(angle))
-
-
-@compiled
-def heun(x0: float, d1: float, d: float, h: float, second: bool) -> float:
-    """Return the predictor x0 + h d, or in the second pass the corrector x0 + h (d1 + d) / 2."""
-    if second:
-        return x0 + 0.5 * h * (d1 + d)
-    return x0 + h * d
+magnitude, unit_phasor = compiled(inverter_model.magnitude), compiled(inverter_model.unit_phasor)

@@ -8,20 +8,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from gridpeers.plant.dynamics.kernel.compiled import (
-    A120,
-    Complex,
-    Flags,
-    Integers,
-    Real,
-    compiled,
-    magnitude,
-    unit_phasor,
-)
-from gridpeers.plant.dynamics.kernel.gfl import advance_gfl
-from gridpeers.plant.dynamics.kernel.gfm import advance_gfm, measure_positive_sequence
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Integers, Real, compiled, magnitude, unit_phasor
+from gridpeers.plant.dynamics.kernel.model_pass import THETA, F, run_pass
 
 READING = 7
 """Numbers per inverter and step: f (Hz), P (W), Q (var), mean V (V), V of the lowest and the highest phase (V), and
@@ -29,19 +17,19 @@ whether its phase currents were limited (1 or 0)."""
 
 
 class Units(NamedTuple):
-    """The inverters of a run as the compiled functions take them."""
+    """The inverters of a run as the compiled functions take them: tables with a row for each."""
 
     f_nom: float  # nominal frequency (Hz)
-    gfm: Any  # records of `gridpeers.plant.dynamics.kernel.gfm.PARAMETERS`
-    gfm_at: Integers  # the inverter that each belongs to
-    gfm_state: Any  # their states; advanced by a pass
-    gfm_0: Any  # their states at the start of the step
-    gfm_d: Any  # slopes of the step's first pass
-    gfl: Any  # the same for `gridpeers.plant.dynamics.kernel.gfl`
-    gfl_at: Integers
-    gfl_state: Any
-    gfl_0: Any
-    gfl_d: Any
+    passes: Integers  # addresses of their models' passes
+    parameters: Any  # bytes of `model_pass.parameters_of` their models
+    state: Real  # their states, `model_pass.state_of` their models; advanced by a pass
+    start: Real  # their states at the start of the step
+    slope: Real  # slopes of the step's first pass
+    terminal: Any  # records of `model_pass.TERMINAL`
+    S_3: Real  # ratings of three phases (VA)
+    V_b: Real  # nominal voltages (V)
+    y_f: Complex  # admittances of their filters in the network (S)
+    I_limit: Real  # limits of their phase currents (A); infinite for none
     online: Flags  # inverters that are connected and in a live island
     set_points: Real  # n_inv x 3: P_set, V_set, Q_set (pu)
     J: Complex  # injections (A), n_inv x 3: in, those of the network solution; out, the new ones
@@ -49,6 +37,10 @@ class Units(NamedTuple):
     V: Complex  # terminal voltages (V), n_inv x 3, of the last network solution
     I: Complex  # noqa: E741  # the paper's symbol; currents out of the inverters (A)
     limiting: Flags  # inverters whose phase currents were limited in the last network solution
+
+
+ADVANCED = ("state", "J", "V", "I", "limiting")
+"""Tables that a step advances."""
 
 
 @compiled
@@ -90,70 +82,46 @@ def read_offline(units: Any, readings: Real) -> None:
 
 @compiled
 def keep_start(units: Any) -> None:
-    for k in range(units.gfm_at.size):
-        units.gfm_0[k] = units.gfm_state[k]
-    for k in range(units.gfl_at.size):
-        units.gfl_0[k] = units.gfl_state[k]
     for i in range(units.J.shape[0]):
+        for k in range(units.state.shape[1]):
+            units.start[i, k] = units.state[i, k]
         for phase in range(3):
             units.J_0[i, phase] = units.J[i, phase]
 
 
 @compiled
-def turn_frames(units: Any, net: Any, theta: Real, rotation: Complex) -> None:
-    """Write the factor that turns phasors into each island's frame; `theta`: room for a number an inverter."""
-    for k in range(units.gfm_at.size):
-        theta[units.gfm_at[k]] = units.gfm_state[k].theta
+def turn_frames(units: Any, net: Any, rotation: Complex) -> None:
+    """Write the factor that turns phasors into each island's frame."""
     for island in range(net.leader.size):
         rotation[island] = 1.0
         if net.leader[island] >= 0:
-            rotation[island] = unit_phasor(net.theta_lin[island] - theta[net.leader[island]])
+            rotation[island] = unit_phasor(net.theta_lin[island] - units.state[net.leader[island], THETA])
 
 
 @compiled
 def advance_inverters(units: Any, h: float, second: bool, readings: Real) -> None:
     """Take one pass of length `h` (s) of every inverter: V is read; states, J, I and `readings` are written."""
-    set_points, J, V = units.set_points, units.J, units.V
-    for k in range(units.gfm_at.size):
-        i = units.gfm_at[k]
+    set_points, J, V, I = units.set_points, units.J, units.V, units.I  # noqa: E741
+    width, size, record = units.parameters.shape[1], 8 * units.state.shape[1], units.terminal.itemsize
+    g, t, x0 = units.parameters.ctypes.data, units.terminal.ctypes.data, units.start.ctypes.data
+    x, d = units.state.ctypes.data, units.slope.ctypes.data
+    for i in range(units.online.size):
         if not units.online[i]:
             continue
-        former = units.gfm[k]
-        read_terminal(i, former.y_f, J, V, units.I, readings)
-        state = units.gfm_state[k]
-        P, Q, v = readings[i, 1] / former.S_b, readings[i, 2] / former.S_b, readings[i, 3] / former.V_b
-        if former.positive_sequence:
-            P, Q, v = measure_positive_sequence(former, i, V, units.I)
-        advance_gfm(
-            former, set_points[i, 0], set_points[i, 1], units.gfm_0[k], state, units.gfm_d[k], P, Q, v, h, second
+        read_terminal(i, units.y_f[i], J, V, I, readings)
+        at = units.terminal[i]
+        at.P_set, at.V_set, at.Q_set = set_points[i, 0], set_points[i, 1], set_points[i, 2]
+        at.P, at.Q, at.V = (
+            readings[i, 1] / units.S_3[i],
+            readings[i, 2] / units.S_3[i],
+            readings[i, 3] / units.V_b[i],
         )
-        J_A = state.E * former.V_b * unit_phasor(state.theta) * former.y_f
-        J[i, 0], J[i, 1], J[i, 2] = J_A, J_A * A120.conjugate(), J_A * A120
-        readings[i, 0] = units.f_nom + state.w / (2.0 * np.pi)
+        at.V_A, at.V_B, at.V_C = V[i, 0], V[i, 1], V[i, 2]
+        at.I_A, at.I_B, at.I_C = I[i, 0], I[i, 1], I[i, 2]
+        at.J_A, at.J_B, at.J_C = J[i, 0], J[i, 1], J[i, 2]
+        own = i * size
+        run_pass(units.passes[i], g + i * width, t + i * record, x0 + own, x + own, d + own, h, second)
+        J[i, 0], J[i, 1], J[i, 2] = at.J_A, at.J_B, at.J_C
+        readings[i, 0] = units.state[i, F]
         if units.limiting[i]:
             readings[i, 6] = 1.0
-
-    for k in range(units.gfl_at.size):
-        i = units.gfl_at[k]
-        if not units.online[i]:
-            continue
-        follower = units.gfl[k]
-        read_terminal(i, follower.y_f, J, V, units.I, readings)
-        J[i, 0], J[i, 1], J[i, 2] = advance_gfl(
-            follower,
-            set_points[i, 0],
-            set_points[i, 1],
-            set_points[i, 2],
-            units.gfl_0[k],
-            units.gfl_state[k],
-            units.gfl_d[k],
-            V[i, 0],
-            V[i, 1],
-            V[i, 2],
-            J[i, 0],
-            J[i, 1],
-            J[i, 2],
-            h,
-            second,
-        )
-        readings[i, 0] = units.gfl_state[k].f

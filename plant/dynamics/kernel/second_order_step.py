@@ -22,19 +22,6 @@ LOOSE = 0.01  # tolerance of a round's network solution, as a part of the round'
 MAX_ROUNDS = 60
 
 
-class Slopes(NamedTuple):
-    """States and slopes of all inverters as tables of numbers, a row each: the memory of the records in `Units`."""
-
-    gfm: Real  # states
-    gfm_0: Real  # states at the start of the step
-    gfm_d: Real  # slopes of the last pass; 0 for an output
-    gfm_d0: Real  # slopes at the start of the step
-    gfl: Real  # the same for the GFL
-    gfl_0: Real
-    gfl_d: Real
-    gfl_d0: Real
-
-
 class FeedForward(NamedTuple):
     y: Complex
     """Admittance (S) between the internal voltage that a pass gives and the terminal; 0: a pass gives the current
@@ -120,7 +107,7 @@ def run_second_order_steps(
     net: Any,
     units: Any,
     present: Any,
-    slopes: Any,
+    slope_0: Real,
     forward: Any,
     x: Real,
     out: Real,
@@ -128,7 +115,7 @@ def run_second_order_steps(
     """Advance to the end of `steps` steps; returns, and resumes after a failure, as `step.run_steps` does.
 
     `begin`: solution to begin with: 2 k at the start of step k, 2 k + 1 at its predictor, 2 `steps` at the end;
-    `present`: `units` with the present states in place of those at the start of the step; `slopes`: the same memory.
+    `present`: `units` with the present states in place of those at the start of the step; `slope_0`: room for slopes.
     """
     total = 0
     if steps == 0:
@@ -137,7 +124,6 @@ def run_second_order_steps(
     I_b = np.empty(m, np.complex128)
     x_0, J_0 = np.empty_like(x), np.empty_like(units.J)
     rotation = np.empty(net.leader.size, np.complex128)
-    theta = np.zeros(n)
     unread = np.zeros_like(out[0])
     for solution in range(begin, 2 * steps + 1):
         step = solution // 2
@@ -148,7 +134,7 @@ def run_second_order_steps(
         J_0[:] = units.J
         if solution > 0:
             extrapolate(net.sparse, x)
-        turn_frames(units, net, theta, rotation)
+        turn_frames(units, net, rotation)
         iterations = solve_together(net, present, forward, rotation, x, I_b, tolerance, readings)
         if iterations < 0:
             x[:] = x_0
@@ -165,13 +151,10 @@ def run_second_order_steps(
                 if units.online[i] and not np.isfinite(readings[i, 0]):
                     return -1 - (FAILURES * (step - 1) + 2)
         if predicted:
-            slopes.gfm[:] = slopes.gfm_0 + 0.5 * h * (slopes.gfm_d0 + slopes.gfm_d)
-            slopes.gfl[:] = slopes.gfl_0 + 0.5 * h * (slopes.gfl_d0 + slopes.gfl_d)
+            units.state[:] = units.start + 0.5 * h * (slope_0 + units.slope)
         else:
             keep_start(units)
             if step < steps:
-                slopes.gfm_d0[:] = slopes.gfm_d
-                slopes.gfl_d0[:] = slopes.gfl_d
-                slopes.gfm[:] = slopes.gfm_0 + h * slopes.gfm_d0
-                slopes.gfl[:] = slopes.gfl_0 + h * slopes.gfl_d0
+                slope_0[:] = units.slope
+                units.state[:] = units.start + h * slope_0
     return total

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Integers, Real, compiled
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Real, compiled
 from gridpeers.plant.dynamics.kernel.controller_pass import advance_inverters, keep_start, read_offline, turn_frames
 from gridpeers.plant.dynamics.kernel.network_arrays import extrapolate, note_increment
 from gridpeers.plant.dynamics.kernel.solve import solve_network
@@ -23,14 +23,13 @@ MAX_LIMITING = 2000
 
 
 @compiled
-def limit_currents(gfm: Any, gfm_at: Integers, online: Flags, J: Complex, V: Complex, limiting: Flags) -> float:
+def limit_currents(units: Any, J: Complex, V: Complex, limiting: Flags) -> float:
     """Reduce the injections of the phases beyond their limit; return the largest change of an internal voltage (V)."""
     largest = 0.0
-    for k in range(gfm_at.size):
-        i = gfm_at[k]
-        if not online[i]:
+    for i in range(units.online.size):
+        y_f, limit = units.y_f[i], units.I_limit[i]
+        if not units.online[i] or limit == np.inf:
             continue
-        y_f, limit = gfm[k].y_f, gfm[k].I_limit
         for phase in range(3):
             current = J[i, phase] - y_f * V[i, phase]
             square = current.real * current.real + current.imag * current.imag
@@ -51,7 +50,7 @@ def solve_on(net: Any, units: Any, rotation: Complex, x: Real, I_b: Complex, tol
         if iterations < 0:
             return -1
         total += iterations
-        surplus = limit_currents(units.gfm, units.gfm_at, units.online, units.J, units.V, units.limiting)
+        surplus = limit_currents(units, units.J, units.V, units.limiting)
         if surplus <= tolerance:
             return total
     return -1
@@ -61,7 +60,7 @@ def solve_on(net: Any, units: Any, rotation: Complex, x: Real, I_b: Complex, tol
 def solve_within_limits(net: Any, units: Any, rotation: Complex, x: Real, I_b: Complex, tolerance: float) -> int:
     """Solve the network with every phase within its limit; `step` has these lines in its loop, which is faster."""
     units.limiting[:] = False
-    limit_currents(units.gfm, units.gfm_at, units.online, units.J, units.V, units.limiting)
+    limit_currents(units, units.J, units.V, units.limiting)
     return solve_on(net, units, rotation, x, I_b, tolerance)
 
 
@@ -74,7 +73,7 @@ def run_steps(begin: int, steps: int, h: float, tolerance: float, net: Any, unit
     """Advance to the end of `steps` steps; returns the network iterations, or -1 - (FAILURES k + what) for step k.
 
     A solution that failed leaves everything as it stood before it: with another tangent in `net`, a call with `begin` =
-    2 k + what goes on there. The start of step k is in `gfm_0`, `gfl_0` and `J_0` of the units. `x`: branch voltages in
+    2 k + what goes on there. The start of step k is in `start` and `J_0` of the units. `x`: branch voltages in
     the islands' frames, the first guess of the next solution; `out`: steps x n_inv x READING: f of the corrector; P, Q
     and V of the second solution.
     """
@@ -82,21 +81,20 @@ def run_steps(begin: int, steps: int, h: float, tolerance: float, net: Any, unit
     I_b = np.empty(m, np.complex128)
     x_0 = np.empty_like(x)
     rotation = np.empty(net.leader.size, np.complex128)
-    theta = np.zeros(n)
     total = 0
     for solution in range(begin, 2 * steps):
         step = solution // 2
         second = solution % 2 == 1
         if not second:
             keep_start(units)
-        turn_frames(units, net, theta, rotation)
+        turn_frames(units, net, rotation)
         x_0[:] = x
         extrapolate(net.sparse, x)
         units.limiting[:] = False
-        limit_currents(units.gfm, units.gfm_at, units.online, units.J, units.V, units.limiting)
+        limit_currents(units, units.J, units.V, units.limiting)
         iterations = solve_network(net, units.J, rotation, x, I_b, units.V, tolerance)
         if iterations >= 0:
-            surplus = limit_currents(units.gfm, units.gfm_at, units.online, units.J, units.V, units.limiting)
+            surplus = limit_currents(units, units.J, units.V, units.limiting)
             if surplus > tolerance:
                 more = solve_on(net, units, rotation, x, I_b, tolerance)
                 iterations = iterations + more if more >= 0 else -1

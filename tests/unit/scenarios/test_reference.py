@@ -13,7 +13,9 @@ from gridpeers.cli.commands.show import Topic
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem, NodeFault
 from gridpeers.netem.schema.partition import Partition
-from gridpeers.plant.plant_config import GflParameters, GfmParameters, Protection, SyncCheck
+from gridpeers.plant.inverters.gfl import Gfl
+from gridpeers.plant.inverters.gfm_droop import GfmDroop
+from gridpeers.plant.plant_config import Protection, SyncCheck
 from gridpeers.scenarios.reference import TOPICS, field_docs, page
 from gridpeers.scenarios.schema.scenario_model import Case, Event, PlantTable, Processes, ScenarioModel, Time
 from gridpeers.wire import keys, messages
@@ -24,8 +26,8 @@ TABLES: tuple[type[msgspec.Struct], ...] = (
     ScenarioModel,
     Time,
     PlantTable,
-    GfmParameters,
-    GflParameters,
+    GfmDroop,
+    Gfl,
     Gains,
     Processes,
     Event,
@@ -41,7 +43,7 @@ def test_every_field_has_its_sentence(cls: type[msgspec.Struct]) -> None:
     assert [field.name for field in fields_of(cls) if not (field.help or below[field.name])] == []
 
 
-@pytest.mark.parametrize("cls", [Gains, DegradedCommunication, Protection, GfmParameters, GflParameters, SyncCheck])
+@pytest.mark.parametrize("cls", [Gains, DegradedCommunication, Protection, GfmDroop, Gfl, SyncCheck])
 def test_the_unit_in_a_key_is_the_one_in_its_sentence(cls: type[msgspec.Struct]) -> None:
     """T_p_s is in seconds, and its docstring says so; what is in s, pu or Hz carries it in the key."""
     below = {name: text for name, (_, text) in field_docs(cls).items()}

@@ -12,10 +12,13 @@ import pytest
 from msgspec.structs import replace
 
 from gridpeers.bridges.gridlabd.glm import export_glm, inverter_blocks
-from gridpeers.bridges.gridlabd.gridlabd_simulator import beyond_gridlabd
 from gridpeers.plant.equipment import Feeder, Load
-from gridpeers.plant.equipment.inverter_parameters import BOUNDS_OF_SET_POINTS, PARAMETERS_OF, REGFM_A1, GfmParameters
 from gridpeers.plant.feeder import Plant
+from gridpeers.plant.inverters.gfl import Gfl
+from gridpeers.plant.inverters.gfm_droop import GfmDroop
+from gridpeers.plant.inverters.inverter_model import InverterModel
+from gridpeers.plant.inverters.inverter_registry import BOUNDS_OF_SET_POINTS
+from gridpeers.plant.inverters.regfm_a1 import REGFM_A1
 from gridpeers.plant.network import Network, solve_power_flow
 from gridpeers.plant.plant_config import PlantSettings
 from gridpeers.plant.tables import FeederError, read_feeder
@@ -76,7 +79,7 @@ def test_exported_inverters_start_at_our_operating_point(tmp_path: Path) -> None
     roof, lateral = (replace(feeder.inverters[i], P_rated=5e4) for i in (1, 0))
     added = (replace(roof, name="roof", bus="47", phases="C"), replace(lateral, name="lateral", bus="96", phases="B"))
     feeder = replace(feeder, inverters=(*feeder.inverters, *added))
-    settings = PlantSettings(P_set0=0.5, gfm=GfmParameters(X_f=0.2))
+    settings = PlantSettings(P_set0=0.5, gfm=GfmDroop(X_f=0.2))
 
     text = export_glm(feeder, settings, 1, "voltages.csv")
     theirs = voltages(text, tmp_path)
@@ -110,12 +113,13 @@ def test_everything_that_cannot_be_exported_is_named_at_once() -> None:
     )
 
 
+DEFAULT: dict[str, type[InverterModel]] = {"GFM": GfmDroop, "GFL": Gfl}
 ROW = {"name": "inv1", "bus": "13", "P_rated_kW": "600", "m_p_pu": "0.01", "m_q_pu": "0.05"}
 KEYS = [
     (kind, field)
-    for kind, cls in PARAMETERS_OF.items()
+    for kind, cls in DEFAULT.items()
     for field in fields_of(cls)
-    if field.name not in BOUNDS_OF_SET_POINTS  # they bound set-points before GridLAB-D gets them
+    if field.name not in {"folder", *BOUNDS_OF_SET_POINTS}  # they bound set-points before GridLAB-D gets them
 ]
 
 
@@ -123,6 +127,8 @@ def another(field: Field) -> Any:
     """Return another value of a parameter than its default."""
     if field.type is bool:
         return not field.default
+    if field.name == "model":
+        return {"gridlabd": "regfm_a1", "voltage_source": "current_source"}[field.default]
     if get_origin(field.type) is Literal:
         return next(word for word in get_args(field.type) if word != field.default)
     return 0.5 * field.default or 0.01
@@ -131,10 +137,13 @@ def another(field: Field) -> Any:
 @pytest.mark.parametrize(("kind", "field"), KEYS, ids=[f"{kind}-{field.key}" for kind, field in KEYS])
 def test_a_parameter_is_written_or_refused(kind: str, field: Field) -> None:
     """Another value of any parameter makes another model; one that GridLAB-D does not have is named by its key."""
-    default = PARAMETERS_OF[kind]()
+    default = DEFAULT[kind]()
     own = replace(default, **{field.name: another(field)})
 
-    models = [inverter_blocks([ROW], {"inv1": 1e5 + 0j}, {"inv1": parameters}) for parameters in (default, own)]
+    models = [
+        inverter_blocks([ROW | {"kind": kind}], {"inv1": 1e5 + 0j}, {"inv1": parameters})
+        for parameters in (default, own)
+    ]
 
-    assert (models[0] != models[1]) != (field.key in beyond_gridlabd(own))
-    assert beyond_gridlabd(default) == {}
+    assert (models[0] != models[1]) != (field.key in own.beyond_gridlabd())
+    assert default.beyond_gridlabd() == {}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import scipy.sparse as sp
@@ -10,7 +11,10 @@ from numpy.typing import NDArray
 
 from gridpeers.plant.dynamics import Circuit, Dynamics, Inverter
 from gridpeers.plant.dynamics.circuit import LoadLaw
-from gridpeers.plant.plant_config import GflParameters, GfmParameters
+from gridpeers.plant.dynamics.kernel.compiled import Complex
+from gridpeers.plant.inverters.gfl import Gfl
+from gridpeers.plant.inverters.gfm_droop import GfmDroop
+from gridpeers.plant.inverters.inverter_model import InverterModel
 
 S_B = 200e3
 V_B = 277.1363
@@ -18,11 +22,11 @@ Z_B = V_B**2 / (S_B / 3.0)
 A = np.exp(2j * np.pi / 3.0)
 BALANCED = np.array([1.0, A**2, A])
 
-GFM_D = GfmParameters(R_f=0.01, X_f=0.15, P_max=1.5, k_ip=30.0)
+GFM_D = GfmDroop(R_f=0.01, X_f=0.15, P_max=1.5, k_ip=30.0)
 """Defaults of inverter-models section 8."""
-GFM_A = GfmParameters(R_f=0.014, X_f=0.1636, P_max=1.5, k_ip=30.0)
+GFM_A = GfmDroop(R_f=0.014, X_f=0.1636, P_max=1.5, k_ip=30.0)
 """The same with the autotest's filter."""
-GFL_D = GflParameters(
+GFL_D = Gfl(
     F_current=0.0,
     frequency_watt=False,
     volt_var=False,
@@ -38,10 +42,11 @@ GFL_D = GflParameters(
 NONE = np.zeros(0, np.complex128)
 
 
-def inverter(parameters: GfmParameters | GflParameters, *, m_p: float = 0.01, m_q: float = 0.05) -> Inverter:
+def inverter(parameters: InverterModel, *, m_p: float = 0.01, m_q: float = 0.05) -> Inverter:
     """Make an inverter of 200 kVA."""
-    kind = "GFM" if isinstance(parameters, GfmParameters) else "GFL"
-    return Inverter(name=kind, kind=kind, S_b=S_B, V_b=V_B, m_p=m_p, m_q=m_q, parameters=parameters)
+    return Inverter(
+        name=parameters.kind, kind=parameters.kind, S_b=S_B, V_b=V_B, m_p=m_p, m_q=m_q, parameters=parameters
+    )
 
 
 def circuit(
@@ -60,12 +65,12 @@ def circuit(
     )
 
 
-def on_stiff_bus(parameters: GfmParameters | GflParameters, *, h: float = 0.002, **droops: float) -> Dynamics:
+def on_stiff_bus(parameters: InverterModel, *, h: float = 0.002, **droops: float) -> Dynamics:
     """One inverter at an infinite bus of 1 pu, at rest at p = q = 0."""
     return at_rest(circuit(np.zeros((3, 3), complex), [[0, 1, 2]], source=V_B * BALANCED), parameters, h=h, **droops)
 
 
-def lone(parameters: GfmParameters, p: float, *, h: float = 0.002) -> Dynamics:
+def lone(parameters: GfmDroop, p: float, *, h: float = 0.002) -> Dynamics:
     """One GFM with a resistive load of p at 1 pu, at rest."""
     return at_rest(loaded(p), parameters, h=h)
 
@@ -75,7 +80,7 @@ def loaded(p: float) -> Circuit:
     return circuit(np.eye(3, dtype=complex) * p / Z_B, [[0, 1, 2]])
 
 
-def at_rest(network: Circuit, parameters: GfmParameters | GflParameters, *, h: float, **droops: float) -> Dynamics:
+def at_rest(network: Circuit, parameters: InverterModel, *, h: float, **droops: float) -> Dynamics:
     """One inverter at rest."""
     dynamics = Dynamics(network, (inverter(parameters, **droops),), h)
     dynamics.start(np.zeros(1), np.zeros(1))
@@ -87,7 +92,7 @@ def move_source(dynamics: Dynamics, source: NDArray[np.complex128]) -> None:
     dynamics.connect(replace(dynamics.network.circuit, source_voltage=source))
 
 
-def pair(first: GfmParameters, second: GfmParameters, load: float) -> Dynamics:
+def pair(first: GfmDroop, second: GfmDroop, load: float) -> Dynamics:
     """Two GFM joined by 0.0002 + j0.0004 pu, resistive load in the middle, at rest."""
     y = 1.0 / ((0.0001 + 0.0002j) * Z_B)
     Y = np.zeros((9, 9), complex)
@@ -103,3 +108,25 @@ def pair(first: GfmParameters, second: GfmParameters, load: float) -> Dynamics:
     dynamics = Dynamics(network, (inverter(first), inverter(second)), 0.002)
     dynamics.start(np.full(2, load / 2.0), np.zeros(2))
     return dynamics
+
+
+def by_name(record: NDArray[np.void]) -> SimpleNamespace:
+    """Return a record's values as attributes: a pass of a model takes them, called as a function of Python."""
+    return SimpleNamespace(**{name: record[name].item() for name in record.dtype.names or ()})
+
+
+def at_terminal(V: Complex, J: Complex, y_f: complex, P_set: float, V_set: float, Q_set: float) -> SimpleNamespace:
+    """Return what a pass finds at a terminal of V (V) and J (A), of `S_B` and `V_B`; set-points in pu."""
+    I = J - y_f * V  # noqa: E741
+    S = np.sum(V * np.conj(I)) / S_B
+    phases = {
+        f"{q}_{phase}": complex(x)
+        for q, of in (("V", V), ("I", I), ("J", J))
+        for phase, x in zip("ABC", of, strict=True)
+    }
+    set_points = {"P_set": P_set, "V_set": V_set, "Q_set": Q_set}
+    return SimpleNamespace(P=S.real, Q=S.imag, V=float(np.mean(np.abs(V))) / V_B, **set_points, **phases)
+
+
+def injections(t: SimpleNamespace) -> Complex:
+    return np.array([t.J_A, t.J_B, t.J_C])

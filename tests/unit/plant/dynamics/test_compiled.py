@@ -21,7 +21,7 @@ from gridpeers.scenarios.schema.check_notes import start_problem
 from gridpeers.scenarios.schema.configs import configs
 from tests.side_by_side import compile_once
 
-SOURCES = sorted(path for path in Path(compiled.__file__).parent.glob("*.py") if "\n@compiled\n" in path.read_text())
+SOURCES = sorted(path for path in compiled.HERE.glob("*.py") if "\n@compiled\n" in path.read_text())
 
 
 def fill(into: NDArray[Any], value: float) -> None:
@@ -50,13 +50,23 @@ def test_an_edit_of_compiled_code_renames_its_cache(
 ) -> None:
     """Whichever file with compiled code is edited, machine code of the text before is not loaded again."""
     folder = Path(shutil.copytree(source.parent, tmp_path / "dynamics", ignore=shutil.ignore_patterns("__pycache__")))
-    monkeypatch.setattr(compiled, "_HERE", folder)
+    monkeypatch.setattr(compiled, "HERE", folder)
     before = compiled.kernel_folder()
 
     with (folder / source.name).open("a") as file:
         file.write("\n")
 
     assert compiled.kernel_folder() != before
+
+
+def test_an_edit_of_a_model_compiles_that_model_alone(tmp_path: Path) -> None:
+    """The machine code of a model stands apart from the step, in a folder named by the files that its pass calls."""
+    model = tmp_path / "mine.py"
+    model.write_text("a")
+    before = compiled.kernel_folder([str(model)])
+    model.write_text("b")
+
+    assert len({before, compiled.kernel_folder([str(model)]), compiled.kernel_folder()}) == 3
 
 
 def test_another_process_loads_the_step_and_compiles_nothing() -> None:

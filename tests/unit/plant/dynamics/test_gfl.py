@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -10,10 +11,20 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from gridpeers.plant.dynamics import Dynamics
-from gridpeers.plant.dynamics.kernel import gfl
 from gridpeers.plant.dynamics.kernel.compiled import Real
-from gridpeers.plant.plant_config import GflParameters
-from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, S_B, V_B, move_source, on_stiff_bus
+from gridpeers.plant.inverters import gfl
+from gridpeers.plant.inverters.gfl import Gfl
+from tests.unit.plant.dynamics.circuits import (
+    BALANCED,
+    GFL_D,
+    S_B,
+    V_B,
+    at_terminal,
+    by_name,
+    injections,
+    move_source,
+    on_stiff_bus,
+)
 from tests.unit.plant.dynamics.test_gfm import crossing
 
 WATT = replace(GFL_D, frequency_watt=True, T_ff=0.05)
@@ -26,16 +37,16 @@ def frequency_step(plant: Dynamics, df: float, seconds: float) -> NDArray[np.flo
     network solution is the bus itself, so the inverter's passes can be called without it.
     """
     units, h = plant.inverters, plant.h
-    state, g, J = units.gfl_state, units.gfl[0], units.J[0].copy()
+    x, g, J = by_name(units.state_of(0)), by_name(units.constants(0)), units.J[0].copy()
     rows = []
     for k in range(round(seconds / h)):
-        x0, d = state.copy(), state.copy()
+        x0, d = copy(x), copy(x)
         for second in (False, True):
             V = V_B * BALANCED * np.exp(2j * np.pi * df * (k + second) * h)
-            p = np.sum(V * np.conj(J - g["y_f"] * V)).real / S_B
-            P_set, V_set, Q_set = units.set_points[0]
-            J = np.array(gfl.advance_gfl(g, P_set, V_set, Q_set, x0[0], state[0], d[0], *V, *J, h, second))
-        rows.append((float(state["f"][0]), p))
+            t = at_terminal(V, J, g.y_f, *units.set_points[0])
+            Gfl.advance(g, t, x0, x, d, h, second)
+            J = injections(t)
+        rows.append((x.f, t.P))
     return np.array(rows)
 
 
@@ -43,12 +54,12 @@ def frequency_step(plant: Dynamics, df: float, seconds: float) -> NDArray[np.flo
 def test_the_plls_first_answer_to_a_phase_jump(h: float, expected: float) -> None:
     """Row 14: a jump of 10 degrees shows at once through both gains, before the corrector."""
     units = on_stiff_bus(GFL_D, h=h).inverters
-    x, d = units.gfl_state.copy(), units.gfl_state.copy()
-    V = V_B * BALANCED * np.exp(1j * np.deg2rad(10.0))
+    g, x0 = by_name(units.constants(0)), by_name(units.state_of(0))
+    x, t = copy(x0), at_terminal(V_B * BALANCED * np.exp(1j * np.deg2rad(10.0)), units.J[0], g.y_f, 0.0, 1.0, 0.0)
 
-    gfl.advance_gfl(units.gfl[0], 0.0, 1.0, 0.0, units.gfl_state[0], x[0], d[0], *V, *units.J[0], h, False)
+    Gfl.advance(g, t, x0, x, copy(x0), h, False)
 
-    assert x["f"][0] == pytest.approx(expected, abs=0.01)
+    assert x.f == pytest.approx(expected, abs=0.01)
 
 
 def test_the_pll_after_a_phase_jump() -> None:
@@ -98,7 +109,7 @@ def test_frequency_watt_with_the_default_droop() -> None:
 
 def test_the_dead_band_jumps() -> None:
     """Row 18: past the edge of the dead band the full deviation acts."""
-    record = on_stiff_bus(replace(WATT, db_UF=0.036, db_OF=0.036)).inverters.gfl[0]
+    record = by_name(on_stiff_bus(replace(WATT, db_UF=0.036, db_OF=0.036)).inverters.constants(0))
 
     assert gfl.power_reference(record, 0.3, 59.965) == pytest.approx(0.3, abs=1e-12)
     assert gfl.power_reference(record, 0.3, 59.963) == pytest.approx(0.3 + 0.0617, abs=1e-4)
@@ -117,7 +128,7 @@ def test_volt_var() -> None:
 
 def test_var_takes_what_power_leaves() -> None:
     """Row 20: at P_d = 0.8 the var reference is clipped at 0.6."""
-    record = on_stiff_bus(replace(GFL_D, volt_var=True)).inverters.gfl[0]
+    record = by_name(on_stiff_bus(replace(GFL_D, volt_var=True)).inverters.constants(0))
 
     assert gfl.var_reference(record, 1.0, 0.0, 0.9, 0.8) == pytest.approx(0.6, abs=1e-6)
 
@@ -152,23 +163,23 @@ def test_the_current_reference_is_clipped() -> None:
 
     plant.run(3000)
     units = plant.inverters
-    i = units.I[0, 0] * np.exp(-1j * units.gfl_state["theta"][0]) / units.gfl["I_b"][0]
+    i = units.I[0, 0] * np.exp(-1j * units.state_of(0)["theta"]) / units.constants(0)["I_b"]
 
     assert i.real == pytest.approx(1.0, abs=1e-3)
     assert plant.readings()[0, 1] / S_B == pytest.approx(0.5, abs=1e-3)
 
 
 @pytest.mark.parametrize("wrong", [replace(GFL_D, F_current=1.0), replace(GFL_D, k_pc=0.2)])
-def test_a_diverging_current_controller_is_refused(wrong: GflParameters) -> None:
+def test_a_diverging_current_controller_is_refused(wrong: Gfl) -> None:
     """Row 23: gains whose one-pass feedback grows on a stiff bus are refused with the ratio and the remedy."""
     with pytest.raises(ValueError, match=r"must be below 1, got 1\.\d\d"):
-        gfl.pack(wrong, S_B, V_B, 0.01, 0.05, 60.0)
+        on_stiff_bus(wrong)
 
 
 def test_the_refused_gains_do_diverge() -> None:
     """Row 23: the refusal is not overcautious: let through, the gains blow up."""
     plant = on_stiff_bus(GFL_D)
-    plant.inverters.gfl["F_current"] = 1.0
+    plant.inverters.constants(0)["F_current"] = 1.0
     plant.inverters.set_points[0, 0] = 0.3
 
     p = plant.run(200)[:, 0, 1] / S_B
@@ -206,7 +217,7 @@ P_SET = 0.5
 
 def record() -> Any:
     """Return the inverter as the compiled pass has it."""
-    return on_stiff_bus(CATEGORY_B, m_p=M_P, m_q=M_Q).inverters.gfl[0]
+    return by_name(on_stiff_bus(CATEGORY_B, m_p=M_P, m_q=M_Q).inverters.constants(0))
 
 
 @pytest.mark.parametrize(
@@ -289,15 +300,16 @@ def test_a_ramp_in_time_gives_openders_powers(monkeypatch: pytest.MonkeyPatch, V
     theirs = opender(monkeypatch, h, V, f)
 
     units = plant.inverters
-    state, g, J = units.gfl_state, units.gfl[0], units.J[0].copy()
+    x, g, J = by_name(units.state_of(0)), by_name(units.constants(0)), units.J[0].copy()
     theta, ours = 0.0, []
     for v, df in zip(V.tolist(), (f - 60.0).tolist(), strict=True):
-        x0, d = state.copy(), state.copy()
+        x0, d = copy(x), copy(x)
         for second in (False, True):
             bus = v * V_B * BALANCED * np.exp(1j * (theta + 2.0 * np.pi * df * h * second))
-            S = np.sum(bus * np.conj(J - g["y_f"] * bus)) / S_B
-            J = np.array(gfl.advance_gfl(g, *units.set_points[0], x0[0], state[0], d[0], *bus, *J, h, second))
+            t = at_terminal(bus, J, g.y_f, *units.set_points[0])
+            Gfl.advance(g, t, x0, x, d, h, second)
+            J = injections(t)
         theta += 2.0 * np.pi * df * h
-        ours.append((S.real, S.imag))
+        ours.append((t.P, t.Q))
     assert np.abs(np.array(ours) - theirs).max() < 0.001
     assert np.ptp(theirs, axis=0).max() > 0.2

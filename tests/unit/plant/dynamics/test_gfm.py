@@ -11,8 +11,8 @@ from scipy.linalg import expm
 from gridpeers.plant.dynamics import Circuit, Dynamics
 from gridpeers.plant.dynamics.circuit import aligned_sum
 from gridpeers.plant.dynamics.inverters import Inverters
-from gridpeers.plant.dynamics.kernel import gfm
-from gridpeers.plant.equipment.inverter_parameters import REGFM_A1, GfmParameters
+from gridpeers.plant.inverters.gfm_droop import GfmDroop
+from gridpeers.plant.inverters.regfm_a1 import REGFM_A1
 from gridpeers.plant.plant_config import Method
 from tests.unit.plant.dynamics.circuits import (
     BALANCED,
@@ -47,7 +47,7 @@ def settled(y: Series, end: float, within: float, h: float) -> float:
 
 def test_bases() -> None:
     """Row 1: 200 kVA at 277.1363 V has 1.15207 ohm, and the autotest's filter 0.4507 - j5.2672 S."""
-    record = gfm.pack(GFM_A, S_B, V_B, 0.01, 0.05, 60.0)
+    record = on_stiff_bus(GFM_A).inverters.constants(0)
 
     assert pytest.approx(240.56, rel=1e-4) == S_B / (3.0 * V_B)
     assert pytest.approx(1.15207, rel=1e-4) == Z_B
@@ -79,7 +79,7 @@ def test_the_voltage_controller_alone() -> None:
         plant.run(10)
         t = 10 * k * plant.h
         expected = 0.01 * (1.0 - (s2 * np.exp(-s1 * t) - s1 * np.exp(-s2 * t)) / (s2 - s1))
-        assert plant.inverters.gfm_state["v"][0] - 1.0 == pytest.approx(expected, abs=0.02 * 0.01)
+        assert plant.inverters.state_of(0)["v"] - 1.0 == pytest.approx(expected, abs=0.02 * 0.01)
 
 
 def test_voltage_droop_on_a_stiff_bus() -> None:
@@ -116,7 +116,7 @@ def test_the_default_filter_is_critically_damped() -> None:
     filtered = []
     for _ in range(300):
         plant.run(5)
-        filtered.append(float(plant.inverters.gfm_state["p"][0]) / 0.001)
+        filtered.append(float(plant.inverters.state_of(0)["p"]) / 0.001)
     t = 0.001 * np.arange(1, 301)
     a, b = 50.0, 1.5
     expected = 1.0 - np.exp(-a * t) * (np.cos(b * t) + a / b * np.sin(b * t))
@@ -144,7 +144,7 @@ def test_the_overload_limiter_hands_over() -> None:
 
     assert end[:, 1] / S_B == pytest.approx([1.000, 0.800], abs=1e-3)
     assert end[:, 0] == pytest.approx(59.820, abs=0.001)
-    assert plant.inverters.gfm_state["x_over"][0] == pytest.approx(-0.754, abs=0.004)
+    assert plant.inverters.state_of(0)["x_over"] == pytest.approx(-0.754, abs=0.004)
 
 
 @pytest.mark.parametrize(
@@ -164,7 +164,7 @@ def test_the_limiter_on_a_stiff_bus(
     assert np.argmax(p) * plant.h == pytest.approx(at, abs=0.004)
     assert settled(p, 0.5, 0.01, plant.h) == pytest.approx(quiet, abs=0.02)
     assert p[-1] == pytest.approx(0.5, abs=1e-4)
-    assert plant.inverters.gfm_state["x_over"][0] == pytest.approx(-1.131, abs=1e-3)
+    assert plant.inverters.state_of(0)["x_over"] == pytest.approx(-1.131, abs=1e-3)
 
 
 def test_a_gfm_does_not_absorb() -> None:
@@ -176,7 +176,7 @@ def test_a_gfm_does_not_absorb() -> None:
     p = end[:, 1] / S_B
 
     assert p[0] == pytest.approx(0.0, abs=1e-3)
-    assert plant.inverters.gfm_state["x_under"][0] > 0.1
+    assert plant.inverters.state_of(0)["x_under"] > 0.1
     assert end[0, 0] > 60.0 + 0.6 * (0.1 - p[0]) + 0.01
 
 
@@ -186,7 +186,7 @@ RESISTIVE = {"R_f": 0.05, "P_max": 2.0, "Q_max": 2.0, "Q_min": -2.0}
 """With a resistance, the negative and zero sequence carry real power; without one, only vars."""
 
 
-def unbalanced(parameters: GfmParameters, method: Method, *, scale: float = 1.0) -> Dynamics:
+def unbalanced(parameters: GfmDroop, method: Method, *, scale: float = 1.0) -> Dynamics:
     """A lone GFM with 0.9, 0.5 and 0.2 pu + 40 % of vars on its phases, at rest."""
     dynamics = Dynamics(unequal_load(scale), (inverter(parameters),), 0.002, method=method)
     dynamics.start(np.zeros(1), np.zeros(1))
@@ -198,7 +198,7 @@ def unequal_load(scale: float) -> Circuit:
     return circuit(np.diag([0.9, 0.5, 0.2]) * scale * (1.0 - 0.4j) / Z_B, [[0, 1, 2]])
 
 
-def at_stiff_bus(parameters: GfmParameters, method: Method, h: float) -> Dynamics:
+def at_stiff_bus(parameters: GfmDroop, method: Method, h: float) -> Dynamics:
     """A GFM at 1 pu, at rest without power."""
     bus = circuit(np.zeros((3, 3), complex), [[0, 1, 2]], source=V_B * BALANCED)
     dynamics = Dynamics(bus, (inverter(parameters),), h, method=method)
@@ -214,7 +214,7 @@ def positive_sequence(dynamics: Dynamics) -> tuple[complex, float]:
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("parameters", [REGFM_A1, DIRECT], ids=["VFlag 1", "VFlag 0"])
-def test_it_rests_where_it_starts_on_unequal_phases(parameters: GfmParameters, method: Method) -> None:
+def test_it_rests_where_it_starts_on_unequal_phases(parameters: GfmDroop, method: Method) -> None:
     """The start is an equilibrium of what the model measures: nothing moves in 1 s."""
     dynamics = unbalanced(parameters, method)
     before = dynamics.readings()[0].copy()
@@ -228,7 +228,7 @@ def test_it_rests_where_it_starts_on_unequal_phases(parameters: GfmParameters, m
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("parameters", [REGFM_A1, DIRECT], ids=["VFlag 1", "VFlag 0"])
-def test_a_given_v_set_is_met_at_the_start(parameters: GfmParameters, method: Method) -> None:
+def test_a_given_v_set_is_met_at_the_start(parameters: GfmDroop, method: Method) -> None:
     """Behind a line with unequal loads it starts with the Q at which its own droop gives V_set, and rests."""
     y = np.eye(3) / ((0.02 + 0.04j) * Z_B)
     load = np.diag([0.9, 0.5, 0.2]) * (1.0 - 0.4j) / Z_B
@@ -246,7 +246,7 @@ def test_a_given_v_set_is_met_at_the_start(parameters: GfmParameters, method: Me
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("parameters", [REGFM_A1, DIRECT], ids=["VFlag 1", "VFlag 0"])
-def test_it_droops_by_the_positive_sequence(parameters: GfmParameters, method: Method) -> None:
+def test_it_droops_by_the_positive_sequence(parameters: GfmDroop, method: Method) -> None:
     """After a load step f follows P of the positive sequence, and V_set - m_q Q is its voltage, or the internal one."""
     dynamics = unbalanced(replace(parameters, **RESISTIVE), method)
     P_set, V_set, _ = dynamics.inverters.set_points[0]
@@ -255,7 +255,7 @@ def test_it_droops_by_the_positive_sequence(parameters: GfmParameters, method: M
     f = dynamics.run(4000)[-1, 0, 0]
     S, v = positive_sequence(dynamics)
     total = complex(np.sum(dynamics.inverters.V[0] * np.conj(dynamics.inverters.I[0]))) / S_B
-    E = float(dynamics.inverters.gfm_state["E"][0])
+    E = float(dynamics.inverters.state_of(0)["E"])
 
     assert min(abs(total.real - S.real), abs(total.imag - S.imag)) > 0.002
     assert f - 60.0 == pytest.approx(0.6 * (P_set - S.real), abs=1e-7)
@@ -301,7 +301,7 @@ def test_a_step_follows_the_poles_of_the_linearised_model() -> None:
         got = []
         for _ in range(n // 20):
             dynamics.run(20)
-            got.append(float(dynamics.inverters.gfm_state[state][0]) / step)
+            got.append(float(dynamics.inverters.state_of(0)[state]) / step)
         size = len(B)
         joined = np.zeros((size + 1, size + 1))
         joined[:size, :size], joined[:size, size] = A, B
@@ -327,12 +327,11 @@ def units() -> Inverters:
     return Inverters((inverter(GFL_D), inverter(GFM_D), inverter(GFL_D)), connected=(True, True, False))
 
 
-def test_each_kind_has_its_own_records(units: Inverters) -> None:
-    """Records and states of each kind are found at the inverters they belong to."""
-    assert (units.gfm_at.tolist(), units.gfl_at.tolist()) == ([1], [0, 2])
-    assert (len(units.gfm_state), len(units.gfl_state)) == (1, 2)
-    assert units.y_f.tolist() == [units.gfl["y_f"][0], units.gfm["y_f"][0], units.gfl["y_f"][1]]
-    assert units.S_max.tolist() == [1.0, np.inf, 1.0]
+def test_each_inverter_has_the_records_of_its_model(units: Inverters) -> None:
+    """Each inverter has parameters and states of its own model."""
+    assert ["P_f" in (units.state_of(i).dtype.names or ()) for i in range(3)] == [True, False, True]
+    assert units.y_f.tolist() == [units.constants(i)["y_f"] for i in range(3)]
+    assert units.volt_var[0].tolist() == [1.0, np.inf, 1.0]
     assert units.connected.tolist() == [True, True, False]
 
 
@@ -343,15 +342,15 @@ def test_rest_is_that_of_the_inverter_asked_for(units: Inverters) -> None:
     units.rest(2, 0.4 + 0.3j, 0.98)
 
     assert units.theta() == pytest.approx([0.0, np.pi / 2.0, 0.0])
-    assert (units.gfm_state["p"][0], units.gfm_state["q"][0], units.gfm_state["v"][0]) == (0.2, 0.1, 1.01)
-    assert units.gfl_state["P_f"].tolist() == [0.0, 0.4]
-    assert units.gfl_state["V_m"].tolist() == [0.0, 0.98]
+    assert units.state_of(1)[["p", "q", "v"]].item() == (0.2, 0.1, 1.01)
+    assert [units.state_of(i)["P_f"] for i in (0, 2)] == [0.0, 0.4]
+    assert [units.state_of(i)["V_m"] for i in (0, 2)] == [0.0, 0.98]
 
 
 def test_only_a_gfl_has_its_power_limited(units: Inverters) -> None:
     """A limit in W bounds one GFL's reference in pu; for a GFM it is refused by name."""
     units.limit_power(2, 0.25 * S_B)
 
-    assert units.gfl["P_max"].tolist() == [GFL_D.P_max, 0.25]
+    assert [units.constants(i)["P_max"] for i in (0, 2)] == [GFL_D.P_max, 0.25]
     with pytest.raises(ValueError, match="GFM is grid-forming; only a GFL has a P reference"):
         units.limit_power(1, 0.25 * S_B)

@@ -15,9 +15,9 @@ from gridpeers.plant.dynamics.island_newton import Island, solve_island
 from gridpeers.plant.dynamics.kernel.compiled import Complex
 from gridpeers.plant.dynamics.live_network import unsettled_island
 from gridpeers.plant.dynamics.reduction import Reduction
-from gridpeers.plant.equipment.inverter_parameters import GfmParameters
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.feeder.circuits import Circuits
+from gridpeers.plant.inverters.gfm_droop import GfmDroop
 from gridpeers.plant.network import Network, solve_power_flow
 from gridpeers.plant.plant_config import PlantSettings, Protection, SwitchEvent
 from gridpeers.plant.tables import read_feeder
@@ -192,7 +192,7 @@ def test_a_limit_that_does_not_act_changes_no_number() -> None:
 def islanded(I_max: float) -> Plant:
     """Microgrid123 0.1 s after islanding."""
     settings = PlantSettings(
-        gfm=GfmParameters(I_max=I_max),
+        gfm=GfmDroop(I_max=I_max),
         protection=Protection(category="off"),
         events=(SwitchEvent(t=0.02, switch="13-152", action="open"),),
     )
@@ -213,7 +213,7 @@ def test_limiting_is_an_event_once_a_spell() -> None:
 
 def test_a_start_beyond_the_limit_is_refused() -> None:
     """At rest no phase may be beyond its limit; the error says the currents and what to change."""
-    settings = PlantSettings(gfm=GfmParameters(I_max=0.6))
+    settings = PlantSettings(gfm=GfmDroop(I_max=0.6))
 
     with pytest.raises(PlantError, match=r"inv1 would have to carry \d+(\.\d+)? A in a phase, .*I_max_pu"):
         Plant(Network(read_feeder("microgrid123")), settings, 0.02, 0.02)

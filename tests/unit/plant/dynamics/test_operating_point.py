@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from gridpeers.plant.dynamics import Dynamics, power_flow_at_rest
 from gridpeers.plant.dynamics.kernel.compiled import Real
 from gridpeers.plant.dynamics.power_flow_at_rest import DROOP, INSIDE, MOST_ROUNDS, OVER, UNDER, VoltVarAtRest
-from gridpeers.plant.equipment.inverter_parameters import GflParameters
 from gridpeers.plant.feeder import Plant
+from gridpeers.plant.inverters.gfl import Gfl
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings
 from gridpeers.plant.tables import read_feeder
@@ -66,7 +66,7 @@ X, M_Q = 0.05, 0.05
 """Reactance between the source and the inverter (pu), and the inverter's Q-V droop (pu per pu)."""
 
 
-def started(parameters: GflParameters, source: float, P: float = 0.0) -> Dynamics:
+def started(parameters: Gfl, source: float, P: float = 0.0) -> Dynamics:
     """Start an inverter with V_set 1 pu behind a reactance X, at a source of so many pu."""
     y = 1.0 / (1j * X * Z_B)
     Y = np.kron(np.array([[y, -y], [-y, y]]), np.eye(3))
@@ -115,7 +115,7 @@ def test_an_inverter_within_its_dead_band_starts_within_its_limits(
 
 @pytest.mark.parametrize("source", [0.97, 1.03])
 @pytest.mark.parametrize("parameters", [replace(VOLT_VAR, db_UV=0.04, db_OV=0.04), replace(VOLT_VAR, volt_var=False)])
-def test_an_inverter_within_its_dead_band_starts_without_vars(parameters: GflParameters, source: float) -> None:
+def test_an_inverter_within_its_dead_band_starts_without_vars(parameters: Gfl, source: float) -> None:
     """Within the band, and without volt-var, Q is Q_set, 0: a start on the droop would move at once, by 0.3 pu."""
     dynamics = started(parameters, source, P=0.5)
 
@@ -209,7 +209,7 @@ UNEQUAL = V_B * BALANCED * np.array([1.0, 0.9, 1.05]) * np.exp(1j * np.radians([
 """Unequal phase voltages, B and C off their angles (V)."""
 
 
-def at_unequal_voltages(parameters: GflParameters) -> Dynamics:
+def at_unequal_voltages(parameters: Gfl) -> Dynamics:
     """A GFL of 0.6 + j0.2 pu at a stiff bus of unequal phases, at rest."""
     bus = circuit(np.zeros((3, 3), complex), [[0, 1, 2]], source=UNEQUAL)
     dynamics = Dynamics(bus, (inverter(parameters),), 0.002)

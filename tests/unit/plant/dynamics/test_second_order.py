@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from copy import copy
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,10 +12,14 @@ from numpy.typing import NDArray
 
 from bench.validation.gfm_gfl import gfm_gfl_circuit
 from gridpeers.plant.dynamics import Dynamics
-from gridpeers.plant.dynamics.kernel import gfl, gfm
+from gridpeers.plant.dynamics.inverters import Inverters
 from gridpeers.plant.feeder import Plant
+from gridpeers.plant.inverters.gfl import Gfl
+from gridpeers.plant.inverters.inverter_model import InverterModel
+from gridpeers.plant.inverters.regfm_a1 import REGFM_A1
+from gridpeers.plant.inverters.vsm import Vsm
 from gridpeers.plant.network import Network
-from gridpeers.plant.plant_config import GflParameters, GfmParameters, Method, PlantSettings
+from gridpeers.plant.plant_config import Method, PlantSettings
 from gridpeers.plant.tables import read_feeder
 from tests.unit.plant.dynamics.circuits import (
     BALANCED,
@@ -22,6 +27,8 @@ from tests.unit.plant.dynamics.circuits import (
     GFM_D,
     S_B,
     V_B,
+    at_terminal,
+    by_name,
     circuit,
     inverter,
 )
@@ -29,66 +36,52 @@ from tests.unit.plant.dynamics.circuits import (
 WATT_VAR = replace(GFL_D, F_current=0.6, frequency_watt=True, volt_var=True)
 
 
-def gfm_pass(par: GfmParameters) -> Any:
-    """Return a pass of a GFM that meets 0.4 + 0.1j pu at 0.98 pu."""
-    record = gfm.pack(par, S_B, V_B, 0.01, 0.05, 60.0)[()]
-
-    def advance(x0: Any, x: Any, d: Any, h: float, second: bool) -> None:
-        gfm.advance_gfm(record, 0.5, 1.0, x0, x, d, 0.4, 0.1, 0.98, h, second)
-
-    return advance
-
-
-def gfl_pass(par: GflParameters) -> Any:
-    """Return a pass of a GFL that meets 0.98 pu, turned by 0.1 rad, at a current of 0.4 pu."""
-    record = gfl.pack(par, S_B, V_B, 0.01, 0.05, 60.0, "second-order")[()]
-    V = 0.98 * V_B * BALANCED * np.exp(0.1j)
-    J = 0.4 * record["I_b"] * BALANCED
-
-    def advance(x0: Any, x: Any, d: Any, h: float, second: bool) -> None:
-        gfl.advance_gfl(record, 0.5, 1.0, 0.0, x0, x, d, *V, *J, h, second)
-
-    return advance
-
-
 @pytest.mark.parametrize(
-    ("state", "advance"),
+    "model",
     [
-        (gfm.STATE, gfm_pass(GFM_D)),
-        (gfm.STATE, gfm_pass(replace(GFM_D, voltage_control=False))),
-        (gfl.STATE, gfl_pass(WATT_VAR)),
-        (gfl.STATE, gfl_pass(replace(WATT_VAR, model="current_source"))),
-        (gfl.STATE, gfl_pass(replace(WATT_VAR, mode="balanced_power"))),
+        GFM_D,
+        replace(GFM_D, voltage_control=False),
+        REGFM_A1,
+        Vsm(D=20.0),
+        WATT_VAR,
+        replace(WATT_VAR, model="current_source"),
+        replace(WATT_VAR, mode="balanced_power"),
     ],
-    ids=["GFM", "GFM without voltage controller", "GFL", "GFL current source", "GFL of balanced power"],
+    ids=[
+        *("GFM", "GFM without voltage controller", "REGFM_A1", "VSM", "GFL", "GFL current source"),
+        "GFL of balanced power",
+    ],
 )
-def test_a_pass_of_length_0_gives_the_slopes_and_moves_no_state(state: np.dtype[Any], advance: Any) -> None:
+def test_a_pass_of_length_0_gives_the_slopes_and_moves_no_state(model: InverterModel) -> None:
     """Both methods integrate the same right-hand side: the limit of a short pass's slopes is that of the empty one."""
-    start = np.zeros(1, state)
-    for k, name in enumerate(state.names or ()):
-        start[name] = 0.3 + 0.05 * k
-    start["f_m" if "f_m" in (state.names or ()) else "w"] = 60.0 if "f_m" in (state.names or ()) else 0.0
-    for name in ("x_over", "y_over"):
-        if name in (state.names or ()):
-            start[name] *= -1.0  # within its limits
-    still, moved = start.copy(), start.copy()
-    d, short = np.zeros(1, state), np.zeros(1, state)
+    units = Inverters((inverter(model),), method="second-order")
+    g, names = by_name(units.constants(0)), units.state_of(0).dtype.names or ()
+    V = 0.98 * V_B * BALANCED * np.exp(0.1j)
+    J = 0.4 * g.I_b * BALANCED + g.y_f * V
+    start = SimpleNamespace(**{name: 0.3 + 0.05 * k for k, name in enumerate(names)})
+    if "f_m" in names:
+        start.f_m = 60.0
+    for name in {"x_over", "y_over"} & set(names):
+        setattr(start, name, -getattr(start, name))  # within its limits
+    still, moved = copy(start), copy(start)
+    d, short = (SimpleNamespace(**dict.fromkeys(names, 0.0)) for _ in range(2))
 
-    advance(still[0], still[0], d[0], 0.0, False)
-    advance(start[0], moved[0], short[0], 1e-9, False)
+    model.advance(g, at_terminal(V, J, g.y_f, 0.5, 1.0, 0.0), still, still, d, 0.0, False)
+    model.advance(g, at_terminal(V, J, g.y_f, 0.5, 1.0, 0.0), start, moved, short, 1e-9, False)
 
-    states = [name for name in state.names or () if name not in ("E", "w", "f")]
+    states = [name for name in names if getattr(d, name) != 0.0]
+    assert len(states) >= len(names) - 7  # outputs, and states of the other mode
     for name in states:
-        assert still[name] == start[name], name
-        assert d[name] == pytest.approx(short[name], rel=1e-5, abs=1e-9), name
-        assert moved[name] - start[name] == pytest.approx(1e-9 * d[name], rel=1e-4, abs=1e-14), name
-    assert any(d[name] != 0.0 for name in states)
+        slope = getattr(d, name)
+        assert getattr(still, name) == getattr(start, name), name
+        assert slope == pytest.approx(getattr(short, name), rel=1e-5, abs=1e-9), name
+        assert getattr(moved, name) - getattr(start, name) == pytest.approx(1e-9 * slope, rel=1e-4, abs=1e-14), name
 
 
 @pytest.mark.parametrize("model", ["voltage_source", "current_source"])
 def test_the_feeder_rests_in_the_second_order_method(model: str) -> None:
     """Both methods have the same equilibrium: without an event nothing moves for 2 s."""
-    settings = PlantSettings(method="second-order", gfl=GflParameters(model=model))
+    settings = PlantSettings(method="second-order", gfl=Gfl(model=model))
     plant = Plant(Network(read_feeder("microgrid123")), settings, 0.02, 0.02)
     first = plant.measure()
 
@@ -138,7 +131,7 @@ def test_limits_hold_a_gfm_as_in_the_default_method() -> None:
         system.connect(gfm_gfl_circuit(2.304))
         end = system.run(1000)[-1, :, :3]
         ends.append(end)
-        assert system.inverters.gfm_state["x_over"][0] < 0.0
+        assert system.inverters.state_of(0)["x_over"] < 0.0
 
     assert ends[0] == pytest.approx(ends[1], rel=1e-3)
 

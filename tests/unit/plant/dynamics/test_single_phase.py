@@ -11,7 +11,9 @@ from msgspec.structs import replace as changed
 
 from gridpeers.plant.dynamics import Circuit, Dynamics, Inverter
 from gridpeers.plant.dynamics.circuit import LoadLaw
-from gridpeers.plant.equipment.inverter_parameters import REGFM_A1, GflParameters, GfmParameters
+from gridpeers.plant.inverters.gfl import Gfl
+from gridpeers.plant.inverters.gfm_droop import GfmDroop
+from gridpeers.plant.inverters.regfm_a1 import REGFM_A1
 from gridpeers.plant.plant_config import Method
 from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, GFM_D, S_B, V_B, Z_B, circuit, inverter, lone
 
@@ -20,7 +22,7 @@ METHODS: tuple[Method, ...] = ("first-order", "second-order")
 LINE = 1.0 / ((0.02 + 0.05j) * Z_B)
 
 
-def single(parameters: GfmParameters | GflParameters, phase: str, *, part: float = 1.0 / 3.0) -> Inverter:
+def single(parameters: GfmDroop | Gfl, phase: str, *, part: float = 1.0 / 3.0) -> Inverter:
     """An inverter of a third of 200 kVA on one phase."""
     return replace(inverter(parameters), name=f"single {phase}", phases=phase, S_b=S_B * part)
 
@@ -43,9 +45,7 @@ def pair_of(phases: int, load: float) -> Circuit:
     ],
     ids=["GFM, GFL", "REGFM_A1, current source", "VFlag 0, balanced power", "current limit"],
 )
-def test_it_is_a_third_of_a_balanced_three_phase_inverter(
-    gfm: GfmParameters, gfl: GflParameters, phase: str, method: Method
-) -> None:
+def test_it_is_a_third_of_a_balanced_three_phase_inverter(gfm: GfmDroop, gfl: Gfl, phase: str, method: Method) -> None:
     """On a third of the network it has a third of the power, and the same f and V, through a load step and a return."""
     runs = []
     for phases, units in ((3, (inverter(gfm), inverter(gfl))), (1, (single(gfm, phase), single(gfl, phase)))):

@@ -73,7 +73,7 @@ def test_a_gfm_alone_starts_a_dead_island_at_its_set_point() -> None:
     units = plant.inverters
     assert not off.any()
     assert units.set_points[0].tolist() == [0.0, 1.0, 0.0]
-    assert (units.gfm_state["E"][0], units.gfm_state["theta"][0]) == pytest.approx((1.0, 0.0))
+    assert (units.state_of(0)["E"], units.state_of(0)["theta"]) == pytest.approx((1.0, 0.0))
     assert plant.readings()[0, 1] == pytest.approx(0.3 * S_B, rel=0.05)
 
 
@@ -87,9 +87,9 @@ def test_a_gfm_comes_back_in_step() -> None:
     plant.switch_inverters([1], True)
 
     units = plant.inverters
-    w = float(units.gfm_state["w"][0])
+    w = float(units.state_of(0)["w"])
     assert abs(w) > 0.1
-    assert units.gfm_state["w"].tolist() == [w, w]
+    assert units.state_of(1)["w"] == w
     assert units.set_points[1, 0] == pytest.approx(w / (0.01 * OMEGA_0))
     assert currents(units, 1) < 1e-9
 

@@ -9,7 +9,9 @@ from msgspec.structs import replace
 
 import gridpeers as gp
 from gridpeers.plant.equipment import Bus, Source
-from gridpeers.plant.equipment.inverter_parameters import REGFM_A1, GflParameters, GfmParameters, OwnParameters
+from gridpeers.plant.inverters.gfl import Gfl
+from gridpeers.plant.inverters.gfm_droop import GfmDroop
+from gridpeers.plant.inverters.regfm_a1 import REGFM_A1
 from gridpeers.plant.tables import FeederError, read_feeder
 from gridpeers.plant.tables.read import DATA
 from gridpeers.scenarios.catalogue_files import CATALOGUE
@@ -46,7 +48,7 @@ def test_an_inverters_own_keys_come_before_its_set_and_its_set_before_its_kind(t
     scenario, feeder = load_scenario(scenario_of(tmp_path, folder, tables))
 
     units = [feeder.parameters_of(row, scenario.plant.gfm, scenario.plant.gfl) for row in feeder.inverters]
-    gfl = [unit for unit in units if isinstance(unit, GflParameters)][:3]
+    gfl = [unit for unit in units if isinstance(unit, Gfl)][:3]
 
     assert [it.k_pPLL for it in gfl] == [30.0, 40.0, 50.0]
     assert [it.T_pf for it in gfl] == [0.2, 0.2, 0.1]
@@ -67,7 +69,7 @@ def test_the_published_values_of_a_model_are_a_set_of_every_feeder(tmp_path: Pat
 
     assert units[0] == replace(REGFM_A1, V_set_max=1.1)
     assert units[3] == replace(REGFM_A1, V_set_max=1.1, voltage_control=False, k_pq=0.1, k_iq=10.0, P_max=1.0)
-    assert units[6] == GfmParameters(P_max=1.5, V_set_max=1.1)
+    assert units[6] == GfmDroop(P_max=1.5, V_set_max=1.1)
 
 
 def test_all_mistakes_of_a_set_come_at_once(tmp_path: Path) -> None:
@@ -124,14 +126,14 @@ def test_parameters_of_an_added_inverter_are_saved_and_read_again(tmp_path: Path
     )  # fmt: skip
     some = {"T_pf_s": 0.2, "volt_var": False}
     feeder = whole.add_inverter("a", "1", "GFL", 1e5, params=some).add_inverter("b", "2", "GFL", 1e5, params=some)
-    feeder = feeder.add_inverter("c", "3", "GFM", 1e5, params=GfmParameters(P_max=1.2))
+    feeder = feeder.add_inverter("c", "3", "GFM", 1e5, params=GfmDroop(P_max=1.2))
 
     folder = feeder.save(tmp_path / "saved")
     sets = feeder.parameter_sets
 
     assert [row.parameters for row in feeder.inverters] == ["a", "a", "c"]
-    assert sets["a"] == OwnParameters(T_pf=0.2, volt_var=False)
-    assert sets["c"].k_ip == GfmParameters().k_ip
+    assert sets["a"] == {"T_pf": 0.2, "volt_var": False}
+    assert sets["c"]["k_ip"] == GfmDroop().k_ip
     with pytest.raises(FeederError, match="nothing connects it"):  # its tables are right apart from that
         read_feeder(str(folder))
     assert "a,volt_var,false\n" in (folder / "inverter_parameters.csv").read_text()
@@ -142,7 +144,7 @@ def test_parameters_of_an_added_inverter_are_saved_and_read_again(tmp_path: Path
     [
         ({"T_pf": 0.2}, "inv11.*T_pf: unknown key; write T_pf_s"),
         ({"T_p_s": 0.2}, "T_p_s: a GFL has no such parameter"),
-        (GfmParameters(), "a GFL has no such parameter"),
+        (GfmDroop(), "a GFL has no such parameter"),
         ("slow", 'no parameter set "slow"'),
         (7, "params: must be the name of a set, .* got 7"),
     ],

@@ -7,26 +7,28 @@ import pytest
 from msgspec.structs import replace
 
 from gridpeers.plant.feeder import Plant
+from gridpeers.plant.inverters.gfl import Gfl
+from gridpeers.plant.inverters.gfm_droop import GfmDroop
 from gridpeers.plant.network import Network
-from gridpeers.plant.plant_config import GflParameters, GfmParameters, PlantSettings, SwitchEvent
+from gridpeers.plant.plant_config import PlantSettings, SwitchEvent
 from gridpeers.plant.tables import read_feeder
 
 T_C = 0.02
 
 
-COUPLING = GfmParameters(R_f=0.0025, X_f=0.05)
+COUPLING = GfmDroop(R_f=0.0025, X_f=0.05)
 """The GFM impedance of the independent power flow: it decides how unbalanced the terminals are."""
 
 
 def plant(
     *events: SwitchEvent,
     load_set: str = "main",
-    gfm: GfmParameters | None = None,
-    gfl: GflParameters | None = None,
+    gfm: GfmDroop | None = None,
+    gfl: Gfl | None = None,
     record: float = T_C,
 ) -> Plant:
     """Make the microgrid feeder with these switch operations."""
-    settings = PlantSettings(load_set=load_set, events=events, gfm=gfm or GfmParameters(), gfl=gfl or GflParameters())
+    settings = PlantSettings(load_set=load_set, events=events, gfm=gfm or GfmDroop(), gfl=gfl or Gfl())
     return Plant(Network(read_feeder("microgrid123", load_set)), settings, T_C, record)
 
 
@@ -50,7 +52,7 @@ def totals(p: Plant) -> tuple[float, float]:
 @pytest.mark.parametrize("model", ["voltage_source", "current_source"])
 def test_the_feeder_rests(model: str) -> None:
     """Row 2 on the real feeder: without an event nothing moves for 10 s, and every V_set is exactly what was asked."""
-    p = plant(gfl=GflParameters(model=model))
+    p = plant(gfl=Gfl(model=model))
     first = p.measure()
 
     run(p, 10.0)
@@ -121,7 +123,7 @@ def test_a_gfl_alone_stops_and_comes_back() -> None:
         inverters=tuple(unit for unit in network.inverters if unit.microgrid != "MG2" or unit.kind == "GFL"),
     )
     settings = PlantSettings(
-        gfm=GfmParameters(I_max=1000.0),  # at 2 pu the island would collapse as it picks up the dead one
+        gfm=GfmDroop(I_max=1000.0),  # at 2 pu the island would collapse as it picks up the dead one
         events=(
             *opened(0.1, "13-152", "60-160"),
             *opened(0.5, "sw1_2", "sw2_3"),
@@ -157,7 +159,7 @@ def test_both_gfl_representations_settle_alike() -> None:
     """Voltage-source and current-source GFL end at the same operating point on the feeder."""
     ends = []
     for model in ("voltage_source", "current_source"):
-        p = plant(*opened(0.1, "13-152"), gfl=GflParameters(model=model))
+        p = plant(*opened(0.1, "13-152"), gfl=Gfl(model=model))
         run(p, 6.0)
         ends.append([(r.P, r.Q) for r in p.measure().values()])
 

@@ -8,10 +8,10 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from gridpeers.plant.dynamics.simulation import Trip
-from gridpeers.plant.equipment.inverter_parameters import GfmParameters
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.feeder.islands import trip_event
 from gridpeers.plant.feeder.protection import ATTEMPTS, Recovery, Relays, Tripped
+from gridpeers.plant.inverters.gfm_droop import GfmDroop
 from gridpeers.plant.known_names import DEFAULTS
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings, PowerLimit, Protection, SwitchEvent
@@ -225,7 +225,7 @@ def test_trips_far_apart_are_not_counted_together() -> None:
         wait(recovery, 600)
 
 
-UNLIMITED = GfmParameters(I_max=1000.0)
+UNLIMITED = GfmDroop(I_max=1000.0)
 """GFM of any current: overloads, and black starts into the whole load, come to the functions that are tested here."""
 
 CLOUDS = tuple(PowerLimit(t=1.5, inverter=f"inv{k}", P_max=0.0) for k in (2, 3, 5, 6, 8, 9))

@@ -15,8 +15,10 @@ from gridpeers.plant.equipment.imported_equipment import LoadPart, bus_behind
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.feeder.limit_events import PAUSE, LoadLimits
 from gridpeers.plant.feeder.switchboard import Switchboard
+from gridpeers.plant.inverters.gfl import Gfl
+from gridpeers.plant.inverters.gfm_droop import GfmDroop
 from gridpeers.plant.network import Network
-from gridpeers.plant.plant_config import GflParameters, GfmParameters, PlantSettings, SwitchEvent
+from gridpeers.plant.plant_config import PlantSettings, SwitchEvent
 from gridpeers.plant.tables import read_feeder
 from tests.unit.plant.feeder.test_feeder import opened, plant, run
 from tests.unit.plant.networks import feeder, three_phase_bus
@@ -235,14 +237,14 @@ def test_a_spell_of_limited_set_points_is_told_once_with_value_and_bound() -> No
 def test_a_start_beyond_the_limits_of_the_gfm_that_holds_an_island_up_is_refused() -> None:
     """A start at which the overload limiter already acts is no equilibrium: f would dip without an event."""
     with pytest.raises(PlantError, match=r"no equilibrium at t = 0: inv1 would have to give \d+ kW, .*P_set0_pu"):
-        Plant(Network(read_feeder("microgrid123")), PlantSettings(P_set0=1.1, gfl=GflParameters(P_max=1.1)), 0.02, 0.02)
+        Plant(Network(read_feeder("microgrid123")), PlantSettings(P_set0=1.1, gfl=Gfl(P_max=1.1)), 0.02, 0.02)
 
 
 @pytest.mark.parametrize(
     ("settings", "said"),
     [
         (PlantSettings(V_set0=1.2), r"inv1 would have to have an internal voltage of 1\.\d+ pu, .*E_max_pu"),
-        (PlantSettings(gfm=GfmParameters(Q_max=0.01)), r"inv1 would have to give \d+(\.\d+)? kvar, .*Q_max_pu"),
+        (PlantSettings(gfm=GfmDroop(Q_max=0.01)), r"inv1 would have to give \d+(\.\d+)? kvar, .*Q_max_pu"),
     ],
 )
 def test_a_start_beyond_the_limits_of_vars_or_voltage_is_refused(settings: PlantSettings, said: str) -> None:

@@ -1,0 +1,121 @@
+"""The compiled pass of each model of inverters, which the inner loop calls by its address.
+
+So the loop is compiled once, for all models, and a model once, for all loops. Parameters and states of an inverter are
+a row of a table; its model sees the row as a record.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cache
+from typing import Any
+
+import msgspec
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core.ccallback import CFunc
+from numba.extending import intrinsic, register_jitable
+
+from gridpeers.plant.dynamics.kernel.compiled import keep
+from gridpeers.plant.inverters import inverter_model
+from gridpeers.plant.inverters.inverter_model import COMPILED, InverterModel, Rating
+
+TERMINAL = np.dtype(
+    [
+        *((name, "f8") for name in ("P_set", "V_set", "Q_set", "P", "Q", "V")),
+        *((f"{quantity}_{phase}", "c16") for quantity in "VIJ" for phase in "ABC"),
+    ]
+)
+"""What a pass reads and writes at its terminal: `InverterModel.advance`."""
+
+THETA, W, F = range(3)
+"""Columns of a state that every model has: angle (rad), speed relative to nominal (rad/s), frequency (Hz)."""
+
+
+@cache
+def state_of(model: type[InverterModel]) -> np.dtype[np.void]:
+    return np.dtype([(name, "f8") for name in ("theta", "w", "f", *model.STATES)])
+
+
+@cache
+def parameters_of(model: type[InverterModel]) -> np.dtype[np.void]:
+    """Return the record of a model's parameters: numbers and flags of its fields, and constants of its rating."""
+    values = constants(model(), Rating(1.0, 1.0, 1.0, 1.0, 1.0), 0.0j)
+    return np.dtype([(name, np.dtype(type(value))) for name, value in values.items()], align=True)
+
+
+def constants(unit: InverterModel, rating: Rating, y_f: complex) -> dict[str, Any]:
+    """Return the values of a unit's parameters; `y_f`: admittance of its filter in the network (S)."""
+    given = {name: value for name, value in msgspec.structs.asdict(unit).items() if not isinstance(value, str | None)}
+    numbers = {name: value if isinstance(value, bool) else float(value) for name, value in given.items()}
+    return {**rating.constants(), "y_f": y_f, **numbers, **unit.constants(rating)}
+
+
+def _record(_: Any, address: Any, dtype: Any) -> Any:
+    """Return the record at an address."""
+
+    def code(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        return builder.inttoptr(values[0], context.get_value_type(signature.return_type))
+
+    return dtype.dtype(address, dtype), code
+
+
+record_at: Any = intrinsic(_record)
+
+
+_PASS = types.void(*[types.intp] * 5, types.float64, types.boolean)
+_PASS_OF_C = (_PASS.args, _PASS.return_type)
+
+
+def _run_pass(_: Any, address: Any, g: Any, t: Any, x0: Any, x: Any, d: Any, h: Any, second: Any) -> Any:
+    """Call the pass at an address with those of its records."""
+
+    def code(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        kinds = [context.get_argument_type(kind) for kind in _PASS.args]
+        function = builder.inttoptr(values[0], ir.FunctionType(ir.VoidType(), kinds).as_pointer())
+        given = zip(_PASS.args, values[1:], strict=True)
+        builder.call(function, [context.get_value_as_argument(builder, kind, value) for kind, value in given])
+        return context.get_dummy_value()
+
+    return types.void(types.intp, *_PASS.args), code
+
+
+run_pass: Any = intrinsic(_run_pass)
+
+
+_known: set[Any] = set()
+"""Functions that compiled code may call."""
+
+
+@cache
+def address_of(model: type[InverterModel]) -> int:
+    """Compile a model's pass, or load its machine code; return its address."""
+    advance, parameters, state = model.advance, parameters_of(model), state_of(model)
+
+    def take(g: int, t: int, x0: int, x: int, d: int, h: float, second: bool) -> None:
+        start, present, slopes = record_at(x0, state), record_at(x, state), record_at(d, state)
+        advance(record_at(g, parameters), record_at(t, TERMINAL), start, present, slopes, h, second)
+
+    for function in (advance, *COMPILED):
+        if function not in _known:
+            register_jitable(error_model="numpy")(function)
+            _known.add(function)
+    code: Any = CFunc(take, _PASS_OF_C, locals={}, options={"error_model": "numpy"})
+    keep(code, take, {inverter_model.__file__, *(function.__code__.co_filename for function in _called(advance))})
+    code.compile()
+    _kept.append(code)
+    return int(code.address)
+
+
+def _called(function: Any) -> Iterator[Any]:
+    """Yield a function and all `compiled` ones that it calls."""
+    yield function
+    for name in function.__code__.co_names:
+        other = function.__globals__.get(name)
+        if callable(other) and other in COMPILED:
+            yield from _called(other)
+
+
+_kept: list[Any] = []
+"""Compiled passes: their machine code must outlive their addresses."""

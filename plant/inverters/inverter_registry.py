@@ -1,0 +1,160 @@
+"""The registry of inverter models: what a scenario may name in `model`, and how a unit gets its parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from typing import Annotated, Any
+
+import msgspec
+
+from gridpeers.plant.inverters.gfl import Gfl
+from gridpeers.plant.inverters.gfm_droop import GfmDroop
+from gridpeers.plant.inverters.inverter_model import InverterModel, Kind
+from gridpeers.plant.inverters.regfm_a1 import REGFM_A1, REGFM_A1_VFLAG0
+from gridpeers.plant.inverters.vsm import Vsm
+from gridpeers.wire.plugins.registry import ANYTHING, Registry, named
+from gridpeers.wire.schema.table_schema import Field, fields_of
+from gridpeers.wire.wording import suggestion
+
+OURS: dict[Kind, tuple[type[InverterModel], ...]] = {"GFM": (GfmDroop, type(REGFM_A1), Vsm), "GFL": (Gfl,)}
+"""Models that come with gridpeers; the first of a kind is its default."""
+
+
+def _objection(it: Any) -> str:
+    if not (isinstance(it, type) and issubclass(it, InverterModel)):
+        return "derive a class from gridpeers.InverterModel"
+    if missing := [name for name in ("advance", "rest") if getattr(it, name) is getattr(InverterModel, name)]:
+        return f"it has no static method {missing[0]}; docs/inverter-models.md has the contract"
+    if it.kind not in OURS:
+        return f'its kind must be "GFM" or "GFL", got {it.kind!r}'
+    try:
+        it()
+        wrong = [
+            f"{field.name}: its default {text}" for field in fields_of(it) if (text := field.objection(field.default))
+        ]
+    except ANYTHING as error:
+        return f"give every parameter a default: {named(error)}"
+    return "; ".join(wrong)
+
+
+INVERTERS: Registry[type[InverterModel]] = Registry(
+    "inverter model",
+    "inverters",
+    _objection,
+    own={
+        "gridlabd": "gridpeers.plant.inverters.gfm_droop:GfmDroop",
+        "regfm_a1": "gridpeers.plant.inverters.regfm_a1:RegfmA1",
+        "vsm": "gridpeers.plant.inverters.vsm:Vsm",
+        "voltage_source": "gridpeers.plant.inverters.gfl:Gfl",
+        "current_source": "gridpeers.plant.inverters.gfl:Gfl",
+    },
+)
+
+
+def model_of(values: Mapping[str, Any], kind: Kind = "GFM") -> InverterModel:
+    """Return a model with parameters by name; `values` names it, else it is the default of the kind."""
+    return msgspec.convert(dict(values), _class_of(values, kind))
+
+
+def _class_of(values: Mapping[str, Any], kind: Kind) -> type[InverterModel]:
+    name = values.get("model")
+    return INVERTERS.resolve(str(name), str(values.get("folder") or "")) if name else OURS[kind][0]
+
+
+def chosen(kind: Kind, table: Mapping[str, Any]) -> type[InverterModel]:
+    """Return the model that a table of a kind names; ValueError if there is none, or it is of the other kind."""
+    name = table.get("model")
+    if not isinstance(name, str):
+        return OURS[kind][0]
+    if ":" not in name and name not in INVERTERS.names:
+        known = [known for known in INVERTERS.names if INVERTERS.resolve(known).kind == kind]
+        raise ValueError(f'there is no "{name}"; {suggestion(name, known, "choices")}')
+    if (model := _class_of(table, kind)).kind != kind:
+        raise ValueError(f'"{name}" is a model of a {model.kind}, and this is a {kind}; name another one')
+    return model
+
+
+def with_own(common: InverterModel, own: Mapping[str, Any]) -> InverterModel:
+    """Return the model of a unit: its own parameters before those that its kind has in common.
+
+    To another model than the common one goes only what that gives beside its defaults.
+    """
+    model = _class_of(own, common.kind) if own.get("model") else type(common)
+    base = msgspec.structs.asdict(common)
+    if model is not type(common):
+        default = type(common)()
+        base = {name: value for name, value in base.items() if name != "model" and value != getattr(default, name)}
+    # what its model has not, the checks of feeder and scenario refuse; others of their checks come first
+    return model(**{name: value for name, value in {**base, **own}.items() if name in model.__struct_fields__})
+
+
+# ------------------------------------------------------ sets of parameters, and parameters of single inverters
+
+
+@cache
+def optional(*models: type[InverterModel]) -> type[msgspec.Struct]:
+    """Return a struct of the parameters of some models, each with its unit and range, and None where it gives none."""
+    fields: dict[str, Field] = {}
+    for field in (field for model in models for field in fields_of(model)):
+        fields.setdefault(field.name, field)
+    types = {
+        name: Annotated[field.type | None, *field.marks] if field.marks else field.type | None
+        for name, field in fields.items()
+    }
+    rules: Any = {"frozen": True, "forbid_unknown_fields": True, "kw_only": True, "omit_defaults": True}
+    words = {"__doc__": "Some parameters of an inverter; None gives nothing."}
+    return msgspec.defstruct(
+        "OwnParameters", [(name, it, None) for name, it in types.items()], **rules, module=__name__, namespace=words
+    )
+
+
+OwnParameters: Any = optional(*OURS["GFM"], *OURS["GFL"])
+"""Some parameters of an inverter of any of our models."""
+
+
+def chosen_own(table: Mapping[str, Any]) -> Any:
+    """Return the parameters that the table of a single inverter may give: those of its model, if it is none of ours."""
+    name = table.get("model")
+    if not isinstance(name, str) or name in INVERTERS.own:
+        return OwnParameters
+    return optional(_class_of(table, "GFM"))
+
+
+def given(own: msgspec.Struct) -> dict[str, Any]:
+    """Return what a set gives, by the names of the parameters."""
+    return {name: value for name, value in msgspec.structs.asdict(own).items() if value is not None}
+
+
+BOUNDS_OF_SET_POINTS = frozenset({"P_set_lim", "V_set_min", "V_set_max"})  # of ours alone, not of a published model
+
+
+def _published(own: InverterModel) -> dict[str, Any]:
+    return {name: value for name, value in given(own).items() if name not in BOUNDS_OF_SET_POINTS}
+
+
+PUBLISHED_SETS = {"regfm_a1": _published(REGFM_A1), "regfm_a1_vflag0": _published(REGFM_A1_VFLAG0)}
+
+ParameterSet = dict[str, Any]
+"""Parameters by name."""
+
+
+def with_published(sets: Mapping[str, ParameterSet]) -> dict[str, ParameterSet]:
+    """Return the sets of a feeder, which come first, and the published ones."""
+    return {**sets, **{name: own for name, own in PUBLISHED_SETS.items() if name not in sets}}
+
+
+def foreign(own: Mapping[str, Any], kind: Kind, model: type[InverterModel] | None = None) -> list[str]:
+    """Return what a set gives and a kind, or one model, has not: keys, and words of a choice with their key.
+
+    >>> foreign({"P_max": 1.2, "S_max": 1.2}, "GFM"), foreign({"model": "regfm_a1"}, "GFL")
+    (['S_max_pu'], ['model = "regfm_a1"'])
+    """
+    found, models = [], (model,) if model else OURS[kind]
+    if "model" in own and (named_model := _class_of(own, kind)).kind == kind:
+        models = (named_model,)
+    elif "model" in own:
+        found.append(f'model = "{own["model"]}"')
+    known = {field.name for it in models for field in fields_of(it)}
+    keys = {field.name: field.key for field in fields_of(chosen_own(own))}
+    return found + [keys.get(name, name) for name in own if name not in known]

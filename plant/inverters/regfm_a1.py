@@ -1,0 +1,44 @@
+"""REGFM_A1, the WECC's generic model of a grid-forming inverter with droop (`inverter-models.md` section 3.8)."""
+
+from __future__ import annotations
+
+from math import pi
+from typing import Any
+
+from msgspec.structs import replace
+
+from gridpeers.plant.inverters.gfm_droop import GfmDroop, advance_droop
+from gridpeers.plant.inverters.inverter_model import A120, magnitude
+
+
+class RegfmA1(GfmDroop, frozen=True, kw_only=True):
+    """The grid-forming inverter "gridlabd" whose controller measures power and voltage of the positive sequence."""
+
+    model: str = "regfm_a1"
+
+    @staticmethod
+    def advance(g: Any, t: Any, x0: Any, x: Any, d: Any, h: float, second: bool) -> None:
+        V_1 = (t.V_A + A120 * t.V_B + A120.conjugate() * t.V_C) / 3.0
+        I_1 = (t.I_A + A120 * t.I_B + A120.conjugate() * t.I_C) / 3.0
+        S = 3.0 * V_1 * I_1.conjugate() / g.S_b
+        advance_droop(g, t, x0, x, d, S.real, S.imag, magnitude(V_1) / g.V_b, h, second)
+
+    @property
+    def measures_positive_sequence(self) -> bool:
+        return True
+
+
+REGFM_A1 = RegfmA1(
+    R_f=0.0,
+    X_f=0.15,
+    P_max=0.9,
+    k_pp=0.01 * 2.0 * pi * 60.0,
+    k_ip=0.1 * 2.0 * pi * 60.0,
+    Q_max=0.44,
+    Q_min=-0.44,
+    E_max=1.15,
+)
+"""Default values of public implementations of REGFM_A1, at 60 Hz (section 3.8); VFlag is 1."""
+
+REGFM_A1_VFLAG0 = replace(REGFM_A1, voltage_control=False, k_pq=0.1, k_iq=10.0)
+"""The same with VFlag 0, which has other gains of the Q limiters."""

@@ -1,0 +1,198 @@
+"""The virtual synchronous machine against its equations, written down anew, and as a model of a user's own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+import gridpeers as gp
+from gridpeers.lab.predict.prediction import predict
+from gridpeers.plant.dynamics import Dynamics
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.inverters.inverter_model import Method
+from gridpeers.plant.inverters.vsm import Vsm
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import PlantSettings
+from gridpeers.plant.tables import read_feeder
+from tests.unit.plant.dynamics.circuits import BALANCED, S_B, V_B, circuit, inverter
+
+W_NOM = 2.0 * np.pi * 60.0
+M_P, M_Q = 0.02, 0.05
+MACHINE = Vsm(H=0.3, D=30.0, T_q=0.03, R_f=0.02, X_f=0.2)
+
+
+def swing_equation(P_set: float, V_set: float, times: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Integrate the published equations behind the filter at a stiff bus of 1 pu, f (Hz), p, q (pu)."""
+    H, D, T_q, z = 0.3, 30.0, 0.03, 0.02 + 0.2j
+
+    def powers(theta: float, q: float) -> complex:
+        E = (V_set - M_Q * q) * np.exp(1j * theta)
+        return complex(np.conj((E - 1.0) / z))  # 1 pu at angle 0, times the conjugate current
+
+    def slopes(t: float, x: NDArray[np.float64]) -> list[float]:
+        w, theta, q = x.tolist()
+        S = powers(theta, q)
+        return [(P_set - w / M_P - S.real - D * w) / (2.0 * H), W_NOM * w, (S.imag - q) / T_q]
+
+    x = solve_ivp(slopes, (0.0, times[-1]), [0.0, 0.0, 0.0], "DOP853", times, rtol=1e-11, atol=1e-12).y
+    S = np.array([powers(theta, q) for _, theta, q in x.T])
+    return np.array([60.0 * (1.0 + x[0]), S.real, S.imag]).T
+
+
+@pytest.mark.parametrize(("method", "gain"), [("first-order", 1.8), ("second-order", 3.5)])
+def test_it_swings_as_its_equations_say(method: Method, gain: float) -> None:
+    """A step of both set-points gives scipy's trajectory, and half the step divides the error by its order."""
+    errors = []
+    for h in (0.002, 0.001):
+        unit = inverter(MACHINE, m_p=M_P, m_q=M_Q)
+        dynamics = Dynamics(
+            circuit(np.zeros((3, 3), complex), [[0, 1, 2]], source=V_B * BALANCED), (unit,), h, None, method
+        )
+        dynamics.start(np.zeros(1), np.zeros(1))
+        dynamics.inverters.set_points[0, :2] = 0.5, 1.03
+        stride = round(0.01 / h)
+        got = dynamics.run(100 * stride)[stride - 1 :: stride, 0, :3] / [1.0, S_B, S_B]
+        expected = swing_equation(0.5, 1.03, 0.01 * np.arange(1, 101))
+        errors.append(np.abs(got - expected).max(axis=0))
+
+    assert np.ptp(expected[:, 0]) > 0.2  # Hz
+    assert (errors[0] < [0.02, 0.01, 0.01]).all()
+    assert (errors[0] / errors[1] > gain).all()
+
+
+OF_A_USER = """
+from cmath import phase
+from math import pi
+from typing import Annotated, ClassVar
+
+import gridpeers as gp
+
+
+class Machine(gp.InverterModel, frozen=True):
+    \"\"\"A virtual synchronous machine.\"\"\"
+
+    H: Annotated[float, gp.Unit("s"), gp.Plausible("an inertia constant", 0.01, 20.0), "Inertia constant (s)."] = 0.1
+    D: Annotated[float, gp.Unit("pu"), "Damping (pu)."] = 0.0
+    T_q: Annotated[float, gp.Unit("s"), "Filter of Q (s)."] = 0.02
+    I_max: Annotated[float, gp.Unit("pu"), "Limit of a phase's current (pu)."] = 2.0
+    STATES: ClassVar = ("q",)
+    holds_terminal = False
+
+    @staticmethod
+    def advance(g, t, x0, x, d, h, second):
+        dw = (t.P_set - x.w / g.m_p - t.P - g.D * x.w / g.w_nom) * g.w_nom / (2.0 * g.H)
+        dtheta = x.w
+        dq = (t.Q - x.q) / g.T_q
+        x.w = gp.heun(x0.w, d.w, dw, h, second)
+        x.theta = gp.heun(x0.theta, d.theta, dtheta, h, second)
+        x.q = gp.heun(x0.q, d.q, dq, h, second)
+        if not second:
+            d.w, d.theta, d.q = dw, dtheta, dq
+        x.f = (g.w_nom + x.w) / (2.0 * pi)
+        gp.inject(g, t, t.V_set - g.m_q * x.q, x.theta)
+
+    @staticmethod
+    def rest(g, x, V, I, J, S, v):
+        x["q"], x["theta"] = S.imag, phase(J[0] / g["y_f"])
+"""
+
+SCENARIO = """
+[time]
+end_s = 0.4
+
+[plant]
+P_set0_pu = 0.5
+
+[plant.gfm]
+model = "{gfm}"
+D_pu = 20
+X_f_pu = 0.2
+{keys}
+
+[plant.inverter.inv4]
+model = "{inv4}"
+H_s = 0.4
+
+[[event]]
+label = "islanding"
+t_s = 0.1
+open = ["13-152"]
+
+[case.A]
+secondary = "all"
+graph = "full"
+"""
+
+
+def scenario(folder: Path, gfm: str, inv4: str, keys: str = "") -> Path:
+    folder.mkdir()
+    path = folder / "swing.toml"
+    path.write_text(SCENARIO.format(gfm=gfm, inv4=inv4, keys=keys))
+    return path
+
+
+def test_a_model_of_a_user_gives_the_same_bytes(tmp_path: Path) -> None:
+    """It stands in a folder beside the scenario, for a kind and for one inverter: nothing else knows it."""
+    ours = gp.load(scenario(tmp_path / "ours", "vsm", "vsm")).run("A")
+    path = scenario(tmp_path / "own", "machine:Machine", "machine:Machine")
+    (path.parent / "machine.py").write_text(OF_A_USER)
+    own = gp.load(path).run("A")
+
+    assert own.sha256 == ours.sha256
+    assert np.ptp(ours.history["inv1", "f"].to_numpy()) > 0.01
+    again = gp.read(own.save(tmp_path / "saved"))
+    assert again.sha256 == ours.sha256
+
+
+def test_what_is_wrong_with_a_model_is_said_at_its_key(tmp_path: Path) -> None:
+    """A model that is not there, one of the other kind, a parameter that it has not, a value that makes no sense."""
+    cases = {
+        "vsn": 'plant.gfm.model: there is no "vsn"; did you mean "vsm"?',
+        "mine:Machine": 'plant.gfm.model: mine:Machine: there is no module "mine"',
+        "current_source": 'plant.gfm.model: "current_source" is a model of a GFL, and this is a GFM',
+    }
+    for k, (name, words) in enumerate(cases.items()):
+        with pytest.raises(gp.ScenarioError) as error:
+            gp.load(scenario(tmp_path / str(k), name, "vsm"))
+        assert words in str(error.value)
+    with pytest.raises(gp.ScenarioError) as error:
+        gp.load(scenario(tmp_path / "keys", "vsm", "gridlabd", "H_s = 200\nT_p_s = 0.1"))
+    text = str(error.value)
+    assert "plant.gfm.T_p_s: unknown key" in text
+    assert "plant.gfm.H_s: 200 s is not plausible for an inertia constant" in text
+    assert "plant.inverter.inv4" in text
+
+
+def test_predict_says_that_it_cannot(tmp_path: Path) -> None:
+    """A model without a linear response is named: a prediction of others would be silently wrong."""
+    with pytest.raises(gp.ScenarioError, match=r'inv\d+: the model "vsm" has no linear response'):
+        predict(scenario(tmp_path / "ours", "vsm", "vsm"), "A")
+
+
+def test_gridlab_d_refuses_it(tmp_path: Path) -> None:
+    """GridLAB-D has no such inverter, and `check` says so before anything starts."""
+    path = scenario(tmp_path / "ours", "vsm", "vsm")
+    path.write_text(path.read_text().replace("[plant]", '[plant]\nsimulator = "gridlabd"'))
+
+    with pytest.raises(gp.ScenarioError, match=r'plant\.gfm\.model: GridLAB-D has no such GFM, got "vsm" at inv1'):
+        gp.load(path)
+
+
+def test_the_feeder_rests_with_machines_and_droops_beside_each_other() -> None:
+    """Of one island each model has its own rows: nothing moves before an event, and all end at one frequency."""
+    settings = PlantSettings(gfm=Vsm(D=20.0))
+    feeder = read_feeder("microgrid123")
+    rows = tuple(replace(row, own={"model": "gridlabd"}) if row.name == "inv7" else row for row in feeder.inverters)
+    plant = Plant(Network(replace(feeder, inverters=rows)), settings, 0.02, 0.02)
+    first = plant.measure()
+    for _ in range(50):
+        plant.advance()
+
+    for name, now in plant.measure().items():
+        assert pytest.approx(first[name].P, abs=1e-4) == now.P
+        assert pytest.approx(first[name].f, abs=1e-9) == now.f
