@@ -269,15 +269,15 @@ class PowerFlowModel:
         """Go on until the positions have been the same for longer than any control waits, or for an hour.
 
         Return what the solver holds then, or at the first moment if it finds no solution later. `settling` has whether
-        it was `solved` all the time and whether the positions `rest`, the `time` as GridLAB-D writes it, the `seconds`
-        since the first moment, and the positions at the `first` moment and the `last`, by object.
+        it was `solved` all the time and whether the positions `rest`, the `time` as GridLAB-D writes it, and the
+        `seconds` since the first moment.
         """
         wait = 2.0 * max(
             (self._core.doubles(name, key)[0] for name in self._classes for key in DELAYS if self._core.has(name, key)),
             default=0.0,
         )
         start = changed = later = self._core.clock()
-        first = last = self._positions(moved)
+        last = self._positions(moved)
         tables: dict[str, Any] = {}
         solved = True
         while solved and later - changed <= wait and later <= start + LONGEST_SETTLING:
@@ -286,7 +286,6 @@ class PowerFlowModel:
             before, last = last, self._positions(moved)
             later = max(self._core.clock(), now)
             if now == start:
-                first = last
                 if solved and later > start:
                     tables = self._solver_tables()
             elif last != before:
@@ -294,7 +293,7 @@ class PowerFlowModel:
         rest = min(later, start + LONGEST_SETTLING) - changed > wait
         if solved:
             tables = self._solver_tables()
-        settling = {"solved": solved, "rest": rest, "time": time, "seconds": now - start, "first": first, "last": last}
+        settling = {"solved": solved, "rest": rest, "time": time, "seconds": now - start}
         return {**tables, "settling": settling}
 
     def _positions(self, names: list[str]) -> dict[str, list[str]]:

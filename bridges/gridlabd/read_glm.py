@@ -165,10 +165,6 @@ class _GlmReader:
             notes.append(f"{file}: {text}; they stay as then")
         elif settling["seconds"]:
             notes.append(f"{file}: as GridLAB-D has it at {time}, when its regulators and capacitors rest")
-        for name, positions in settling["last"].items():
-            if positions != (before := settling["first"][name]):
-                then = f"{', '.join(positions)} in A, B, C, and {', '.join(before)} at the first moment"
-                notes.append(f"{self._called(name)}: {then}")
 
     def _mend_nominal_voltages(self) -> bool:
         """Take the voltage that a bus has for its nominal one, where the model states another one by mistake.

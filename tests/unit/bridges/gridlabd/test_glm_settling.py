@@ -81,7 +81,7 @@ def gridlabd_at_50_min(folder: Path, model: str) -> dict[tuple[str, str], comple
 
 @pytest.mark.parametrize("what", CONTROLS)
 def test_controls_come_to_rest_where_gridlabd_has_them(tmp_path: Path, what: str) -> None:
-    """Every voltage is the one that GridLAB-D has after 50 minutes, and a note names each position that changed."""
+    """Every voltage is the one that GridLAB-D has after 50 minutes, and a note names the time."""
     model = regulated(*CONTROLS[what])
     theirs = gridlabd_at_50_min(tmp_path, model)
 
@@ -92,9 +92,6 @@ def test_controls_come_to_rest_where_gridlabd_has_them(tmp_path: Path, what: str
     differences = [abs(V[k] - theirs[node]) / 7200.0 for k, node in enumerate(network.nodes) if "~" not in node[0]]
     assert len(differences) == 12
     assert max(differences) < TOLERANCE
-    moved = [note.partition(":")[0] for note in feeder.notes if "at the first moment" in note]
-    assert moved
-    assert set(moved) <= {"regulator.reg", "capacitor.cap"}
     assert any("when its regulators and capacitors rest" in note for note in feeder.notes)
 
 
