@@ -31,7 +31,6 @@ from gridpeers.agents.upkeep import Upkeep
 from gridpeers.wire.codec import RejectedError, encode
 from gridpeers.wire.journal import JournalBuffer, TimedTraffic
 from gridpeers.wire.links import Links
-from gridpeers.wire.membership import arrived, is_usable
 from gridpeers.wire.messages import PLANT, LinkRequest, Measurement, Prepare, State, Stop, Waiting
 from gridpeers.wire.phases import Phases, PhaseTable
 from gridpeers.wire.post import FollowedPlant, Post, Route
@@ -263,14 +262,14 @@ class AgentNode:
             raise RejectedError("unexpected", f"the measurement of {message.to}")
         self.policy.granted(message, now)
         at = message.t if self.upkeep is None else now * self._config.speed
-        if is_usable(self.heard.links, message, payload, at, self.admission):
+        if self.admission.is_usable(self.heard.links, message, payload, at):
             self.heard.keep(message, at)
         if self.policy.due(now) is not None:
             self._tick(now)
 
     def _on_state(self, state: State, payload: bytes, now: float) -> None:
         at = state.t if self.upkeep is None else now * self._config.speed
-        if self.policy.counts(state, now) and is_usable(self.heard.links, state, payload, at, self.admission):
+        if self.policy.counts(state, now) and self.admission.is_usable(self.heard.links, state, payload, at):
             self.heard.keep(state, at)
         if self.policy.due(now) is not None:
             self._tick(now)
@@ -284,7 +283,7 @@ class AgentNode:
             return
         post, policy, heard = self.post, self.policy, self.heard
         at = policy.at
-        for message in () if heard.links is None else arrived(heard.links, at, self.rejects, self.admission):
+        for message in () if heard.links is None else self.admission.arrived(heard.links, at, self.rejects):
             heard.keep(message, at)
         if PLANT not in self.admission.epochs:
             return  # what the dead plant said last would still look fresh
@@ -314,7 +313,7 @@ class AgentNode:
             post.send(self.keys.report(self.name), *post.take_link_reports(heard.links, instance=self._instance))
         if isinstance(policy, AgentBarrier):
             for early, payload in policy.take_early():
-                if is_usable(heard.links, early, payload, early.t, self.admission):
+                if self.admission.is_usable(heard.links, early, payload, early.t):
                     heard.keep(early, early.t)
 
     def _hold(self, why: str) -> None:

@@ -30,7 +30,6 @@ from gridpeers.plant.recorder_feed import KEPT_BYTES, KEPT_BYTES_RECORDED, Recor
 from gridpeers.wire.codec import RejectedError, encode
 from gridpeers.wire.journal import JournalBuffer, TickTraffic, TimedTraffic
 from gridpeers.wire.links import Links
-from gridpeers.wire.membership import arrived, is_usable
 from gridpeers.wire.messages import PLANT, Answer, Command, Journal, LinkReport, Nameplate, State, Waiting
 from gridpeers.wire.phases import Phases, PhaseTable
 from gridpeers.wire.post import ANYBODY, Post, Route
@@ -233,7 +232,7 @@ class PlantNode:
         if state.fault or state.quiet:
             self.stepper.hear(state)
         at = state.t if self.ticks.grants else now * self.config.speed
-        if is_usable(self.links, state, payload, at, self.post.admission):
+        if self.post.admission.is_usable(self.links, state, payload, at):
             self._states[state.sender] = state
 
     def _on_report(self, report: LinkReport | Journal, payload: bytes, now: float) -> None:
@@ -304,7 +303,7 @@ class PlantNode:
         self.feed.replay()
         states, self._states = self._states, {}
         at = stepper.t if self.ticks.grants else now * self.config.speed
-        for late in arrived(self.links, at, self.rejects, self.post.admission):
+        for late in self.post.admission.arrived(self.links, at, self.rejects):
             if isinstance(late, State):
                 states[late.sender] = late
         hold, epochs = stepper.plant.hold, self.post.admission.epochs

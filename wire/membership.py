@@ -75,39 +75,39 @@ class Admission:
         self._passed[name] = seq
         return True
 
+    def is_usable(self, links: Links | None, message: State | Measurement, payload: bytes, at: float) -> bool:
+        """Return whether a message off the wire is of use at once; if not, `arrived` may yield it later.
 
-def is_usable(links: Links | None, message: State | Measurement, payload: bytes, at: float, who: Admission) -> bool:
-    """Return whether a message off the wire is of use at once; if not, `arrived` may yield it later.
+        An emulated link takes the message if it came over one. The state of a paused agent only keeps the lock-step
+        going: no link carries it, and no node uses it. `at` is the run time (s) on the receiver's clock.
+        """
+        name, seq = message.sender, message.seq
+        if type(message) is State and message.idle:
+            return False
+        if links is not None and name not in links.clear and links.offer(message, payload, at):
+            return False
+        if self.epochs.get(name) != message.epoch or seq <= self._passed.get(name, -1):  # as `passes`, in one call
+            return False
+        self._passed[name] = seq
+        return True
 
-    An emulated link takes the message if it came over one. The state of a paused agent only keeps the lock-step going:
-    no link carries it, and no node uses it. `at` is the run time (s) on the receiver's clock.
-    """
-    if type(message) is State and message.idle:
-        return False
-    if links is not None and message.sender not in links.clear and links.offer(message, payload, at):
-        return False
-    return who.passes(message)
+    def arrived(self, links: Links | None, now: float, rejects: RejectedMessages) -> Iterator[AnyMessage]:
+        """Yield the messages that the links have let through by now (s of run time) and that are of use.
 
-
-def arrived(links: Links | None, now: float, rejects: RejectedMessages, admission: Admission) -> Iterator[AnyMessage]:
-    """Yield the messages that the links have let through by now (s of run time) and that are of use.
-
-    A corrupted message is decoded again; its CRC-32 fails, so it is counted and dropped.
-    """
-    if links is None:
-        return
-    for arrival in links.due(now):
-        message = arrival.message
-        if message is None:
-            try:
-                message = decode(arrival.payload)
-                if message.sender != arrival.src:
-                    raise RejectedError("foreign", f"sender {message.sender}")
-            except RejectedError as rejected:
-                rejects.add(rejected.kind, f"the link from {arrival.src}", rejected.text)
-                continue
-        if admission.passes(message):
-            yield message
+        A corrupted message is decoded again; its CRC-32 fails, so it is counted and dropped.
+        """
+        for arrival in () if links is None else links.due(now):
+            message = arrival.message
+            if message is None:
+                try:
+                    message = decode(arrival.payload)
+                    if message.sender != arrival.src:
+                        raise RejectedError("foreign", f"sender {message.sender}")
+                except RejectedError as rejected:
+                    rejects.add(rejected.kind, f"the link from {arrival.src}", rejected.text)
+                    continue
+            if self.passes(message):
+                yield message
 
 
 MOST_PROCESSES = 8
