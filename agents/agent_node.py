@@ -24,7 +24,6 @@ from gridpeers.agents.decision_journal import DecisionJournal
 from gridpeers.agents.laws.law import Law
 from gridpeers.agents.neighbours import Hearing, OpenMeeting
 from gridpeers.agents.roster_meeting import KnownAgents, RosterMeeting
-from gridpeers.agents.session_health import SessionHealth
 from gridpeers.agents.tick_barrier import AgentBarrier
 from gridpeers.agents.tick_timer import AgentTimer
 from gridpeers.agents.upkeep import Upkeep
@@ -73,8 +72,7 @@ class AgentNode:
         own: tuple[Callable[[str], str], ...]
         post = self.post = Post(name, config.run, config.epoch, None if realtime else known.members)
         keys = self.keys = post.keys
-        self.members, self.admission = post.members, post.admission
-        self.rejects, self.routes = post.rejects, post.routes
+        self.admission, self.rejects, self.routes = post.admission, post.rejects, post.routes
         self.received, self.is_known, self.lost = post.received, post.is_known, post.lost
         self.take_actions, self.take_rejects = post.take_actions, post.take_rejects
         self.name, self.watched, self.token = name, keys.any_alive, keys.alive_agent(name, instance)
@@ -115,9 +113,8 @@ class AgentNode:
         """What is to be done in real time beside the ticks."""
         if realtime:
             self._meeting = meeting = OpenMeeting(post, self._agent, self._on_state)
-            health = SessionHealth(name)
-            timer = self.policy = AgentTimer(config, post, self.phases, self.heard, meeting, health, self._timed)
-            self.upkeep = Upkeep(post, self.phases, self.heard, meeting, timer, health, links)
+            self.policy = timer = AgentTimer(config, post, self.phases, self.heard, meeting, self._timed)
+            self.upkeep = Upkeep(timer, links)
             self.routes[keys.control] = Route(PLANT, (Waiting, Stop), self._on_control)
             self.routes[keys.link_request(name)] = Route(PLANT, (LinkRequest,), self.upkeep.on_link_command)
             own = keys.set_points, keys.leave, keys.status, keys.link_acknowledgement
@@ -224,12 +221,7 @@ class AgentNode:
                 self._hold(verdict.reason)
             shown = self.upkeep.shown
             self._tick(now)
-            if self.upkeep.journal_due(now):
-                self.post.send(self.keys.journal(self.name), *self.post.take_journal(self.heard.t))
-            if problem := self.upkeep.session_problem(bool(self._agent.fault), now):
-                self.session_broken = self.post.closed = True
-                self.post.say(f"{problem}; opens a new session")
-            self.upkeep.report(shown, now, self.policy.at)
+            self.session_broken = self.post.closed = self.upkeep.ticked(shown, bool(self._agent.fault), now)
 
     # ---------------------------------------------------------------- messages
 
@@ -369,16 +361,9 @@ class AgentNode:
             self.phases.on("end")
             self.post.closed = True
 
-    # ---------------------------------------------------------------- a replay that asks what would have been
-
-    def use_links(self, links: Links) -> None:
-        self.heard.links = links
-
     def change(self, config: AgentConfig, law: Law | None = None) -> None:
-        """Go on in real time under another rule of control, with the set-points of now; see `Agent.taken_over`."""
+        """Go on under another rule of control, in a replay that asks what would have been; see `Agent.taken_over`."""
         self._config, self._agent = config, self._agent.taken_over(config, law)
         self._agent.rejects = self.rejects
-        if self.post.journal is not None:
-            self._decisions = DecisionJournal(self._agent, self.post.journal)
         if self.upkeep is not None:
             self.upkeep.change(config, self._agent)

@@ -140,12 +140,8 @@ def _opened(config: AgentConfig, credentials: Credentials | None, *, again: bool
 def _node(config: AgentConfig, instance: str, make_links: MakeLinks, law: Law, shared: list[KnownAgents]) -> AgentNode:
     try:
         links = make_links(config.name, config.links)
-        if config.clock == "wall":
-            return AgentNode(config, instance, links, law)
-        known = next((each for each in shared if each.control == config.control), None)
-        if known is None:
-            known = KnownAgents(config.control)
-            shared.append(known)
+        known = next((each for each in shared if each.control == config.control), None) or KnownAgents(config.control)
+        shared.append(known)
         return AgentNode(config, instance, links, law, known)
     except ValueError as error:
         raise ConfigurationError(str(error)) from None

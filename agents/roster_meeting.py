@@ -30,6 +30,7 @@ class KnownAgents:
         self._rule = rule_of(control)
         self._own: dict[str, Nameplate] = {}
         self._latest: tuple[Prepare | None, dict[str, str]] = None, {}
+        """The last roster, and the process of each name on it; for one message one object."""
         self._taken: Prepare | None = None
         self._graph: RosterGraph | None = None
         self._unmet: tuple[int, list[str]] = -1, []
@@ -39,7 +40,6 @@ class KnownAgents:
         self._own[nameplate.sender] = nameplate
 
     def processes(self, message: Prepare) -> dict[str, str]:
-        """Return the process of each name on a roster, in the order of the inverters; for one message one object."""
         if message is not self._latest[0]:
             self._latest = message, dict(zip(message.roster, message.instances, strict=True))
         return self._latest[1]

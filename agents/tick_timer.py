@@ -21,8 +21,6 @@ keeps clear of its own sampling.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from msgspec.structs import replace
 
 from gridpeers.agents.agent import Agent
@@ -45,37 +43,33 @@ CONVINCED = 5
 """Measurements in a row that come at a bad time before the ticks are moved: one may just have been late."""
 
 
-class TickTimer:
+class TickTimer(Timer):
     """Due times of an agent's ticks; unless it `keeps_clear` of the measurements, they drift as the own clock does."""
 
     def __init__(self, period: float, *, keeps_clear: bool = True) -> None:
-        self.period = period
         self._keeps_clear = keeps_clear
+        super().__init__(period, 0.0)
         self.start(0.0)
 
     def start(self, now: float) -> None:
         """Begin anew, with a tick at once; the first measurement is believed."""
-        self._timer = Timer(self.period, now)
+        self._start, self._n = now, 0
         self._measured: float | None = None
         self._astride = CONVINCED - 1
-
-    @property
-    def due(self) -> float:
-        return self._timer.due
 
     def measured(self, at: float) -> None:
         self._measured = at
 
     def take(self, now: float) -> int:
-        skipped = self._timer.take(now)
+        skipped = super().take(now)
         if self._measured is None or not self._keeps_clear:
             return skipped
-        phase = (self._timer.due - self._measured) / self.period % 1.0
+        phase = (self.due - self._measured) / self.period % 1.0
         self._measured = None
         self._astride = 0 if EARLIEST <= phase <= LATEST else self._astride + 1
         if self._astride >= CONVINCED:
             self._astride = 0
-            self._timer.shift((0.5 - phase) * self.period)
+            self._start += (0.5 - phase) * self.period
         return skipped
 
 
@@ -85,18 +79,6 @@ LINKS_PERIOD = 0.5
 LEAVING = 1.0
 """Longest wait (s, wall) for the plant's word that it has taken the inverter off: a session that closes at once can
 take what was sent last with it."""
-
-
-@dataclass
-class AgentStatistics:
-    ticks: int = 0
-    missed: int = 0
-    sent: int = 0
-    """States sent; the number of the next."""
-    lost: int = 0
-    """Messages that did not come off the wire, as the numbers of those that did show."""
-    lateness: float = 0.0
-    """Longest delay of a tick behind its time since the last status (s of wall time)."""
 
 
 class AgentTimer:
@@ -111,17 +93,21 @@ class AgentTimer:
         phases: Phases,
         heard: Hearing,
         meeting: OpenMeeting,
-        health: SessionHealth,
         timed: TimedTraffic | None,
     ) -> None:
         if config.speed <= 0.0:
             raise ValueError(f"speed: must be positive, got {config.speed:g} s/s; 1 is real time")
-        self.config, self._post, self._phases, self._heard = config, post, phases, heard
-        self._meeting, self._health, self._timed = meeting, health, timed
+        self.config, self.post, self.phases, self.heard = config, post, phases, heard
+        self.meeting, self.health, self._timed = meeting, SessionHealth(config.name), timed
         # a clock that is to drift must drift
         self._ticks = TickTimer(config.T_c / config.speed / config.clock_rate, keeps_clear=config.clock_rate == 1.0)
         self._report_ticks = REPORT_TICKS if timed is None else max(1, round(LINKS_PERIOD / self._ticks.period))
-        self.statistics = AgentStatistics()
+        self.ticks = self.missed = self.sent = 0
+        """Ticks done and left out; states sent, which is the number of the next."""
+        self.lost = 0
+        """Messages that did not come off the wire, as the numbers of those that did show."""
+        self.lateness = 0.0
+        """Longest delay of a tick behind its time since the last status (s of wall time)."""
         self.at = 0.0
         """Time of the last tick on the own clock (s of run time)."""
         self._give_up: float | None = None
@@ -150,24 +136,24 @@ class AgentTimer:
 
     def plant_came(self, now: float) -> None:
         self._plant_seen, self._give_up = True, None
-        self._health.plant_seen(now)
+        self.health.plant_seen(now)
 
     def plant_waits(self, message: Waiting | Prepare, now: float) -> None:
-        self._health.plant_seen(now)
+        self.health.plant_seen(now)
         if isinstance(message, Waiting):
             self.missing_agents = message.waits_for
 
     @property
     def t(self) -> float:
         """Run time (s) of the last measurement in use."""
-        return self._heard.t
+        return self.heard.t
 
     def gone(self, name: str) -> Verdict:
         """Note that a process is gone."""
         if name == PLANT:
             return Verdict("wait", "the plant is gone; holds, and seeks it again")
-        self._heard.states.pop(name, None)
-        self._health.forget(name)
+        self.heard.states.pop(name, None)
+        self.health.forget(name)
         return WAIT
 
     def leave(self, now: float) -> None:
@@ -178,17 +164,17 @@ class AgentTimer:
 
     def granted(self, message: Measurement, now: float) -> None:
         """Note a measurement off the wire; RejectedError if a later one has come."""
-        self.statistics.lost += self._post.admission.take(message)
-        self._health.came(PLANT, now)
+        self.lost += self.post.admission.take(message)
+        self.health.came(PLANT, now)
         self._ticks.measured(now)
         self.run_time, self.missing_agents = message.t, ()
 
     def counts(self, state: State, now: float) -> bool:
         """Whether a state off the wire enters a tick; RejectedError if a later one has come."""
-        self.statistics.lost += max(0, self._post.admission.take(state) - state.skipped)
-        self._health.came(state.sender, now)
+        self.lost += max(0, self.post.admission.take(state) - state.skipped)
+        self.health.came(state.sender, now)
         # The plant sends its commands to links before a measurement: till then no link is known.
-        return self._heard.links is None or self._health.has_come(PLANT)
+        return self.heard.links is None or self.health.has_come(PLANT)
 
     def missing(self) -> tuple[Awaited, ...]:
         """Nothing: a tick does without what has not come."""
@@ -204,10 +190,10 @@ class AgentTimer:
         config = self.config
         if self._give_up is not None and now >= self._give_up:
             return Verdict("break", f"{config.name}: no plant of run {config.run} within {config.deadline:g} s")
-        if self._phases.now != "running":
+        if self.phases.now != "running":
             return Verdict("tick")
-        self.statistics.missed += skipped
-        self.statistics.lateness = max(self.statistics.lateness, late)
+        self.missed += skipped
+        self.lateness = max(self.lateness, late)
         too_late = late * config.speed > config.max_age
         return Verdict("tick", f"woken {late:.2f} s late; waits for news" if too_late else "")
 
@@ -218,21 +204,21 @@ class AgentTimer:
         self.reports = False
         if measurement is None or agent.fault:
             return None
-        heard, neighbours, statistics = self._heard, self._meeting.neighbours, self.statistics
+        heard, neighbours = self.heard, self.meeting.neighbours
         at = self.at
         limit = self.config.control.degraded_communication.max_age or self.config.max_age
         ages = {name: age for name in neighbours if (age := heard.age(name, at)) <= limit}
         before = agent.set_points
-        state = replace(agent.tick(measurement, tuple(ages), ages), seq=statistics.sent)
+        state = replace(agent.tick(measurement, tuple(ages), ages), seq=self.sent)
         if decisions is not None and self._timed is not None:
             all_ages = {name: heard.age(name, at) for name in neighbours}
             decisions.realtime_tick(state.seq, measurement.seq, all_ages, limit, self._timed.now, before)
         self.used = tuple(name for name in ages if agent.shares_island(name))
-        statistics.ticks += 1
-        statistics.sent += 1
-        self.reports = statistics.ticks % self._report_ticks == 0
+        self.ticks += 1
+        self.sent += 1
+        self.reports = self.ticks % self._report_ticks == 0
         if state.fault:
-            self._post.say(f"{state.fault}; idle, its inverter stays on primary droop")
+            self.post.say(f"{state.fault}; idle, its inverter stays on primary droop")
         if state.quiet:
             self._skipped += 1
         elif self._skipped:

@@ -8,14 +8,9 @@ from typing import Literal, cast
 
 from gridpeers.agents.agent import Agent
 from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.agents.link_command_receiver import LinkCommandReceiver
-from gridpeers.agents.neighbours import Hearing, OpenMeeting
-from gridpeers.agents.session_health import SessionHealth
 from gridpeers.agents.tick_timer import AgentTimer
 from gridpeers.wire.links import Links
-from gridpeers.wire.messages import MOST_COUNT, PLANT, AgentStatus, Leave, LinkRequest
-from gridpeers.wire.phases import Phases
-from gridpeers.wire.post import Post
+from gridpeers.wire.messages import MOST_COUNT, PLANT, AgentStatus, Leave, LinkAcknowledgement, LinkRequest
 from gridpeers.wire.timing import Timer
 from gridpeers.wire.wording import printable
 
@@ -26,19 +21,52 @@ JOURNAL_PERIOD = 0.2
 """Time (s, wall) between two parts of the journal: a record loses no more when a process is killed."""
 
 
+class LinkCommandReceiver:
+    """Commands to the emulated links into an agent: taken in their sequence, each once, and acknowledged."""
+
+    def __init__(self, name: str, epoch: int, links: Links | None) -> None:
+        self._name, self._epoch, self._links = name, epoch, links
+        self._last = 0
+
+    def restart(self) -> None:
+        """Forget all commands: another plant has begun, whose run starts at 0."""
+        self._last = 0
+        if self._links is not None:
+            self._links.restart()
+
+    def take(self, request: LinkRequest, t: float) -> LinkAcknowledgement | None:
+        """Carry a command out, or tell the links' status at t (s of run time); None if an earlier one is missing."""
+        if self._links is None:
+            return self._answer(request, ok=False, text="there are no emulated links to this agent")
+        if request.seq == 0:
+            return self._answer(request, ok=True, text="", data=self._links.status(t))
+        if request.seq > self._last + 1:
+            return None
+        if request.seq <= self._last:
+            return self._answer(request, ok=True, text="done before")
+        self._last = request.seq
+        try:
+            return self._answer(request, ok=True, text=self._links.command(request.link_command, request.t).changed)
+        except ValueError as error:
+            return self._answer(request, ok=False, text=str(error))
+
+    def _answer(self, request: LinkRequest, *, ok: bool, text: str, data: bytes = b"") -> LinkAcknowledgement:
+        return LinkAcknowledgement(
+            sender=self._name,
+            epoch=self._epoch,
+            seq=request.seq,
+            t=request.t,
+            ok=ok,
+            text=printable(text),
+            reply_to=request.reply_to,
+            data=data,
+        )
+
+
 class Upkeep:
-    def __init__(
-        self,
-        post: Post,
-        phases: Phases,
-        heard: Hearing,
-        meeting: OpenMeeting,
-        timer: AgentTimer,
-        health: SessionHealth,
-        links: Links | None,
-    ) -> None:
-        self._post, self._phases, self._heard, self._meeting = post, phases, heard, meeting
-        self._timer, self._health = timer, health
+    def __init__(self, timer: AgentTimer, links: Links | None) -> None:
+        self._timer, self._health, self._heard, self._meeting = timer, timer.health, timer.heard, timer.meeting
+        post = self._post = timer.post
         self._link_commands = LinkCommandReceiver(post.name, post.epoch, links)
         self.host_moved: Callable[[], bool] = lambda: False
         """Whether the own host has another address than the session knows; the driver sets it."""
@@ -60,7 +88,7 @@ class Upkeep:
 
     def leave(self) -> None:
         post = self._post
-        leave = Leave(sender=post.name, epoch=post.epoch, seq=self._timer.statistics.sent, t=self._heard.t)
+        leave = Leave(sender=post.name, epoch=post.epoch, seq=self._timer.sent, t=self._heard.t)
         post.send(post.keys.leave(post.name), leave)
 
     def change(self, config: AgentConfig, agent: Agent) -> None:
@@ -79,43 +107,42 @@ class Upkeep:
     @property
     def shown(self) -> tuple[str, tuple[str, ...]]:
         """The part of the status whose change is reported at once."""
-        return self._phases.now, self._timer.used
+        return self._timer.phases.now, self._timer.used
 
-    def journal_due(self, now: float) -> bool:
-        if now < self._journal.due or self._phases.now != "running":  # running: the plant knows this process
-            return False
-        self._journal.take(now)
-        return True
+    def ticked(self, shown: tuple[str, tuple[str, ...]], failed: bool, now: float) -> bool:
+        """Do what is due after a tick; return whether a new session is needed.
 
-    def session_problem(self, failed: bool, now: float) -> str:
-        """Return why a new session is needed, "" if it is not: this one did not bring, or take, what it should.
-
-        `failed`: whether the agent's law has failed.
+        `shown` is the part of the status before the tick; `failed` says whether the agent's law has failed.
         """
+        post, running = self._post, self._timer.phases.now == "running"
+        if now >= self._journal.due and running:  # then the plant knows this process
+            self._journal.take(now)
+            post.send(post.keys.journal(post.name), *post.take_journal(self._heard.t))
+        problem = self._session_problem(failed, now)
+        if problem:
+            post.say(f"{problem}; opens a new session")
+        due = now >= self._status.due
+        if due:
+            self._status.take(now)
+            post.ask_again()
+        if due or self.shown != shown:
+            self._publish_status()
+        return bool(problem)
+
+    def _session_problem(self, failed: bool, now: float) -> str:
+        """Return why a new session is needed, "" if it is not: this one did not bring, or take, what it should."""
         if self.host_moved():
             return "this host has another address"
-        measured = self._heard.measurement if self._phases.now == "running" else None
+        measured = self._heard.measurement if self._timer.phases.now == "running" else None
         roster = None if measured is None else measured.roster
         if roster is not None and failed:
             roster = (*roster, self._post.name)  # who says nothing is not heard, and no session changes that
         met = self._post.members.nameplates
         return self._health.problem(roster, met=met, neighbours=self._meeting.neighbours, now=now)
 
-    def report(self, shown: tuple[str, tuple[str, ...]], now: float, at: float) -> None:
-        """Publish the status if it is due, or if not the same is `shown` as before; ask again for nameplates.
-
-        `at` is the run time (s) on the own clock.
-        """
-        due = now >= self._status.due
-        if due:
-            self._status.take(now)
-            self._post.ask_again()
-        if due or self.shown != shown:
-            self._publish_status(at)
-
-    def _publish_status(self, at: float) -> None:
+    def _publish_status(self) -> None:
         post, timer, heard, neighbours = self._post, self._timer, self._heard, self._meeting.neighbours
-        statistics, phase, run = timer.statistics, self._phases.now, timer.config.run
+        phase, run = timer.phases.now, timer.config.run
         missing = f", which waits for {', '.join(timer.missing_agents)}" if timer.missing_agents else ""
         waits_for = {
             "seeking": f"the plant of run {run}",
@@ -123,11 +150,11 @@ class Upkeep:
         }
         links = heard.links
         dropped = 0 if links is None else links.dropped
-        ages = [heard.age(name, at) for name in neighbours]
+        ages = [heard.age(name, timer.at) for name in neighbours]
         status = AgentStatus(
             sender=post.name,
             epoch=post.epoch,
-            seq=statistics.sent,
+            seq=timer.sent,
             t=heard.t,
             phase=cast(Literal["seeking", "waiting", "running"], phase),
             waits_for=printable(waits_for.get(phase, "")),
@@ -136,13 +163,13 @@ class Upkeep:
             ages=tuple(age if age < inf else -1.0 for age in ages),
             used=timer.used,
             received=post.used,
-            sent=statistics.sent,
+            sent=timer.sent,
             rejected=sum(post.rejects.counts.values()),
-            lost=min(statistics.lost + dropped, MOST_COUNT),
-            ticks=statistics.ticks,
-            missed=statistics.missed,
-            lateness=statistics.lateness,
+            lost=min(timer.lost + dropped, MOST_COUNT),
+            ticks=timer.ticks,
+            missed=timer.missed,
+            lateness=timer.lateness,
             impaired=() if links is None else links.impaired(timer.run_time),
         )
-        statistics.lateness = 0.0
+        timer.lateness = 0.0
         post.send(post.keys.status(post.name), status)

@@ -43,9 +43,6 @@ class Timer:
         self._n += past + 1
         return past
 
-    def shift(self, by: float) -> None:
-        self._start += by
-
 
 STOOD_STILL = 1.0
 """Time (s) after a deadline. A process that is woken later was stopped itself, while its clock went on."""
@@ -81,9 +78,6 @@ class TickBarrier:
     def wait_for(self, awaited: dict[str, str], now: float) -> None:
         self.awaited = awaited
         self.renew(now)
-
-    def awaits(self, name: str) -> bool:
-        return name in self.awaited
 
     def came(self, name: str) -> bool:
         """Note that a sender's message came, or never will; return whether it was awaited."""

@@ -213,7 +213,7 @@ class ReplayedProcess:
         if isinstance(self.node, PlantNode):
             self.node.links = links
         else:
-            self.node.use_links(links)
+            self.node.heard.links = links
 
     def hears(self, key: str) -> bool:
         return self._root + key in self.node.routes and not self.node.finished

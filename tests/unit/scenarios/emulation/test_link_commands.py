@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from gridpeers.agents.agent_node import AgentNode
-from gridpeers.agents.link_command_receiver import LinkCommandReceiver
+from gridpeers.agents.upkeep import LinkCommandReceiver
 from gridpeers.netem.fault_schedule import Heal
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem, NodeFault
