@@ -14,6 +14,7 @@ import pandas as pd
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.results.case_tables import EVENTS, LINKS, event_rows, header, link_rows, write_tables
 from gridpeers.scenarios.results.run_files import FolderError, write_whole
+from gridpeers.scenarios.results.shared_quantities import shared_table
 
 Format = Literal["csv", "parquet", "feather", "mat", "xlsx"]
 
@@ -26,12 +27,17 @@ SHEET = 1_048_575  # Rows of a sheet below its header
 def export(record: RunRecord, to: Format, folder: Path) -> list[Path]:
     """Write the tables of a record into a folder, and return the files: one for each table, or one for all.
 
-    Columns have the names of history.csv, events.csv and links.csv, with their units. Raise RecordFileError if the
+    Columns have the names of history.csv, events.csv and links.csv, with their units; what the law
+    declares to share has a table of its own, "shared". Raise RecordFileError if the
     record has no rows, FolderError if a format cannot hold them, OSError if a file cannot be written.
     """
     emulated = any(counts.sent for counts in record.link_counts().values())
     if to == "csv":
-        return write_tables(folder, record.physics(), record.events(), record.links() if emulated else None)
+        files = write_tables(folder, record.physics(), record.events(), record.links() if emulated else None)
+        if len(shared := _shared(record)):
+            files.append(folder / "shared.csv")
+            write_whole(files[-1], shared.to_csv(index=False).encode())
+        return files
     tables = dict(_tables(record, emulated=emulated))
     if to == "mat":
         contents = {"run.mat": _mat(tables)}
@@ -52,6 +58,13 @@ def _tables(record: RunRecord, *, emulated: bool) -> Iterator[tuple[str, pd.Data
         rows = (row for trace in record.links() for row in link_rows(trace))
         links = pd.DataFrame(rows, columns=list(LINKS)).replace({"delay_s": {"": nan}}).astype({"delay_s": float})
         yield "links", links.sort_values(["src", "dst"], kind="stable", ignore_index=True)
+    if len(shared := _shared(record)):
+        yield "shared", shared
+
+
+def _shared(record: RunRecord) -> pd.DataFrame:
+    declares = record.info.level != "physics" and any(agent.control.law.shared for agent in record.info.agents[:1])
+    return shared_table(record) if declares else pd.DataFrame()  # else a pass over all messages, for nothing
 
 
 def _arrow(table: pd.DataFrame, to: Literal["parquet", "feather"]) -> bytes:

@@ -59,18 +59,37 @@ def shared_frame(record: RunRecord, name: str) -> pd.DataFrame:
 
     Raise RecordFileError if no law shared it.
     """
-    import pandas as pd  # takes longer to import than a case to run
-
     shared = read_shared(record)
     if name not in shared:
         known = suggestion(name, shared, "quantities") if shared else "no law shared anything"
         raise RecordFileError(f'{record.path}: no state has a quantity "{name}"; {known}')
-    columns = {it: pd.Series(values, index=t) for it, (t, values) in shared[name].items()}
-    frame = pd.DataFrame({it: column[~column.index.duplicated(keep="last")] for it, column in columns.items()})
+    frame = _frame(shared[name])
     frame.index.name, frame.columns.name = "t", "inverter"
-    unit = next((it.unit for it in record.info.agents[0].control.law.shared if it.name == name), "")
-    frame.attrs["units"] = {"t": "s", name: unit}
+    frame.attrs["units"] = {"t": "s", name: _units(record).get(name, "")}
     return frame
+
+
+def shared_table(record: RunRecord) -> pd.DataFrame:
+    """Return all that laws shared as a table for other programs: a column t_s, and e.g. inv1_Omega_pu."""
+    import pandas as pd
+
+    units = _units(record)
+    frames = [
+        _frame(series).add_suffix(f"_{name}_{units[name]}" if units.get(name) else f"_{name}")
+        for name, series in read_shared(record).items()
+    ]
+    return pd.concat(frames, axis=1).sort_index().rename_axis("t_s").reset_index() if frames else pd.DataFrame()
+
+
+def _frame(series: Series) -> pd.DataFrame:
+    import pandas as pd  # takes longer to import than a case to run
+
+    columns = {it: pd.Series(values, index=t) for it, (t, values) in series.items()}
+    return pd.DataFrame({it: column[~column.index.duplicated(keep="last")] for it, column in columns.items()})
+
+
+def _units(record: RunRecord) -> dict[str, str]:
+    return {it.name: it.unit for agent in record.info.agents[:1] for it in agent.control.law.shared}
 
 
 def shared_records(cases: Mapping[str, CheckedCase]) -> dict[str, SharedRecord]:

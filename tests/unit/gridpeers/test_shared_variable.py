@@ -9,9 +9,11 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import gridpeers as gp
+from gridpeers.runs.export import export
 from gridpeers.scenarios.record.record_file import RecordFileError
 
 DOCS = Path(__file__).parents[3] / "docs" / "laws.md"
@@ -92,3 +94,15 @@ def test_a_program_shares_what_the_class_does(law: dict[str, str], tmp_path: Pat
     assert one.sha256 == other.sha256
     assert one.quantity("Omega").equals(other.quantity("Omega"))
     assert other.quantity("Omega").attrs["units"]["Omega"] == "pu"
+
+
+def test_an_export_has_a_table_of_it(law: dict[str, str], tmp_path: Path) -> None:
+    """The same numbers, in a column for each inverter with name and unit."""
+    result = gp.load("islanding").replace({**SHORT, "case.IV.law": law}).run("IV")
+
+    files = export(result.run_record, "csv", tmp_path)
+
+    assert [file.name for file in files] == ["history.csv", "events.csv", "shared.csv"]
+    table = pd.read_csv(tmp_path / "shared.csv", index_col="t_s")
+    assert list(table.columns) == [f"inv{i}_Omega_pu" for i in range(1, 10)]
+    assert table.to_numpy() == pytest.approx(result.quantity("Omega").to_numpy(), rel=1e-12)
