@@ -33,10 +33,6 @@ class Flow(NamedTuple):
     """Why it was dropped, or not used: a reason of netem, "damaged", "kept" by a cut, or the kind of its rejection;
     empty if it was handed on."""
 
-    @property
-    def is_lost(self) -> bool:
-        return self.arrived is None
-
 
 def flows(record: RunRecord, since: float = 0.0, until: float = inf) -> list[Flow]:
     """Return the measurements and states of a run that were sent between two run times (s), in the order of sending.

@@ -46,15 +46,11 @@ from gridpeers.scenarios.sweep.workers import on_workers
 from gridpeers.wire.driver.command_line import command_line
 from gridpeers.wire.wording import counted
 
-RUNS = 100
-
 REPEATED = 20
 """Each run whose number is a multiple of this one is done twice, by any worker that is free."""
 
 SEEDS = 1_000_000
 """Seeds of the messages' fates for each seed of a campaign: run n has one of its own."""
-
-SCENARIO = "scenario.toml"  # file of the scenario without disturbances
 
 COLUMNS = (
     *("run", "seed", "status", "violated", "why", "disturbances", "schedule"),
@@ -182,7 +178,7 @@ class Campaign:
         return self.path / name
 
     def begin(self) -> None:
-        write_whole(self._file(SCENARIO), self.base.text)
+        write_whole(self._file("scenario.toml"), self.base.text)
         self.write_table()
 
     def add(self, row: ChaosRow) -> None:

@@ -92,10 +92,6 @@ def compared(row: ChaosRow, other: ChaosRow, asked: str) -> ChaosRow:
     return msgspec.structs.replace(row, passed=(*row.passed, asked))
 
 
-def run_scenario(base: ChaosBase, driver: Driver = "inprocess") -> ChaosRow:
-    return _judged(base, base.scenario, ChaosRow(number=0, schedule=()), driver)[0]
-
-
 def restored_from(events: Iterable[PlantEvent], enter_service_s: float) -> float:
     """Return the run time (s) from which on a run with trips is to be restored; 0 for one without.
 
@@ -114,7 +110,7 @@ def _settled(
     since_s = base.changed_s(schedule)
     for _ in range(LONGER_RUNS):
         row = ChaosRow(number=number, schedule=schedule, since_s=since_s)
-        row, restored_s = _judged(base, base.disturbed(schedule, seed, since_s), row, driver, within)
+        row, restored_s = judged(base, base.disturbed(schedule, seed, since_s), row, driver, within)
         if restored_s <= since_s:
             return row
         since_s = restored_s
@@ -122,7 +118,7 @@ def _settled(
     return msgspec.structs.replace(row, unsettled=f"inverters trip and return: {text}")
 
 
-def _judged(
+def judged(
     base: ChaosBase, scenario: ScenarioModel, row: ChaosRow, driver: Driver, within: Path | None = None
 ) -> tuple[ChaosRow, float]:
     """Run a scenario and judge it; return from which run time (s) on it is to be restored, too."""

@@ -212,9 +212,6 @@ class RecordContent(RecordPass):
         self.complete = True
         """The record was closed properly."""
 
-    def of_agent(self, agent: str) -> list[SentState]:
-        return sorted(self.states[agent].values(), key=lambda state: state.t)
-
     def take_state(self, agent: str, state: SentState) -> None:
         self.states[agent].setdefault((state.epoch, state.number), state)
 

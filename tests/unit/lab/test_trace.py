@@ -34,7 +34,7 @@ def test_in_ticks_a_message_arrives_with_the_decision_that_can_use_it() -> None:
     """One period after it was sent at the earliest, or after its delay; what a link keeps never arrives."""
     found = judged((0.1, 0.0), (0.12, 0.05), (0.14, "loss"), (0.16, float("inf")))
 
-    assert [(flow.number, flow.sent, flow.fate, flow.is_lost) for flow in found] == [
+    assert [(flow.number, flow.sent, flow.fate, flow.arrived is None) for flow in found] == [
         (5, 0.1, "", False),
         (6, 0.12, "", False),
         (7, 0.14, "loss", True),

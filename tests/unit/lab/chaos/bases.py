@@ -7,6 +7,7 @@ from pathlib import Path
 
 import msgspec
 
+from gridpeers.lab.chaos.chaos_run import ChaosRow, judged
 from gridpeers.lab.chaos.disturbed_scenario import ChaosBase
 from gridpeers.scenarios.schema import load_scenario
 
@@ -28,3 +29,8 @@ def _last_case(name: str | Path) -> ChaosBase:
     scenario, feeder = load_scenario(name)
     case = list(scenario.cases)[-1]
     return ChaosBase(msgspec.structs.replace(scenario, cases={case: scenario.cases[case]}), feeder)
+
+
+def run_scenario(base: ChaosBase) -> ChaosRow:
+    """Run a base as it stands, and judge it."""
+    return judged(base, base.scenario, ChaosRow(number=0, schedule=()), "inprocess")[0]

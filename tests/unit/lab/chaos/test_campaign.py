@@ -12,13 +12,13 @@ import pytest
 
 from gridpeers.lab.chaos import schedules as schedules_of_chaos
 from gridpeers.lab.chaos.campaign import Campaign
-from gridpeers.lab.chaos.chaos_run import ChaosRow, run_scenario
+from gridpeers.lab.chaos.chaos_run import ChaosRow
 from gridpeers.plant.tables.read import DATA
 from gridpeers.scenarios.catalogue_files import CATALOGUE
 from gridpeers.scenarios.checks.check_registry import ALWAYS
 from gridpeers.scenarios.schema import load_scenario
 from tests.command_line import invoke
-from tests.unit.lab.chaos.bases import base_in
+from tests.unit.lab.chaos.bases import base_in, run_scenario
 from tests.unit.lab.chaos.small_campaign import SMALL, rows_of, small
 
 pytestmark = pytest.mark.usefixtures("elsewhere")

@@ -13,12 +13,12 @@ from msgspec.structs import replace
 from gridpeers.lab.chaos import campaign as campaigns
 from gridpeers.lab.chaos import chaos_run
 from gridpeers.lab.chaos.campaign import Campaign, shrink_number
-from gridpeers.lab.chaos.chaos_run import MachineError, run_scenario
+from gridpeers.lab.chaos.chaos_run import MachineError
 from gridpeers.scenarios.record import record_writer
 from gridpeers.scenarios.record.record_writer import Recording
 from gridpeers.scenarios.run import run_case
 from tests.command_line import invoke
-from tests.unit.lab.chaos.bases import base_in
+from tests.unit.lab.chaos.bases import base_in, run_scenario
 from tests.unit.lab.chaos.small_campaign import rows_of, small
 
 pytestmark = pytest.mark.usefixtures("elsewhere", "few_schedules")

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from gridpeers.lab.chaos import chaos_run
-from gridpeers.lab.chaos.chaos_run import MachineError, machine_error, run_scenario
+from gridpeers.lab.chaos.chaos_run import MachineError, machine_error
 from gridpeers.scenarios.run_request import BrokenRunError
-from tests.unit.lab.chaos.bases import base_in
+from tests.unit.lab.chaos.bases import base_in, run_scenario
 from tests.unit.lab.chaos.small_campaign import SMALL
 
 pytestmark = pytest.mark.usefixtures("elsewhere")

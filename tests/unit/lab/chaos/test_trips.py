@@ -10,13 +10,12 @@ from msgspec.structs import replace
 from gridpeers.lab.chaos.campaign import Campaign
 from gridpeers.lab.chaos.chaos_run import (
     restored_from,
-    run_scenario,
     run_schedule,
 )
 from gridpeers.lab.chaos.disturbed_scenario import JUDGED_S, WITHIN_S
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.wire.messages import PlantEvent
-from tests.unit.lab.chaos.bases import base_in
+from tests.unit.lab.chaos.bases import base_in, run_scenario
 from tests.unit.lab.chaos.small_campaign import SMALL
 
 TRIPS = """[protection]

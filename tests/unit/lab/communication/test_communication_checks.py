@@ -56,7 +56,7 @@ def test_the_pass_over_a_record_agrees_with_its_reader() -> None:
 
     for agent in ("inv1", "inv5"):
         sent = [message.number for message in record.messages(agent, kind="State")]
-        assert [state.number for state in content.of_agent(agent)] == sent
+        assert [state.number for state in sorted(content.states[agent].values(), key=lambda it: it.t)] == sent
     assert dict(content.counts) == record.link_counts()
 
 
