@@ -157,7 +157,7 @@ class AgentBarrier:
         """Compute the tick that is due with the last measurement, without one idly; wait for the next tick."""
         grant, links = self._grant, self._heard.links
         assert grant is not None
-        if measurement is None or (links is not None and links.stalled(grant.t)):
+        if measurement is None or (links is not None and grant.t in links.pauses):
             state = agent.idle_state(grant)
         else:
             neighbours, seq = self._neighbours, measurement.seq

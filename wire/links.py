@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Container, Mapping, Sequence, Set
 from typing import Any, NamedTuple, Protocol
 
 from gridpeers.wire.messages import AnyMessage, Measurement, State
@@ -39,6 +39,10 @@ class Links(Protocol):
         """Senders whose messages `offer` never takes; an attribute, because every message reads it."""
 
     @property
+    def pauses(self) -> Container[float]:
+        """Times (s of run time) at which the receiver is paused."""
+
+    @property
     def dropped(self) -> int: ...
 
     def offer(self, message: State | Measurement, payload: bytes, at: float) -> bool:
@@ -46,8 +50,6 @@ class Links(Protocol):
 
     def due(self, now: float) -> Sequence[Arrival]:
         """Take out the messages that have arrived by now, in the order of arrival."""
-
-    def stalled(self, t: float) -> bool: ...
 
     def command(self, tree: Mapping[str, Any], t: float) -> CommandEffect:
         """Apply a link command to messages sent at t (s of run time) or later; raise ValueError if it is none."""

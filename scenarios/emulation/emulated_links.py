@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import msgspec
@@ -35,6 +35,16 @@ class _Interval(NamedTuple):
         return self.since <= t < self.until
 
 
+class _Times:
+    """The times (s of run time) within any of some intervals."""
+
+    def __init__(self, intervals: Sequence[_Interval]) -> None:
+        self._intervals = intervals
+
+    def __contains__(self, t: object) -> bool:
+        return isinstance(t, int | float) and any(at.holds(t) for at in self._intervals)
+
+
 class EmulatedLinks:
     """All links (`gridpeers.wire.links.Links`) into one inverter or the plant, with the faults of their nodes."""
 
@@ -53,7 +63,9 @@ class EmulatedLinks:
             if node.slow_s or (node.pause and not config.real_nodes):
                 end, slow = math.inf if node.to_s is None else node.to_s, math.inf if node.pause else node.slow_s
                 self._intervals.setdefault(node.name, []).append(_Interval(node.from_s, end, slow))
-        self._pauses = tuple(at for at in self._intervals.get(name, ()) if math.isinf(at.slow))
+        pauses = tuple(at for at in self._intervals.get(name, ()) if math.isinf(at.slow))
+        self.pauses: Container[float] = _Times(pauses) if pauses else frozenset[float]()
+        """Times (s of run time) at which the receiver is paused."""
         self._begin()
 
     def offer(self, message: State | Measurement, payload: bytes, at: float) -> bool:
@@ -84,10 +96,7 @@ class EmulatedLinks:
         return self._dropped_before + self._receiver.dropped
 
     def _due_unless_paused(self, now: float) -> Sequence[Arrival]:
-        return () if self.stalled(now) else self._receiver.due(now)
-
-    def stalled(self, t: float) -> bool:
-        return bool(self._pauses) and any(at.holds(t) for at in self._pauses)
+        return () if now in self.pauses else self._receiver.due(now)
 
     def command(self, tree: Mapping[str, Any], t: float) -> CommandEffect:
         """Change what the links do to messages sent from t (s of run time) on; ValueError if the command is wrong."""
@@ -137,7 +146,7 @@ class EmulatedLinks:
         self.clear.clear()
         self._faulty.clear()
         self._receiver = Receiver(self._name, config.netem, config.microgrids, keep_trace=config.keep_trace)
-        self.due = self._due_unless_paused if self._pauses else self._receiver.due
+        self.due = self._due_unless_paused if self.pauses else self._receiver.due
         """Take out what has arrived by now (s of run time): a paused receiver takes it when it goes on."""
         self._schedules = LinkSchedules(config.netem, config.microgrids)
         self._lies.clear()
