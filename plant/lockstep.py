@@ -39,7 +39,6 @@ class LockstepBarrier:
     waiting = AGAIN  # time (s) between two messages of a plant that waits to the agents that are there
     recording = inf  # time (s) for which an ended run stays for a recorder
     report_ticks = TELEMETRY_TICKS, REPORT_TICKS
-    account = ""  # how well the plant kept time
 
     def __init__(self, post: Post, stepper: PlantStepper, phases: Phases, feed: RecorderFeed) -> None:
         if stepper.config.end is None:
@@ -104,18 +103,10 @@ class LockstepBarrier:
 
 
 class LockstepRoster:
-    def __init__(
-        self,
-        post: Post,
-        stepper: PlantStepper,
-        phases: Phases,
-        barrier: LockstepBarrier,
-        meeting: Meeting,
-        reports: RunReports,
-    ) -> None:
-        self._post, self._stepper, self._phases, self._barrier = post, stepper, phases, barrier
-        self._meeting, self._reports = meeting, reports
-        config = stepper.config
+    def __init__(self, meeting: Meeting, barrier: LockstepBarrier, reports: RunReports) -> None:
+        self._meeting, self._barrier, self._reports = meeting, barrier, reports
+        post, stepper, config = meeting.post, meeting.stepper, meeting.stepper.config
+        self._post, self._stepper, self._phases = post, stepper, meeting.phases
         self._schedule = agent_schedule(config, stepper.inverters)
         joiners = {name for actions in self._schedule.values() for name in actions.join}.difference(config.agents)
         self.everyone = (*config.agents, *(name for name in stepper.inverters if name in joiners))

@@ -52,7 +52,7 @@ def agent_schedule(config: PlantConfig, inverters: tuple[str, ...]) -> dict[int,
 
 class Meeting:
     def __init__(self, post: Post, stepper: PlantStepper, phases: Phases, feed: RecorderFeed) -> None:
-        self._post, self._stepper, self._phases, self._feed = post, stepper, phases, feed
+        self.post, self.stepper, self.phases, self.feed = post, stepper, phases, feed
         self.recorders: set[str] = set()
         self._needed = stepper.config.recorders
         self._tokens: set[str] = set()
@@ -61,16 +61,16 @@ class Meeting:
 
     @property
     def has_agents(self) -> bool:
-        return any(self._post.keys.parts(token)[1] == "agent" for token in self._tokens)
+        return any(self.post.keys.parts(token)[1] == "agent" for token in self._tokens)
 
     @property
     def is_alone(self) -> bool:
         """Whether all have gone, but for recorders that the run waits for."""
-        return self._tokens <= {self._post.keys.alive_recorder(name) for name in self._needed}
+        return self._tokens <= {self.post.keys.alive_recorder(name) for name in self._needed}
 
     def missing(self, names: Iterable[str], recorders: bool = False) -> tuple[Awaited, ...]:
         """Return the tokens and nameplates that are missing of agents, and perhaps of the recorders of the run."""
-        members = self._post.members
+        members = self.post.members
         names = tuple(names)
         here = {name for name in names if members.instance(name)}
         absent = [name for name in self._needed if recorders and name not in self.recorders]
@@ -85,7 +85,7 @@ class Meeting:
 
         `refusal`: returns why the process of an agent cannot take part now, an empty string if it can.
         """
-        match self._post.token(key, now, appeared=True):
+        match self.post.token(key, now, appeared=True):
             case ("alive", "recorder", name):
                 self._recorder_came(key, name)
             case ("alive", "agent", name, instance):
@@ -94,42 +94,42 @@ class Meeting:
     def vanished(self, key: str, now: float) -> str:
         """Note that a token is gone; return the agent whose process it was, if that took part."""
         self._tokens.discard(key)
-        match self._post.token(key, now, appeared=False):
+        match self.post.token(key, now, appeared=False):
             case ("alive", "recorder", name):
                 self.recorders.discard(name)
-                if self._phases.now == "running" and (news := self._feed.gone(name)):
-                    self._post.say(news)
-            case ("alive", "agent", name, instance) if self._post.process_gone(name, instance):
+                if self.phases.now == "running" and (news := self.feed.gone(name)):
+                    self.post.say(news)
+            case ("alive", "agent", name, instance) if self.post.process_gone(name, instance):
                 return name
         return ""
 
     def stop(self, key: str, reason: str, *, refused: bool = False) -> None:
         """Ask the agents that listen to a key to stop."""
-        tick, t = self._stepper.tick, self._stepper.t
-        stop = Stop(sender=PLANT, epoch=self._post.epoch, seq=tick, t=t, reason=printable(reason), refused=refused)
-        self._post.publish(key, encode(stop))
+        tick, t = self.stepper.tick, self.stepper.t
+        stop = Stop(sender=PLANT, epoch=self.post.epoch, seq=tick, t=t, reason=printable(reason), refused=refused)
+        self.post.publish(key, encode(stop))
 
     def _recorder_came(self, key: str, name: str) -> None:
         if not (name in self.recorders or name in self._needed or len(self.recorders) < MOST_RECORDERS):
             text = f"the token of recorder {name}; {MOST_RECORDERS} others hold tokens"
-            self._post.rejects.add("excess", key, text)
+            self.post.rejects.add("excess", key, text)
             return
         self._tokens.add(key)
         self.recorders.add(name)
-        if news := self._feed.came(name):
-            self._post.say(news)
+        if news := self.feed.came(name):
+            self.post.say(news)
 
     def _agent_came(self, key: str, name: str, instance: str, reason: str, now: float) -> None:
-        ends = not self._phases.allows("end")
+        ends = not self.phases.allows("end")
         if not (ends or reason):
-            if self._post.process_came(name, instance):
+            if self.post.process_came(name, instance):
                 self._tokens.add(key)
         elif self._refusal_limit.admit("refused", now) is None:
             text = f"a token of {name}, one of too many to be told that they are refused"
-            self._post.rejects.add("excess", key, text)
+            self.post.rejects.add("excess", key, text)
         elif ends:  # it has missed the `Stop` to all
             self._tokens.add(key)
-            self.stop(self._post.keys.stop_request(name, instance), self._stepper.outcome or "the run has ended")
+            self.stop(self.post.keys.stop_request(name, instance), self.stepper.outcome or "the run has ended")
         else:
-            self._post.say(f"refused {reason}")
-            self.stop(self._post.keys.stop_request(name, instance), reason, refused=True)
+            self.post.say(f"refused {reason}")
+            self.stop(self.post.keys.stop_request(name, instance), reason, refused=True)

@@ -24,6 +24,7 @@ from gridpeers.plant.meeting import AGAIN, Meeting
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_interface import LivePlant, PlantLike
 from gridpeers.plant.plant_stepper import PlantStepper
+from gridpeers.plant.realtime.pacer import sentence
 from gridpeers.plant.realtime.realtime import RealtimeRoster, RealtimeTimer
 from gridpeers.plant.realtime.run_commands import LinkCommandSender, RunCommands
 from gridpeers.plant.recorder_feed import KEPT_BYTES, KEPT_BYTES_RECORDED, RecorderFeed, RunReports
@@ -86,9 +87,7 @@ class PlantNode:
         if isinstance(self.ticks, RealtimeTimer):
             sender = LinkCommandSender(post, links, self.reports.publish)
             self.reports.pacing, self.reports.impaired = self.ticks.pacing, lambda: sender.impaired(stepper.t)
-            self.roster = RealtimeRoster(
-                post, stepper, phases, self.ticks, self.meeting, self.reports, self.feed, sender
-            )
+            self.roster = RealtimeRoster(self.meeting, self.ticks, self.reports, sender)
             RunCommands(self, cast(LivePlant, plant), self.ticks, sender)
             state_keys = [keys.state, keys.set_points]
             requests = tuple(map(keys.link_request, stepper.inverters))
@@ -96,7 +95,7 @@ class PlantNode:
                 arrivals = config.record == "all"
                 post.traffic = self._timed = TimedTraffic(keys, post.journal, arrivals=arrivals, whole=True)
         else:
-            self.roster = LockstepRoster(post, stepper, phases, self.ticks, self.meeting, self.reports)
+            self.roster = LockstepRoster(self.meeting, self.ticks, self.reports)
             post.routes[keys.request] = Route(ANYBODY, (Command,), self._on_request)
             state_keys, requests = [keys.state], ()
             if post.journal is not None:
@@ -322,8 +321,8 @@ class PlantNode:
 
     def close(self, reason: str, now: float) -> None:
         """End the run: tell all nodes to close, and report once they have."""
-        if account := self.ticks.account:
-            self.post.say(f"ends: {reason}. {account}")
+        if pacing := self.reports.pacing():
+            self.post.say(f"ends: {reason}. {sentence(pacing, self.config.T_c / self.config.speed)}")
         if self._tick_traffic is not None:
             self._tick_traffic.ticked(self.stepper.tick)
         self.reports.last_due = True

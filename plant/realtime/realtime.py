@@ -18,7 +18,7 @@ from gridpeers.plant.plant_stepper import PlantStepper
 from gridpeers.plant.realtime.pacer import RealTimePacer
 from gridpeers.plant.realtime.run_commands import LinkCommandSender
 from gridpeers.plant.realtime.silence_detector import SilenceDetector
-from gridpeers.plant.recorder_feed import TELEMETRY, RecorderFeed, RunReports
+from gridpeers.plant.recorder_feed import TELEMETRY, RunReports
 from gridpeers.wire.links import REPORT_TICKS
 from gridpeers.wire.messages import AgentStatus, Leave, LinkAcknowledgement, Pacing, State
 from gridpeers.wire.node import CLOCK_ALONE
@@ -62,11 +62,6 @@ class RealtimeTimer:
     def deadline(self) -> float:
         """When the next step is due, or the present wait is over (s on the driver's clock)."""
         return self.pacer.due if self._phases.now == "running" else min(self._until, self.again_at)
-
-    @property
-    def account(self) -> str:
-        """How well the plant kept time."""
-        return str(self.pacer)
 
     def pacing(self) -> Pacing:
         return self.pacer.report()
@@ -127,18 +122,11 @@ class RealtimeTimer:
 
 class RealtimeRoster:
     def __init__(
-        self,
-        post: Post,
-        stepper: PlantStepper,
-        phases: Phases,
-        timer: RealtimeTimer,
-        meeting: Meeting,
-        reports: RunReports,
-        feed: RecorderFeed,
-        link_commands: LinkCommandSender,
+        self, meeting: Meeting, timer: RealtimeTimer, reports: RunReports, link_commands: LinkCommandSender
     ) -> None:
-        self._post, self._stepper, self._phases, self._timer = post, stepper, phases, timer
-        self._meeting, self._reports, self._feed, self._link_commands = meeting, reports, feed, link_commands
+        post, stepper = meeting.post, meeting.stepper
+        self._post, self._stepper, self._phases = post, stepper, meeting.phases
+        self._meeting, self._timer, self._reports, self._link_commands = meeting, timer, reports, link_commands
         self._schedule = agent_schedule(stepper.config, stepper.inverters)
         self.everyone = stepper.inverters
         for name in self.everyone:
@@ -173,7 +161,7 @@ class RealtimeRoster:
     def begin(self, now: float) -> None:
         """Begin to tick, with the agents that are here."""
         self._phases.on("begin")
-        self._feed.paced = True
+        self._meeting.feed.paced = True
         self._timer.begin(now)
         if absent := self.absent:
             text = f"started without the agents of {', '.join(absent)}, which stay on primary droop until they come"
