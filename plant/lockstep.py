@@ -63,11 +63,13 @@ class LockstepBarrier:
 
     def due(self, now: float) -> int | None:
         """Return the tick to do now; before it, perhaps the roster has to change."""
-        return self._stepper.tick if self._phases.now in _TICKS and self.waits.is_open else None
+        return self._stepper.tick if self._phases.now in _TICKS and not self.waits.awaited else None
 
     def counts(self, state: State, now: float) -> bool:
         """Take a state off the wire; return whether it is awaited in this tick."""
-        return state.seq == self._stepper.tick and self._phases.now == "running" and self.waits.came(state.sender)
+        if state.seq != self._stepper.tick or self._phases.now != "running":
+            return False
+        return self.waits.awaited.pop(state.sender, None) is not None
 
     def missing(self) -> tuple[Awaited, ...]:
         return self.waits.missing_messages()
@@ -149,7 +151,7 @@ class LockstepRoster:
         stepper, phase = self._stepper, self._phases.now
         stepper.reproducible = False
         self._changed = True
-        self._barrier.waits.came(name)  # its message will never come
+        self._barrier.waits.awaited.pop(name, None)  # its message will never come
         if phase == "gathering" or (phase == "preparing" and self._number == 0):
             stepper.broken = f"{name} died before the run began"
         elif name in self._joining:
@@ -231,5 +233,5 @@ class LockstepRoster:
         if ready.seq != self._number:
             raise RejectedError("stale", f"Ready({ready.seq}) of {ready.sender} in phase {self._phases.now}")
         if self._phases.now == "preparing":  # else it is the answer to a Prepare that was sent again
-            self._barrier.waits.came(ready.sender)
+            self._barrier.waits.awaited.pop(ready.sender, None)
             self._barrier.waits.renew(now)

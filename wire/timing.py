@@ -68,20 +68,12 @@ class TickBarrier:
         self.deadline: float | None = None
 
     @property
-    def is_open(self) -> bool:
-        return not self.awaited
-
-    @property
     def messages_needed(self) -> int:
         return max(1, len(self.awaited.keys() - self.siblings) if self.siblings else len(self.awaited))
 
     def wait_for(self, awaited: dict[str, str], now: float) -> None:
         self.awaited = awaited
         self.renew(now)
-
-    def came(self, name: str) -> bool:
-        """Note that a sender's message came, or never will; return whether it was awaited."""
-        return self.awaited.pop(name, None) is not None
 
     def missing_messages(self) -> tuple[Awaited, ...]:
         return tuple(Awaited(message, sender) for sender, message in self.awaited.items())
