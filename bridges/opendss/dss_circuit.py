@@ -84,7 +84,7 @@ def read_circuit(request: dict[str, Any], tell: Tell) -> FeederImport:
             found.refuse("switches", f'there is no line "{name}"; {suggestion(name.lower(), lines, "lines")}')
     if not any(name.startswith("vsource.") for name in there):
         found.refuse("no Vsource", "a circuit has one, its substation")
-    note_unusual_voltages(found, taken.unbased)
+    note_unusual_voltages(found)
     if left_out:  # the voltages are those of another circuit
         found.V = {}
     return found
@@ -101,7 +101,6 @@ class DssElements:
         self._wanted = {name.lower() for name in switches}
         names = [str(name).lower() for name in engine.circuit.AllBusNames]
         self.bus_names = found.name_buses(names)  # by those of the script
-        self.unbased: list[str] = []  # buses without a voltage base
         self.order = [(self.bus_names[bus], letter) for bus, letter in order]  # nodes in the engine's order
         for name in names:
             found.buses[self.bus_names[name]] = self._place(name)
@@ -191,7 +190,6 @@ class DssElements:
         x, y = (float(active.x), float(active.y)) if active.Coorddefined else (0.0, 0.0)
         if active.kVBase > 0.0:
             return float(active.kVBase) * 1e3, x, y
-        self.unbased.append(self.bus_names[bus])
         return max(1.0, float(np.abs(complexes(active.Voltages)).max(initial=0.0))), x, y
 
 

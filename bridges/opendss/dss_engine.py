@@ -6,7 +6,7 @@ The commands come one by one, so that each problem has a file and a line, and no
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from gridpeers.bridges.feeder_import import FeederImport
-from gridpeers.plant.equipment import PHASES
 from gridpeers.plant.tables.feeder_columns import Manifest
 from gridpeers.wire.schema.table_schema import named
 from gridpeers.wire.text_file import script_of
@@ -247,36 +246,20 @@ FAR = 1.5  # ratio of two voltages that only a lost factor explains, such as tha
 DEAD = 0.01  # voltage (pu) below which nothing feeds a node, so that nothing can be said of it
 
 
-def note_unusual_voltages(found: FeederImport, unbased: Collection[str]) -> None:
-    """Note loads whose `kv`, and buses whose voltage base, is far from the voltage that they have.
-
-    Buses in `unbased` have no base.
-    """
-    loads, buses = list[tuple[str, float, float]](), list[tuple[str, float, float]]()  # name, voltage, nominal one
+def note_unusual_voltages(found: FeederImport) -> None:
+    """Note loads whose `kv` is far from the voltage that they have."""
+    far: dict[str, float] = {}
     for part in found.load_parts:
         one, other = (found.V.get((part.bus, letter), 0j) for letter in part.ends)
-        loads.append((part.name, abs(one - other), part.V_nom))
-    for bus, (V_nom, *_) in found.buses.items():
-        if bus not in unbased:
-            buses.append((f"bus {bus}", max(abs(found.V.get((bus, letter), 0j)) for letter in PHASES), V_nom))
-    for rows, meant, remedy in (
-        (loads, "kv, and beyond Vminpu and Vmaxpu a load does not take its kw", "correct kv, or what feeds it"),
-        (buses, "voltage base", "correct Set VoltageBases, or the kvs of a transformer"),
-    ):
-        ratios = {name: V / V_nom for name, V, V_nom in rows if V > DEAD * V_nom > 0.0}
-        far = {name: ratio for name, ratio in ratios.items() if not 1.0 / FAR <= ratio <= FAR}
-        if far:
-            found.notes.append(f"{_first(far)}: has {next(iter(far.values())):.2g} times its {meant}; {remedy}")
-    if unbased:
+        ratio = abs(one - other) / part.V_nom
+        if ratio > DEAD and not 1.0 / FAR <= ratio <= FAR:
+            far.setdefault(part.name, ratio)
+    if far:
+        name, more = next(iter(far)), f" (and {len(far) - 1} more)" * (len(far) > 1)
         found.notes.append(
-            f"bus {_first(unbased)}: without a voltage base, so that the voltage there counts as nominal; "
-            "write Set VoltageBases=[...] and CalcVoltageBases"
+            f"{name}{more}: has {far[name]:.2g} times its kv, and beyond Vminpu and Vmaxpu a load does not take its "
+            "kw; correct kv, or what feeds it"
         )
-
-
-def _first(names: Collection[str]) -> str:
-    more = len(names) - 1
-    return f"{next(iter(names))} (and {more} more)" if more else next(iter(names))
 
 
 def complexes(values: Any) -> np.ndarray[Any, np.dtype[np.complex128]]:
