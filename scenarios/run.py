@@ -183,7 +183,7 @@ def run_case(
                 for check in ALWAYS:
                     CHECKS.resolve(check)
             recorder(telemetry)
-            progress(case, recorder.ended, time.end_s)
+            progress(case, recorder.case.ended, time.end_s)
 
         progress(case, 0.0, time.end_s)
         try:

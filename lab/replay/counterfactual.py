@@ -119,7 +119,7 @@ class Counterfactual:
             if tell is not None:
                 tell(rule.case, 0.0, record.t_end)
             notes = run(record, rule, take)
-            recorded = recorder.finish(recorder.ended, recorder.record_step)
+            recorded = recorder.finish()
         if changes and effect.part.difference is None:
             notes = [*notes, f"the change made no difference: every row up to {effect.part.t_end:.2f} s is as recorded"]
         self.difference, self.compared, self.notes = rows.part.difference, rows.part.count, tuple(notes)
@@ -184,7 +184,7 @@ def _as_recorded(record: RunRecord, text: str, folder: Path, until: float) -> Re
             rows = tuple(row for row in message.rows if row[0] <= until + 1e-9)
             events = tuple(event for event in message.events if event.t <= until + 1e-9)
             recorder(msgspec.structs.replace(message, rows=rows, events=events))
-        return recorder.finish(recorder.ended, recorder.record_step)
+        return recorder.finish()
 
 
 def _physics(record: RunRecord, text: str) -> RecordInfo:

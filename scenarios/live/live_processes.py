@@ -132,10 +132,10 @@ class LiveRecorder:
         if recorder.count < 2:
             say("nothing was recorded, so there are no numbers")
         elif not self.client.ended:
-            say(text := f"the record ends at {recorder.ended:.2f} s, without the plant's last message")
+            say(text := f"the record ends at {recorder.case.ended:.2f} s, without the plant's last message")
             self.failure = self.failure or text
         else:
-            self.recorded = recorder.finish(recorder.ended, recorder.record_step)
+            self.recorded = recorder.finish()
             _say_all(self.recorded.links.lines())
 
     def _follow(self) -> None:
@@ -154,11 +154,11 @@ class LiveRecorder:
                 self._say_events(message)
             if recorder is None:
                 return
-            known = len(recorder.missing)
-            if not self._tried(f"the record ends at {recorder.ended:.2f} s", lambda: recorder(message), GOES_ON):
+            known = len(recorder.case.missing)
+            if not self._tried(f"the record ends at {recorder.case.ended:.2f} s", lambda: recorder(message), GOES_ON):
                 self._recorder = None
                 recorder.close()
-            for before, after in recorder.missing[known:]:
+            for before, after in recorder.case.missing[known:]:
                 say(f"rows between {before:.2f} and {after:.2f} s are missing: for so long no word came of the plant")
         except Exception as error:
             self.client.rejects.failed("telemetry", error)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from struct import pack
@@ -34,33 +34,33 @@ def canonical(rows: Iterable[Sequence[float]]) -> bytes:
     return b"".join([pack(f"<{len(row)}d", *row) for row in rows])
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(kw_only=True)
 class Recorded:
-    """A case as recorded; its rows and the verdicts on its messages are in memory, or read from its file."""
+    """A case as recorded so far; its rows and the verdicts on its messages are in memory, or read from its file."""
 
-    inverters: tuple[str, ...]
+    inverters: tuple[str, ...] = ()
     """Order of the columns."""
-    table: bytes = b""
+    table: bytes | bytearray = b""
     """Rows in memory, `canonical`."""
     file: RunRecord | None = None
     """The record with the rows and verdicts; None where they are in memory."""
-    ended: float
-    missing: tuple[tuple[float, float], ...] = ()
+    ended: float = 0.0
+    missing: list[tuple[float, float]] = field(default_factory=list)
     """Times (s) of the last row before and of the first row after each interval of which no rows came."""
-    events: tuple[PlantEvent, ...]
-    quiet: tuple[tuple[float, int], ...] = ()
+    events: list[PlantEvent] = field(default_factory=list)
+    quiet: list[tuple[float, int]] = field(default_factory=list)
     """Run time (s), and number of states of that tick that were not sent to the neighbours."""
-    links: LinkRecord
-    sha256: str
+    links: LinkRecord = field(default_factory=LinkRecord)
+    sha256: str = ""
     """Fingerprint: of the `canonical` bytes of the rows."""
-    reproducible: bool
-    """True if the same scenario and seed give the same bytes again."""
+    reproducible: bool = True
+    """False once something unscripted, such as the death of an agent, has entered the run."""
 
     @cached_property
     def history(self) -> History:
         from gridpeers.scenarios.results.history import History  # numpy, which a run starts without
 
-        return History.of(self.inverters, self.table) if self.file is None else self.file.physics()
+        return History.of(self.inverters, bytes(self.table)) if self.file is None else self.file.physics()
 
     def traces(self) -> Iterator[LinkTrace]:
         """Yield the verdicts of the emulated links, in parts of one link."""
@@ -80,7 +80,6 @@ class Recorder:
     def __init__(self, folder: Path | None = None, *, gaps: bool = False, record: RecordInfo | None = None) -> None:
         self._gaps, self._folder = gaps, folder
         self._hash = hashlib.sha256()
-        self._table = bytearray()
         self._file: Recording | None = None
         if folder is not None:
             folder.mkdir(parents=True)
@@ -88,17 +87,11 @@ class Recorder:
                 from gridpeers.scenarios.record.record_writer import Recording  # imports mcap, which sweeps do without
 
                 self._file = Recording(folder, record)
-        self._inverters: tuple[str, ...] = ()
-        self._first: list[float] = []
-        """Times of the first two rows (s)."""
+        self.case = Recorded(table=bytearray(), links=LinkRecord(keep=self._file is None))
+        """The case so far."""
         self.count = 0
-        self.ended = 0.0
-        self.missing: list[tuple[float, float]] = []
-        self.events: list[PlantEvent] = []
-        self._quiet: list[tuple[float, int]] = []
-        self.reproducible = True
-        """False once something unscripted, such as the death of an agent, has entered the run."""
-        self.links = LinkRecord(keep=self._file is None)
+        self._step = 0.0
+        """Distance of the first two rows (s); 0 while there are not two."""
 
     def __enter__(self) -> Recorder:
         return self
@@ -110,72 +103,61 @@ class Recorder:
         if isinstance(message, Telemetry):
             self._take(message)
         elif isinstance(message, LinkReport):
-            self.links(message)
+            self.case.links(message)
         if self._file is not None:
             self._file(message)
             _require(self._file)
 
     def _take(self, telemetry: Telemetry) -> None:
-        self._inverters = self._inverters or telemetry.inverters
+        case = self.case
+        case.inverters = case.inverters or telemetry.inverters
         for row in telemetry.rows:
-            if self.count and row[0] <= self.ended:
-                raise RecordError(f"telemetry: a row of {row[0]:g} s came after that of {self.ended:g} s")
-            if len(self._first) < 2:
-                self._first.append(row[0])
-            elif row[0] - self.ended > 1.5 * self.record_step:
-                self.missing.append((self.ended, row[0]))
-            self.ended = row[0]
+            if self.count and row[0] <= case.ended:
+                raise RecordError(f"telemetry: a row of {row[0]:g} s came after that of {case.ended:g} s")
+            if self.count == 1:
+                self._step = round(row[0] - case.ended, 9)
+            elif self.count and row[0] - case.ended > 1.5 * self._step:
+                case.missing.append((case.ended, row[0]))
+            case.ended = row[0]
             self.count += 1
         rows = canonical(telemetry.rows)
         self._hash.update(rows)
         if self._file is None:
-            self._table += rows
-        self.events += telemetry.events
-        self._quiet += telemetry.quiet
-        self.reproducible = self.reproducible and telemetry.reproducible
+            case.table += rows
+        case.events += telemetry.events
+        case.quiet += telemetry.quiet
+        case.reproducible = case.reproducible and telemetry.reproducible
 
-    def finish(self, end: float, record_step: float) -> Recorded:
-        """Close the record, and write the tables of the case into its folder; raise RecordError if rows are missing."""
+    def finish(self, end: float | None = None, record_step: float | None = None) -> Recorded:
+        """Close the record, and write the tables of the case into its folder.
+
+        Raise RecordError if there are not all rows up to the end (s), by default those between the first and the last.
+        """
         self.close()
         if self._file is not None:
             _require(self._file)
-        expected = round(end / record_step) + 1
-        absent = sum(round((after - before) / record_step) - 1 for before, after in self.missing)
+        case = self.case
+        end = case.ended if end is None else end
+        step = record_step or self._step or 1.0  # of a single row any
+        expected = round(end / step) + 1
+        absent = sum(round((after - before) / step) - 1 for before, after in case.missing)
         if self.count + (absent if self._gaps else 0) != expected:
-            last = f"the last one is of {self.ended:g} s" if self.count else "none came"
-            holes = "".join(f"; none between {before:g} and {after:g} s" for before, after in self.missing)
+            last = f"the last one is of {case.ended:g} s" if self.count else "none came"
+            holes = "".join(f"; none between {before:g} and {after:g} s" for before, after in case.missing)
             raise RecordError(
-                f"history has {self.count} rows, but {end:g} s in steps of {record_step:g} s are {expected}; "
-                f"{last}{holes}"
+                f"history has {self.count} rows, but {end:g} s in steps of {step:g} s are {expected}; {last}{holes}"
             )
-        recorded = Recorded(
-            inverters=self._inverters,
-            table=bytes(self._table),
-            file=None if self._file is None else _opened(self._file.path),
-            ended=self.ended,
-            missing=tuple(self.missing),
-            events=tuple(self.events),
-            quiet=tuple(self._quiet),
-            links=self.links,
-            sha256=self._hash.hexdigest(),
-            reproducible=self.reproducible,
-        )
+        case.sha256 = self._hash.hexdigest()
+        case.file = None if self._file is None else _opened(self._file.path)
         if self._folder is not None:
-            write_tables(
-                self._folder, recorded.history, recorded.events, recorded.traces() if self.links.sent else None
-            )
-            self.links.write(self._folder)
-        return recorded
+            write_tables(self._folder, case.history, case.events, case.traces() if case.links.sent else None)
+            case.links.write(self._folder)
+        return case
 
     def close(self) -> None:
         """End the record: what came of a case that was not finished is in its file."""
         if self._file is not None:
             self._file.close()
-
-    @property
-    def record_step(self) -> float:
-        """Distance of the first two rows (s); 0 while there are not two."""
-        return round(self._first[1] - self._first[0], 9) if len(self._first) == 2 else 0.0
 
 
 def _require(file: Recording) -> None:

@@ -291,5 +291,5 @@ def fake_clock_record(
         run = FakeClockRun(plant, agents, recorder, delay)
         happens(run)
         run.run()
-        recorder.finish(recorder.ended, recorder.record_step)
+        recorder.finish()
     return RunRecord.open(folder)

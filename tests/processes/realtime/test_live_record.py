@@ -42,7 +42,7 @@ def recorded(folder: Path, plant: PlantConfig, agents: list[AgentConfig]) -> Run
     with Recorder(folder / "wall", gaps=True, record=info) as recorder:
         outcome = run_processes(plant, agents, folder / "log", recorder, on_other=recorder, plant_command=TOY)
         assert outcome.broke == ""
-        recorder.finish(recorder.ended, recorder.record_step)
+        recorder.finish()
     return RunRecord.open(folder / "wall")
 
 

@@ -19,8 +19,8 @@ def shown(case: str) -> Shown:
     recorder = Recorder()
     run_inprocess(*configs(scenario, feeder, case), recorder)
     history = recorder.finish(scenario.time.end_s, scenario.time.record_s).history
-    closed = {e.subject: e.t for e in recorder.events if e.kind == "switch" and "closed" in e.text}
-    warnings = [event.text for event in recorder.events if event.kind in ("warning", "trip")]
+    closed = {e.subject: e.t for e in recorder.case.events if e.kind == "switch" and "closed" in e.text}
+    warnings = [event.text for event in recorder.case.events if event.kind in ("warning", "trip")]
     last = history.table[-1, 1:].reshape(-1, 6).copy()
     last[:, [1, 2, 4]] /= np.array([row.P_rated for row in feeder.inverters])[:, None]
     last[:, 3] /= [row.V_nom for row in feeder.inverters]

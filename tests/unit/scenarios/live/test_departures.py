@@ -202,7 +202,7 @@ def test_a_live_run_that_was_left_alone_has_the_numbers_of_its_case(tmp_path: Pa
     run_inprocess(plant, agents, recorder)
     history = recorder.finish(7.0, plant.record_step).history
     came = windows([("event1", 1.0), ("event2", 4.0)], 7.0)
-    found = find({"IV": case_of(history, came, recorder.events)})
+    found = find({"IV": case_of(history, came, recorder.case.events)})
     ran = RunMetrics(scenario=scenario, feeder=feeder, driver="inprocess", folder=tmp_path)
     expected = json.loads(metrics_json(ran, found, {"IV": {}}))["cases"]["IV"]
     metrics, report = account(tmp_path, recorded, 8.0)

@@ -128,9 +128,9 @@ def test_a_gap_that_is_allowed_is_known_by_its_times(tmp_path: Path) -> None:
     """In wall-clock time a recorder may be out of reach for too long: then it says which rows are missing."""
     with Recorder(tmp_path / "I", gaps=True) as recorder:
         recorder(telemetry(tuple(row(0.5 * k) for k in (0, 1, 2, 7, 8))))
-        recorded = recorder.finish(4.0, recorder.record_step)
+        recorded = recorder.finish()
 
-    assert recorded.missing == ((1.0, 3.5),)
+    assert recorded.missing == [(1.0, 3.5)]
     assert (recorded.ended, recorded.history.t.tolist()) == (4.0, [0.0, 0.5, 1.0, 3.5, 4.0])
 
 
