@@ -263,7 +263,7 @@ class AgentNode:
         at = state.t if self.upkeep is None else now * self._config.speed
         if self.policy.counts(state, now) and self.admission.is_usable(self.heard.links, state, payload, at):
             self.heard.keep(state, at)
-        if self.policy.due(now) is not None:
+        if self.policy.awaits_states and self.policy.due(now) is not None:
             self._tick(now)
 
     # ---------------------------------------------------------------- ticks

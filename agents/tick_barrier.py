@@ -46,6 +46,8 @@ class AgentBarrier:
         self._waits.last_heard, self._waits.siblings = post.last_heard, siblings
         self.at = 0.0
         """Time t_k of the tick that is due (s of run time)."""
+        self.awaits_states = False
+        """Whether the next state may make the tick due: its measurement is here, or the agent leaves."""
         self.reports = False
         """Whether the tick just decided is one after which the links' accounts are due."""
         self._plant_seen = self._leaving = False
@@ -94,7 +96,7 @@ class AgentBarrier:
         return WAIT
 
     def leave(self, now: float) -> None:
-        self._leaving = True
+        self._leaving = self.awaits_states = True
         self._waits.deadline = now + CLOSING
 
     def due(self, now: float) -> int | None:
@@ -115,7 +117,7 @@ class AgentBarrier:
         if message.seq != self._tick or self._grant is not None:
             kind = "unexpected" if message.seq > self._tick else "stale"
             raise RejectedError(kind, f"tick {message.seq}, but {self._tick} is next")
-        self._grant, self.at, waits = message, message.t, self._waits
+        self._grant, self.at, self.awaits_states, waits = message, message.t, True, self._waits
         waits.awaited.pop(PLANT, None)
         if self._neighbours_of is not self._meeting.processes:
             for name in set(self._neighbours).difference(self._meeting.processes):
@@ -174,7 +176,7 @@ class AgentBarrier:
         if self._present[0] != changes or self._neighbours_of is not self._meeting.processes:
             self._neighbours_of, self._neighbours = self._meeting.processes, self._meeting.neighbours
             self._present = changes, self._meeting.present()
-        self._grant, self._tick, waits = None, grant.seq + 1, self._waits
+        self._grant, self._tick, self.awaits_states, waits = None, grant.seq + 1, self._leaving, self._waits
         waits.awaited = {PLANT: f"Measurement({self._tick})"} | dict.fromkeys(self._present[1], f"State({grant.seq})")
         waits.deadline = now + waits.timeout
         for name in self._early:

@@ -84,7 +84,7 @@ take what was sent last with it."""
 class AgentTimer:
     """A tick policy (`gridpeers.wire.tick_policy`): a timer of the agent's own."""
 
-    messages_needed = CLOCK_ALONE
+    messages_needed, awaits_states = CLOCK_ALONE, False
 
     def __init__(
         self,
