@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gridpeers.plant.dynamics.circuit import aligned_sum
 from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Real
-from gridpeers.plant.dynamics.kernel.model_pass import TERMINAL, THETA, F, W, constants, parameters_of, state_of
+from gridpeers.plant.dynamics.kernel.model_pass import TERMINAL, THETA, F, W, parameters_of, state_of
 from gridpeers.plant.dynamics.kernel.second_order_step import FeedForward
 from gridpeers.plant.equipment import F_NOM
 from gridpeers.plant.inverters.inverter_model import InverterModel, Kind, Method, Rating
@@ -91,7 +91,7 @@ class Inverters:
             if wrong := unit.parameters.objection(method):
                 raise ValueError(wrong)
             record = self.constants(i)
-            for name, value in constants(unit.parameters, unit.rating, y_f).items():
+            for name, value in unit.parameters.values(unit.rating, y_f).items():
                 record[name] = value
         self.connected = np.ones(n, bool) if connected is None else np.array(connected, dtype=bool)
         self.set_points = np.zeros((n, 3))

@@ -196,6 +196,13 @@ class InverterModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
         """Return further values for `g`; the types are the same for every unit."""
         return {}
 
+    def values(self, rating: Rating, y_f: complex) -> dict[str, Any]:
+        """Return all of `g`; `y_f`: admittance of the filter in the network (S)."""
+        fields = {name: getattr(self, name) for name in self.__struct_fields__}
+        given = {name: value for name, value in fields.items() if not isinstance(value, str | None)}
+        numbers = {name: value if isinstance(value, bool) else float(value) for name, value in given.items()}
+        return {**rating.constants(), "y_f": y_f, **numbers, **self.constants(rating)}
+
     def admittance(self, rating: Rating) -> complex:
         """Return the filter's admittance (S) between internal and terminal voltage; 0 for a current source."""
         return 1.0 / (complex(self.R_f, self.X_f) * (rating.V_b**2 / (rating.S_b / 3.0)))

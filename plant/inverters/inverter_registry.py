@@ -3,22 +3,41 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from functools import cache
+from types import SimpleNamespace
 from typing import Annotated, Any
 
 import msgspec
 
 from gridpeers.plant.inverters.gfl import Gfl
 from gridpeers.plant.inverters.gfm_droop import GfmDroop
-from gridpeers.plant.inverters.inverter_model import InverterModel, Kind
+from gridpeers.plant.inverters.inverter_model import InverterModel, Kind, Rating
 from gridpeers.plant.inverters.regfm_a1 import REGFM_A1, REGFM_A1_VFLAG0
 from gridpeers.plant.inverters.vsm import Vsm
-from gridpeers.wire.plugins.registry import ANYTHING, Registry, named
+from gridpeers.wire.plugins.registry import ANYTHING, Registry, line_of, named
 from gridpeers.wire.schema.table_schema import Field, fields_of
 from gridpeers.wire.wording import suggestion
 
 OURS: dict[Kind, tuple[type[InverterModel], ...]] = {"GFM": (GfmDroop, type(REGFM_A1), Vsm), "GFL": (Gfl,)}
 """Models that come with gridpeers; the first of a kind is its default."""
+
+
+@cache
+def _trial(model: type[InverterModel]) -> str:
+    """Return why a pass fails as a function of Python, "" if it does not: the compiler would say less."""
+    names = ("theta", "w", "f", *model.STATES)
+    x = SimpleNamespace(**dict.fromkeys(names, 0.0))
+    numbers = {"P_set": 0.5, "V_set": 1.0, "Q_set": 0.0, "P": 0.5, "Q": 0.1, "V": 1.0}
+    t = SimpleNamespace(**numbers, **{f"{quantity}_{phase}": 200.0 + 0j for quantity in "VIJ" for phase in "ABC"})
+    try:
+        g = SimpleNamespace(**model().values(Rating(1e5, 277.0, 0.01, 0.05, 60.0), 0.1 - 1j))
+        for second in (False, True):
+            model.advance(g, t, copy(x), x, copy(x), 0.002, second)
+    except ANYTHING as error:
+        return f"its pass fails{line_of(model.advance, error)}: {named(error)}"
+    unknown = ", ".join(sorted(set(vars(x)) - set(names)))
+    return f"its pass sets {unknown}, which its STATES do not name" if unknown else ""
 
 
 def _objection(it: Any) -> str:
@@ -35,7 +54,7 @@ def _objection(it: Any) -> str:
         ]
     except ANYTHING as error:
         return f"give every parameter a default: {named(error)}"
-    return "; ".join(wrong)
+    return "; ".join(wrong) or _trial(it)
 
 
 INVERTERS: Registry[type[InverterModel]] = Registry(

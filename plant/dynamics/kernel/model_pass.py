@@ -10,7 +10,6 @@ from collections.abc import Iterator
 from functools import cache
 from typing import Any
 
-import msgspec
 import numpy as np
 from llvmlite import ir
 from numba import types
@@ -41,15 +40,8 @@ def state_of(model: type[InverterModel]) -> np.dtype[np.void]:
 @cache
 def parameters_of(model: type[InverterModel]) -> np.dtype[np.void]:
     """Return the record of a model's parameters: numbers and flags of its fields, and constants of its rating."""
-    values = constants(model(), Rating(1.0, 1.0, 1.0, 1.0, 1.0), 0.0j)
+    values = model().values(Rating(1.0, 1.0, 1.0, 1.0, 1.0), 0.0j)
     return np.dtype([(name, np.dtype(type(value))) for name, value in values.items()], align=True)
-
-
-def constants(unit: InverterModel, rating: Rating, y_f: complex) -> dict[str, Any]:
-    """Return the values of a unit's parameters; `y_f`: admittance of its filter in the network (S)."""
-    given = {name: value for name, value in msgspec.structs.asdict(unit).items() if not isinstance(value, str | None)}
-    numbers = {name: value if isinstance(value, bool) else float(value) for name, value in given.items()}
-    return {**rating.constants(), "y_f": y_f, **numbers, **unit.constants(rating)}
 
 
 def _record(_: Any, address: Any, dtype: Any) -> Any:
@@ -103,7 +95,13 @@ def address_of(model: type[InverterModel]) -> int:
             _known.add(function)
     code: Any = CFunc(take, _PASS_OF_C, locals={}, options={"error_model": "numpy"})
     keep(code, take, {inverter_model.__file__, *(function.__code__.co_filename for function in _called(advance))})
-    code.compile()
+    try:
+        code.compile()
+    except Exception as error:  # the compiler's, of what a pass of somebody's does
+        why = " ".join(str(error).split())[:300]
+        raise ValueError(
+            f"{model.__name__}: its pass `advance` cannot be compiled: {type(error).__name__}: {why}"
+        ) from None
     _kept.append(code)
     return int(code.address)
 

@@ -168,6 +168,24 @@ def test_what_is_wrong_with_a_model_is_said_at_its_key(tmp_path: Path) -> None:
     assert "plant.inverter.inv4" in text
 
 
+@pytest.mark.parametrize(
+    ("right", "wrong", "words"),
+    [
+        ("/ g.T_q", "/ g.T_x", "its pass fails (machine.py:23): AttributeError"),
+        ("x.q = gp", "x.z = gp", "its pass sets z, which its STATES do not name"),
+        ("def rest(", "def begin(", "it has no static method rest"),
+    ],
+)
+def test_a_pass_with_a_mistake_is_refused_with_its_line(tmp_path: Path, right: str, wrong: str, words: str) -> None:
+    """`check` takes the pass once as a function of Python, before a compiler says less about it."""
+    path = scenario(tmp_path / "own", "machine:Machine", "machine:Machine")
+    (path.parent / "machine.py").write_text(OF_A_USER.replace(right, wrong))
+
+    with pytest.raises(gp.ScenarioError) as error:
+        gp.load(path)
+    assert words in str(error.value)
+
+
 def test_predict_says_that_it_cannot(tmp_path: Path) -> None:
     """A model without a linear response is named: a prediction of others would be silently wrong."""
     with pytest.raises(gp.ScenarioError, match=r'inv\d+: the model "vsm" has no linear response'):
