@@ -32,13 +32,12 @@ def executable_problem(file: Path) -> str:
     if first.endswith(b"\r\n"):
         return "has lines that end as those of Windows, which #! cannot have; write it with Unix line ends"
     line = first[2:].decode(errors="replace").strip().replace("\t", " ")
-    interpreter, _, argument = line.partition(" ")
-    if not Path(interpreter).is_file():
-        return f"asks in its first line for {interpreter or 'nothing'}, which is not there"
-    argument = argument.strip()  # the system hands it on as one, blanks included
-    if Path(interpreter).name == "env" and not argument.startswith("-") and not shutil.which(argument):
-        return f"asks in its first line for {argument or 'nothing'}, which is not there"
-    return ""
+    program, _, argument = line.partition(" ")
+    found = Path(program).is_file()
+    if found and Path(program).name == "env" and not argument.strip().startswith("-"):
+        program = argument.strip()  # the system hands it on as one, blanks included
+        found = shutil.which(program) is not None
+    return "" if found else f"asks in its first line for {program or 'nothing'}, which is not there"
 
 
 PAPER = LawChoice().use

@@ -20,14 +20,11 @@ CARRIERS = ("use", "command", "fmu")
 
 KEYS = (*CARRIERS, "shared", "folder", "time_limit_s")
 
-METHODS = ("start", "close")
-"""Methods of a law that are called beside `step`; a law may leave them as they are in `Law`."""
-
 
 def _objection(it: Any) -> str:
     if wrong := class_objection(it, Law, "step", ("own", "neighbours", "T"), KEYS):
         return wrong
-    method = next((name for name in METHODS if not callable(getattr(it, name))), "")
+    method = next((name for name in ("start", "close") if not callable(getattr(it, name))), "")
     return f"its {method} is no method; give the parameter another name" if method else ""
 
 

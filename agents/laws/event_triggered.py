@@ -49,8 +49,8 @@ class EventTriggered(Consensus):
         """Decide from the last broadcast values, the own ones included, and whether to broadcast new ones."""
         P_hat, z_hat = self._last_broadcast or (own.P_set, own.z)
         seen = super().step(own._replace(P_set=P_hat, z=z_hat), neighbours, T)
-        P_seen = self._limited(seen.P_set)
-        P_set = self._limited(own.P_set + (P_seen - P_hat))
+        P_seen = min(max(seen.P_set, self.P_set_min), self.P_set_max)
+        P_set = min(max(own.P_set + (P_seen - P_hat), self.P_set_min), self.P_set_max)
         wrong = abs(P_hat - P_set) * own.m_p
         send = (
             self._last_broadcast is None
@@ -67,6 +67,3 @@ class EventTriggered(Consensus):
         assert seen.terms is not None
         P, V, *_ = seen.terms()
         return Terms((*P, Term("limit of the last broadcast", beyond)) if beyond else P, V)
-
-    def _limited(self, P_set: float) -> float:
-        return min(max(P_set, self.P_set_min), self.P_set_max)
