@@ -3,15 +3,9 @@
 The node meets the other agents, hears its in-neighbours by the run's graph, passes their states through the emulated
 links, if there are any, and sends what the agent decides. Its tick policy says when it ticks, with what, and what
 follows if something is late: `gridpeers.agents.tick_barrier` in simulated time, `gridpeers.agents.tick_timer` in real
-time. Its phases:
-
-- *seeking*: there is no plant.
-- *waiting*: there is no measurement, or no recent one.
-- *meeting*: in simulated time, the agent gets ready for a roster.
-- *running*: the agent ticks. In real time it begins with the set-points that its measurement shows: those that the
-  plant holds for it.
-- *leaving*: its last accounts are on their way; in real time the plant takes its inverter off the network.
-- *over*.
+time. Its phases: *seeking* a plant; *waiting* for a measurement; *meeting* the agents of a roster, in simulated time;
+*running*, that is ticking, from the set-points that the plant holds; *leaving*, while its last accounts are on their
+way or the plant takes its inverter off the network; *over*.
 """
 
 from __future__ import annotations
@@ -26,7 +20,7 @@ from gridpeers.agents.neighbours import Hearing, OpenMeeting
 from gridpeers.agents.roster_meeting import KnownAgents, RosterMeeting
 from gridpeers.agents.tick_barrier import AgentBarrier
 from gridpeers.agents.tick_timer import AgentTimer
-from gridpeers.agents.upkeep import Upkeep
+from gridpeers.agents.upkeep import JOURNAL_PERIOD, Upkeep
 from gridpeers.wire.codec import RejectedError, encode
 from gridpeers.wire.journal import JournalBuffer, TimedTraffic
 from gridpeers.wire.links import Links
@@ -44,10 +38,6 @@ AGENT_PHASES: PhaseTable = {
     "leaving": {"end": "over"},
     "over": {},
 }
-
-JOURNAL_PERIOD = 0.2
-"""Longest time (s) until a part of the journal is sent in simulated time, where emulated links change all the time how
-the agent decides."""
 
 
 class AgentNode:
@@ -351,8 +341,10 @@ class AgentNode:
         post, links = self.post, self.heard.links
         if not self._reported:
             self._reported = True
-            empty = self.upkeep is None and links is not None
-            post.send(self.keys.journal(self.name), *post.take_journal(self.policy.t, empty=empty))
+            t, empty = (
+                (self.policy.t, links is not None) if isinstance(self.policy, AgentBarrier) else (self.heard.t, False)
+            )
+            post.send(self.keys.journal(self.name), *post.take_journal(t, empty=empty))
             post.send(self.keys.report(self.name), *post.take_link_reports(links, instance=self._instance, last=True))
 
     def _end(self, *, stopped: str = "", failed: str = "") -> None:

@@ -143,11 +143,6 @@ class AgentTimer:
         if isinstance(message, Waiting):
             self.missing_agents = message.waits_for
 
-    @property
-    def t(self) -> float:
-        """Run time (s) of the last measurement in use."""
-        return self.heard.t
-
     def gone(self, name: str) -> Verdict:
         """Note that a process is gone."""
         if name == PLANT:

@@ -18,7 +18,7 @@ STATUS_PERIOD = 0.5
 """Time (s, wall) between two `AgentStatus`; one more goes out whenever the phase or the neighbours in use change."""
 
 JOURNAL_PERIOD = 0.2
-"""Time (s, wall) between two parts of the journal: a record loses no more when a process is killed."""
+"""Time (s) between two parts of the journal, in simulated time only with emulated links: a kill loses no more."""
 
 
 class LinkCommandReceiver:
