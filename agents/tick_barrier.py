@@ -23,7 +23,7 @@ from gridpeers.wire.codec import RejectedError, payload_of
 from gridpeers.wire.links import REPORT_TICKS
 from gridpeers.wire.messages import PLANT, Measurement, Prepare, Ready, State, Waiting
 from gridpeers.wire.post import Post
-from gridpeers.wire.tick_policy import WAIT, Verdict
+from gridpeers.wire.tick_policy import WAIT, TickVerdict
 from gridpeers.wire.timing import Awaited, TickBarrier, time_of
 
 CLOSING = 2.0
@@ -87,11 +87,11 @@ class AgentBarrier:
     def plant_waits(self, message: Waiting | Prepare, now: float) -> None:
         self._waits.renew(now)
 
-    def gone(self, name: str) -> Verdict:
+    def gone(self, name: str) -> TickVerdict:
         """Note that a process is gone: nothing of it is waited for."""
         if name == PLANT:
             tick = "" if self._tick is None else f" at tick {self._tick}"
-            return Verdict("break", f"{self._post.name}: the plant is gone{tick}; the run has ended")
+            return TickVerdict("break", f"{self._post.name}: the plant is gone{tick}; the run has ended")
         self._waits.awaited.pop(name, None)
         return WAIT
 
@@ -148,10 +148,12 @@ class AgentBarrier:
         missing = self._waits.missing_messages()  # without a measurement, the states do not matter yet
         return missing[:1] if PLANT in self._waits.awaited else missing
 
-    def passed(self, now: float, unmet: tuple[Awaited, ...] = ()) -> Verdict:
+    def passed(self, now: float, unmet: tuple[Awaited, ...] = ()) -> TickVerdict:
         if not self._waits.is_over(now):
             return WAIT
-        return Verdict("over") if self._leaving else Verdict("break", self._waits.complaint(self.missing(), now))
+        return (
+            TickVerdict("over") if self._leaving else TickVerdict("break", self._waits.complaint(self.missing(), now))
+        )
 
     def decide(
         self, agent: Agent, measurement: Measurement | None, decisions: DecisionJournal | None, now: float

@@ -34,7 +34,7 @@ from gridpeers.wire.messages import PLANT, Measurement, Prepare, State, Waiting
 from gridpeers.wire.node import CLOCK_ALONE
 from gridpeers.wire.phases import Phases
 from gridpeers.wire.post import Post
-from gridpeers.wire.tick_policy import WAIT, Verdict
+from gridpeers.wire.tick_policy import WAIT, TickVerdict
 from gridpeers.wire.timing import Awaited, Timer
 
 EARLIEST, LATEST = 0.25, 0.75
@@ -143,10 +143,10 @@ class AgentTimer:
         if isinstance(message, Waiting):
             self.missing_agents = message.waits_for
 
-    def gone(self, name: str) -> Verdict:
+    def gone(self, name: str) -> TickVerdict:
         """Note that a process is gone."""
         if name == PLANT:
-            return Verdict("wait", "the plant is gone; holds, and seeks it again")
+            return TickVerdict("wait", "the plant is gone; holds, and seeks it again")
         self.heard.states.pop(name, None)
         self.health.forget(name)
         return WAIT
@@ -175,22 +175,22 @@ class AgentTimer:
         """Nothing: a tick does without what has not come."""
         return ()
 
-    def passed(self, now: float, unmet: tuple[Awaited, ...] = ()) -> Verdict:
+    def passed(self, now: float, unmet: tuple[Awaited, ...] = ()) -> TickVerdict:
         late = now - self._ticks.due
         skipped = self._ticks.take(now)
         self.at = now * self.config.speed
         if self._leaving:
             self._left += 1
-            return Verdict("over") if self._left * self._ticks.period >= LEAVING else WAIT
+            return TickVerdict("over") if self._left * self._ticks.period >= LEAVING else WAIT
         config = self.config
         if self._give_up is not None and now >= self._give_up:
-            return Verdict("break", f"{config.name}: no plant of run {config.run} within {config.deadline:g} s")
+            return TickVerdict("break", f"{config.name}: no plant of run {config.run} within {config.deadline:g} s")
         if self.phases.now != "running":
-            return Verdict("tick")
+            return TickVerdict("tick")
         self.missed += skipped
         self.lateness = max(self.lateness, late)
         too_late = late * config.speed > config.max_age
-        return Verdict("tick", f"woken {late:.2f} s late; waits for news" if too_late else "")
+        return TickVerdict("tick", f"woken {late:.2f} s late; waits for news" if too_late else "")
 
     def decide(
         self, agent: Agent, measurement: Measurement | None, decisions: DecisionJournal | None, now: float

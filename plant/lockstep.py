@@ -27,7 +27,7 @@ from gridpeers.wire.links import REPORT_TICKS
 from gridpeers.wire.messages import PLANT, Prepare, Ready, State
 from gridpeers.wire.phases import Phases
 from gridpeers.wire.post import Post, Route
-from gridpeers.wire.tick_policy import WAIT, Verdict
+from gridpeers.wire.tick_policy import WAIT, TickVerdict
 from gridpeers.wire.timing import Awaited, TickBarrier
 
 _TICKS = frozenset({"preparing", "running", "joining", "holding"})
@@ -74,7 +74,7 @@ class LockstepBarrier:
     def missing(self) -> tuple[Awaited, ...]:
         return self.waits.missing_messages()
 
-    def passed(self, now: float, unmet: tuple[Awaited, ...] = ()) -> Verdict:
+    def passed(self, now: float, unmet: tuple[Awaited, ...] = ()) -> TickVerdict:
         """Judge a deadline; `unmet`: tokens and nameplates that the roster waits for."""
         if not self.waits.is_over(now):
             return WAIT
@@ -83,8 +83,8 @@ class LockstepBarrier:
             return WAIT
         missing = unmet or self.missing()
         if not missing:  # the last awaited message has just arrived, or the run ends
-            return Verdict("over")
-        return Verdict("break", self.waits.complaint(missing, now))
+            return TickVerdict("over")
+        return TickVerdict("break", self.waits.complaint(missing, now))
 
     def heard(self, now: float) -> None:
         """Return None: agents know from the roster whom the plant hears."""

@@ -8,7 +8,7 @@ from gridpeers.wire.messages import State
 from gridpeers.wire.timing import Awaited
 
 
-class Verdict(NamedTuple):
+class TickVerdict(NamedTuple):
     """What follows from a deadline that has passed."""
 
     kind: Literal["wait", "over", "tick", "break"]
@@ -18,7 +18,7 @@ class Verdict(NamedTuple):
     warnings: tuple[str, ...] = ()
 
 
-WAIT = Verdict("wait")
+WAIT = TickVerdict("wait")
 
 
 class TickPolicy(Protocol):
@@ -37,5 +37,5 @@ class TickPolicy(Protocol):
     def missing(self) -> tuple[Awaited, ...]:
         """Return the messages without which the tick is not due, and their senders."""
 
-    def passed(self, now: float, unmet: tuple[Awaited, ...] = ()) -> Verdict:
+    def passed(self, now: float, unmet: tuple[Awaited, ...] = ()) -> TickVerdict:
         """Judge a deadline that may have passed; `unmet`: tokens and nameplates that the node waits for."""

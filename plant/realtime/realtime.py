@@ -24,7 +24,7 @@ from gridpeers.wire.messages import AgentStatus, Leave, LinkAcknowledgement, Pac
 from gridpeers.wire.node import CLOCK_ALONE
 from gridpeers.wire.phases import Phases
 from gridpeers.wire.post import Post, Route
-from gridpeers.wire.tick_policy import WAIT, Verdict
+from gridpeers.wire.tick_policy import WAIT, TickVerdict
 from gridpeers.wire.timing import Awaited, RateLimit
 
 # times in s, wall
@@ -87,12 +87,12 @@ class RealtimeTimer:
     def missing(self) -> tuple[Awaited, ...]:
         return ()
 
-    def passed(self, now: float, unmet: tuple[Awaited, ...] = ()) -> Verdict:
+    def passed(self, now: float, unmet: tuple[Awaited, ...] = ()) -> TickVerdict:
         """Judge a deadline: a due tick, whatever is missing, or the end of a wait."""
         if self._phases.now != "running":
-            return WAIT if now < self._until else Verdict("over")
+            return WAIT if now < self._until else TickVerdict("over")
         if self._stepper.at_end:
-            return Verdict("tick")
+            return TickVerdict("tick")
         warnings, slipped, speed = list[str](), self.pacer.note(now), self._config.speed
         if slipped:
             warnings.append(f"fell {slipped:.3f} s of wall time behind; all later steps are put off by as much")
@@ -101,8 +101,8 @@ class RealtimeTimer:
             warnings.append(f"cannot keep pace at speed {speed:g}: {self.pacer}; give it a lower speed or more cores")
         told = tuple(line for each in warnings if (line := self._warnings.admit(each, now)) is not None)
         if fails and self._config.strict:
-            return Verdict("break", f"plant: {warnings[-1]}", told)
-        return Verdict("tick", warnings=told)
+            return TickVerdict("break", f"plant: {warnings[-1]}", told)
+        return TickVerdict("tick", warnings=told)
 
     def measured(self, names: Iterable[str], now: float) -> None:
         """Let the plant advance: the measurements of a tick are out."""
