@@ -164,7 +164,9 @@ class Campaign:
             if passed or failed:
                 first = f"run {failed[0]}" if failed else ""
                 yield f"{name:18} {passed + len(failed):7} {len(failed):9}  {first}".rstrip()
-        yield f"{self.violated} of {len(rows)} runs violated anything; {sum(row.trips for row in rows)} trips"
+        collapses = sum(bool(row.collapse) for row in rows)
+        beyond = f"; {collapses} with a collapse that no control prevents, and that lasts" if collapses else ""
+        yield f"{self.violated} of {len(rows)} runs violated anything; {sum(row.trips for row in rows)} trips{beyond}"
         for name, (found, simplest, file) in self.failures.items():
             # of the run as found if the simplest one passes the next time
             yield f"{name}, run {found.number}: {simplest.violated.get(name, found.violated[name])}"
@@ -191,7 +193,7 @@ class Campaign:
         table = csv.writer(text, lineterminator="\n")
         table.writerow(COLUMNS)
         for _, row in sorted(self.rows.items()):
-            why = [*(row.violated[it] for it in sorted(row.violated)), row.unsettled]
+            why = [*(row.violated[it] for it in sorted(row.violated)), row.collapse, row.unsettled]
             table.writerow(
                 (
                     *(row.number, seed_of(self.seed, row.number), row.status, " ".join(sorted(row.violated))),

@@ -19,7 +19,7 @@ import msgspec
 from msgspec.structs import replace
 
 from gridpeers.netem.schema.fault import Fault
-from gridpeers.netem.schema.netem import NodeFault
+from gridpeers.netem.schema.netem import Netem, NodeFault
 from gridpeers.netem.schema.partition import Partition
 from gridpeers.plant.equipment import Feeder, InverterRow
 from gridpeers.plant.equipment.connectivity import Connectivity
@@ -57,6 +57,9 @@ _AFTER: Mapping[str, Mapping[str, Any]] = {
     "rating": {"with_killed": False},
     "steady": {"after_s": WITHIN_S},
 }
+
+RESTORED = frozenset({*_AFTER, "oscillation", RETURNS})
+"""Checks of what control restores; the others hold whatever is done to a run."""
 
 _ALWAYS: Mapping[str, Mapping[str, Any]] = {"heal": {"within_s": REJOINED_S}, "oscillation": {"tail_s": 2.0}}
 
@@ -147,6 +150,11 @@ class ChaosBase:
         ends = [fault.from_s if fault.to_s is None else fault.to_s for fault in faults]
         return max([*ends, *(event.t_s for event in self.scenario.events)], default=0.0)
 
+    def without_faults(self) -> ChaosBase:
+        cases = {name: replace(case, netem=_faultless(case.netem)) for name, case in self.scenario.cases.items()}
+        scenario = replace(self.scenario, netem=_faultless(self.scenario.netem), cases=cases)
+        return self if scenario == self.scenario else ChaosBase(scenario, self.feeder)
+
     def changed_s(self, schedule: Schedule) -> float:
         return max([self.settled_s, *(disturbance.settled_s for disturbance in schedule)])
 
@@ -226,6 +234,10 @@ def merged_events(own: Iterable[Mapping[str, Any]], schedule: Schedule) -> list[
             elif key != "t_s":
                 event[key] = value
     return [found[t_s] for t_s in sorted(found)]
+
+
+def _faultless(netem: Netem) -> Netem:
+    return replace(netem, links=(), partitions=(), nodes=())
 
 
 _read_feeder = lru_cache(maxsize=8)(read_feeder)
