@@ -13,7 +13,7 @@ from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Real
 from gridpeers.plant.dynamics.kernel.model_pass import TERMINAL, THETA, F, W, parameters_of, state_of
 from gridpeers.plant.dynamics.kernel.second_order_step import FeedForward
 from gridpeers.plant.equipment import F_NOM
-from gridpeers.plant.inverters.inverter_model import InverterModel, Kind, Method, Rating
+from gridpeers.plant.inverters.inverter_model import InverterModel, Kind, Method, UnitRating
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,8 +38,8 @@ class Inverter:
         return 3.0 * self.S_b if self.single else self.S_b
 
     @property
-    def rating(self) -> Rating:
-        return Rating(self.S_3, self.V_b, self.m_p, self.m_q, self.f_nom)
+    def rating(self) -> UnitRating:
+        return UnitRating(self.S_3, self.V_b, self.m_p, self.m_q, self.f_nom)
 
 
 class Inverters:

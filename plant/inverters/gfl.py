@@ -20,9 +20,9 @@ from gridpeers.plant.inverters.inverter_model import (
     LimitOfP,
     LimitOfQ,
     Method,
-    Rating,
     Resistance,
     TimeConstant,
+    UnitRating,
     VoltVar,
     compiled,
     heun,
@@ -252,7 +252,7 @@ class Gfl(InverterModel, frozen=True, kw_only=True):
         x["w_i"] = x["w_i_B"] = x["w_i_C"] = w
         x["f_m"] = f
 
-    def constants(self, rating: Rating) -> dict[str, float | complex | bool]:
+    def constants(self, rating: UnitRating) -> dict[str, float | complex | bool]:
         return {
             "y_e": self._filter(rating),  # S, filter admittance also in the current-source form (unused there)
             "current_source": self.model == "current_source",
@@ -262,10 +262,10 @@ class Gfl(InverterModel, frozen=True, kw_only=True):
             "R_q": rating.m_q,  # pu voltage per pu
         }
 
-    def _filter(self, rating: Rating) -> complex:
+    def _filter(self, rating: UnitRating) -> complex:
         return 1.0 / (complex(self.R_f, self.X_f) * rating.V_b**2 / (rating.S_b / 3.0))
 
-    def admittance(self, rating: Rating) -> complex:
+    def admittance(self, rating: UnitRating) -> complex:
         return 0.0j if self.model == "current_source" else self._filter(rating)
 
     def feedback(self) -> complex | None:

@@ -79,7 +79,7 @@ def inject(g: Any, t: Any, E: float, theta: float) -> None:
     t.J_A, t.J_B, t.J_C = J_A, J_A * A120.conjugate(), J_A * A120
 
 
-class Rating(NamedTuple):
+class UnitRating(NamedTuple):
     """Nameplate of a unit; to a model every unit has three phases."""
 
     S_b: float  # VA, three phases
@@ -172,7 +172,7 @@ class InverterModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     def advance(g: Any, t: Any, x0: Any, x: Any, d: Any, h: float, second: bool) -> None:
         """Take one pass; compiled.
 
-        `g`: parameters and `Rating.constants`, y_f (S, the filter in the network), and what `constants` adds; `t`: in:
+        `g`: parameters, `UnitRating.constants`, y_f (S, filter in the network), and what `constants` adds; `t`: in:
         P_set, V_set, Q_set (pu), P, Q, V (pu: power, and mean voltage of the phases), V_A, V_B, V_C (V), I_A, I_B, I_C
         (A, out of the unit), of the last network solution; in and out: J_A, J_B, J_C (A); `x0`, `x`, `d`: states at the
         start of the step, present ones, and slopes of the first pass; `h`: length (s); `second`: whether this is the
@@ -192,18 +192,18 @@ class InverterModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     def locked(x: Any, w: float, f: float) -> None:
         """Set the states of a unit at rest that enters an island of another speed: w (rad/s), f (Hz)."""
 
-    def constants(self, rating: Rating) -> dict[str, float | complex | bool]:
+    def constants(self, rating: UnitRating) -> dict[str, float | complex | bool]:
         """Return further values for `g`; the types are the same for every unit."""
         return {}
 
-    def values(self, rating: Rating, y_f: complex) -> dict[str, Any]:
+    def values(self, rating: UnitRating, y_f: complex) -> dict[str, Any]:
         """Return all of `g`; `y_f`: admittance of the filter in the network (S)."""
         fields = {name: getattr(self, name) for name in self.__struct_fields__}
         given = {name: value for name, value in fields.items() if not isinstance(value, str | None)}
         numbers = {name: value if isinstance(value, bool) else float(value) for name, value in given.items()}
         return {**rating.constants(), "y_f": y_f, **numbers, **self.constants(rating)}
 
-    def admittance(self, rating: Rating) -> complex:
+    def admittance(self, rating: UnitRating) -> complex:
         """Return the filter's admittance (S) between internal and terminal voltage; 0 for a current source."""
         return 1.0 / (complex(self.R_f, self.X_f) * (rating.V_b**2 / (rating.S_b / 3.0)))
 

@@ -12,7 +12,7 @@ import msgspec
 
 from gridpeers.plant.inverters.gfl import Gfl
 from gridpeers.plant.inverters.gfm_droop import GfmDroop
-from gridpeers.plant.inverters.inverter_model import InverterModel, Kind, Rating
+from gridpeers.plant.inverters.inverter_model import InverterModel, Kind, UnitRating
 from gridpeers.plant.inverters.regfm_a1 import REGFM_A1, REGFM_A1_VFLAG0
 from gridpeers.plant.inverters.vsm import Vsm
 from gridpeers.wire.plugins.registry import ANYTHING, Registry, line_of, named
@@ -31,7 +31,7 @@ def _trial(model: type[InverterModel]) -> str:
     numbers = {"P_set": 0.5, "V_set": 1.0, "Q_set": 0.0, "P": 0.5, "Q": 0.1, "V": 1.0}
     t = SimpleNamespace(**numbers, **{f"{quantity}_{phase}": 200.0 + 0j for quantity in "VIJ" for phase in "ABC"})
     try:
-        g = SimpleNamespace(**model().values(Rating(1e5, 277.0, 0.01, 0.05, 60.0), 0.1 - 1j))
+        g = SimpleNamespace(**model().values(UnitRating(1e5, 277.0, 0.01, 0.05, 60.0), 0.1 - 1j))
         for second in (False, True):
             model.advance(g, t, copy(x), x, copy(x), 0.002, second)
     except ANYTHING as error:

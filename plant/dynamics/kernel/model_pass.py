@@ -18,7 +18,7 @@ from numba.extending import intrinsic, register_jitable
 
 from gridpeers.plant.dynamics.kernel.compiled import keep
 from gridpeers.plant.inverters import inverter_model
-from gridpeers.plant.inverters.inverter_model import COMPILED, InverterModel, Rating
+from gridpeers.plant.inverters.inverter_model import COMPILED, InverterModel, UnitRating
 
 TERMINAL = np.dtype(
     [
@@ -40,7 +40,7 @@ def state_of(model: type[InverterModel]) -> np.dtype[np.void]:
 @cache
 def parameters_of(model: type[InverterModel]) -> np.dtype[np.void]:
     """Return the record of a model's parameters: numbers and flags of its fields, and constants of its rating."""
-    values = model().values(Rating(1.0, 1.0, 1.0, 1.0, 1.0), 0.0j)
+    values = model().values(UnitRating(1.0, 1.0, 1.0, 1.0, 1.0), 0.0j)
     return np.dtype([(name, np.dtype(type(value))) for name, value in values.items()], align=True)
 
 
