@@ -242,11 +242,11 @@ class AgentNode:
     def _on_measurement(self, message: Measurement, payload: bytes, now: float) -> None:
         if message.to != self.name:
             raise RejectedError("unexpected", f"the measurement of {message.to}")
-        self.policy.granted(message, now)
+        is_due = self.policy.granted(message, now)
         at = message.t if self.upkeep is None else now * self._config.speed
         if self.admission.is_usable(self.heard.links, message, payload, at):
             self.heard.keep(message, at)
-        if self.policy.due(now) is not None:
+        if is_due:
             self._tick(now)
 
     def _on_state(self, state: State, payload: bytes, now: float) -> None:
@@ -269,7 +269,7 @@ class AgentNode:
             heard.keep(message, at)
         if PLANT not in self.admission.epochs:
             return  # what the dead plant said last would still look fresh
-        measured = heard.measured(at, self._config.max_age)
+        measured = heard.measurement if round(at - heard.measured_at, 9) <= self._config.max_age else None
         if measured is not None:
             if self.phases.now == "waiting":
                 self.phases.on("measured")

@@ -22,7 +22,8 @@ class Hearing:
         self.states: dict[str, tuple[State, float]] = {}
         """Last state of each neighbour, and when it came."""
         self.measurement: Measurement | None = None
-        self._measured_at = 0.0
+        self.measured_at = 0.0
+        """When the measurement came."""
 
     def keep(self, message: AnyMessage, at: float) -> None:
         """Use a message that came at this time."""
@@ -30,15 +31,11 @@ class Hearing:
             if self.agent.hear(message):
                 self.states[message.sender] = message, at
         elif type(message) is Measurement:
-            self.measurement, self._measured_at = message, at
+            self.measurement, self.measured_at = message, at
 
     @property
     def t(self) -> float:
         return 0.0 if self.measurement is None else self.measurement.t
-
-    def measured(self, at: float, max_age: float) -> Measurement | None:
-        """Return the own measurement if it arrived at most `max_age` (s) ago, else None."""
-        return None if round(at - self._measured_at, 9) > max_age else self.measurement
 
     def age(self, name: str, at: float) -> float:
         """Return the age of a neighbour's last state (s); infinite if there is none.

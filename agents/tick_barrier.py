@@ -105,8 +105,8 @@ class AgentBarrier:
             return self._tick or 0 if self._waits.awaited.keys().isdisjoint(self._neighbours) else None
         return None if self._grant is None or self._waits.awaited else self._tick
 
-    def granted(self, message: Measurement, now: float) -> None:
-        """Take a measurement as the grant of its tick; RejectedError if that is not the next."""
+    def granted(self, message: Measurement, now: float) -> bool:
+        """Take a measurement as the grant of its tick, return whether it is due; RejectedError if not the next."""
         if not self._meeting.ready:
             raise RejectedError("unexpected", "no roster has this process on it")
         if self._tick is None:
@@ -123,6 +123,7 @@ class AgentBarrier:
             for name in set(self._neighbours).difference(self._meeting.processes):
                 waits.awaited.pop(name, None)
         waits.deadline = now + waits.timeout
+        return self.due(now) is not None if self._leaving else not waits.awaited
 
     def counts(self, state: State, now: float) -> bool:
         """Whether a state enters the next tick: one of the tick before does; one of this tick waits for the next."""

@@ -157,12 +157,13 @@ class AgentTimer:
     def due(self, now: float) -> None:
         """No message makes a tick due."""
 
-    def granted(self, message: Measurement, now: float) -> None:
-        """Note a measurement off the wire; RejectedError if a later one has come."""
+    def granted(self, message: Measurement, now: float) -> bool:
+        """Note a measurement off the wire, for the next tick; RejectedError if a later one has come."""
         self.lost += self.post.admission.take(message)
         self.health.came(PLANT, now)
         self._ticks.measured(now)
         self.run_time, self.missing_agents = message.t, ()
+        return False
 
     def counts(self, state: State, now: float) -> bool:
         """Whether a state off the wire enters a tick; RejectedError if a later one has come."""

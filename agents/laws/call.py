@@ -43,7 +43,28 @@ def decide(law: Law, own: Own, neighbours: Sequence[Neighbour], T: float) -> Set
     except ANYTHING as error:
         raise LawError(f"step at t = {own.t:.6g} s raised {named(error)}") from error
     try:
-        return _within_limits(law, result, own)
+        if isinstance(result, Terms):
+            result = _summed(result, own)
+        if not isinstance(result, SetPoints):
+            text = f"step at t = {own.t:.6g} s returned {_shown(result)}; return SetPoints(P_set=..., V_set=...)"
+            raise LawError(text)
+        P_set, V_set, shared, send, terms = result
+        if not (type(P_set) is type(V_set) is float and isfinite(P_set) and isfinite(V_set)):
+            P_set, V_set = _number("P_set", P_set, own.t), _number("V_set", V_set, own.t)
+        elif (
+            shared is NOTHING_SHARED
+            and send is True
+            and law.P_set_min <= P_set <= law.P_set_max
+            and law.V_set_min <= V_set <= law.V_set_max
+        ):
+            return result
+        return SetPoints(
+            min(max(P_set, law.P_set_min), law.P_set_max),
+            min(max(V_set, law.V_set_min), law.V_set_max),
+            NOTHING_SHARED if shared is NOTHING_SHARED else _checked(shared, own.t),
+            bool(send),
+            terms,
+        )
     except LawError:
         raise
     except ANYTHING as error:  # the result of a law is foreign code too: its bool(), float() or items() may raise
@@ -59,30 +80,6 @@ def failed_at(law: Law, error: LawError, folder: str) -> str:
     if type(carried).__module__.startswith("gridpeers.agents.carriers."):
         return ""
     return line_of(carried.step, error, folder)
-
-
-def _within_limits(law: Law, result: Any, own: Own) -> SetPoints:
-    if isinstance(result, Terms):
-        result = _summed(result, own)
-    if not isinstance(result, SetPoints):
-        raise LawError(f"step at t = {own.t:.6g} s returned {_shown(result)}; return SetPoints(P_set=..., V_set=...)")
-    P_set, V_set, shared, send, terms = result
-    if not (type(P_set) is type(V_set) is float and isfinite(P_set) and isfinite(V_set)):
-        P_set, V_set = _number("P_set", P_set, own.t), _number("V_set", V_set, own.t)
-    elif (
-        shared is NOTHING_SHARED
-        and send is True
-        and law.P_set_min <= P_set <= law.P_set_max
-        and law.V_set_min <= V_set <= law.V_set_max
-    ):
-        return result
-    return SetPoints(
-        min(max(P_set, law.P_set_min), law.P_set_max),
-        min(max(V_set, law.V_set_min), law.V_set_max),
-        NOTHING_SHARED if shared is NOTHING_SHARED else _checked(shared, own.t),
-        bool(send),
-        terms,
-    )
 
 
 def _summed(terms: Terms, own: Own) -> SetPoints:

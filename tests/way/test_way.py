@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from tests.way.way import PAGE, files_of, page_with, table, way
 
-LIMITS = {"measurement": (14, 36), "to the neighbour": (11, 21), "to the plant": (10, 12)}
-"""Most files and most calls of each leg; the aim is 14 files and 25 calls."""
+LIMITS = {"measurement": (14, 25), "to the neighbour": (13, 24), "to the plant": (10, 12)}
+"""Most files and most calls of each leg."""
 
 
 def test_the_way_of_a_value_is_within_its_limits_and_on_the_page() -> None:

@@ -3,9 +3,10 @@
 The run is the paper's islanding, case IV, on the in-process bus, with its codec, nodes and plant, and an emulated fault
 on every link between agents. The value is the measurement of one agent at one tick without change of roster, and the
 state that answers it. On its way are, each once a leg, the functions of this repository that take, return or enclose
-it, and all that these call until it is handed on. Off it is what sees other agents' values alone, what happens once a
-tick for all (`advance`), and the driver that carries bytes (here a bus, between processes `wire/driver`). A
-comprehension belongs to its function; compiled code, the standard library and packages do not count.
+it, and all that these call until it is handed on; a law is one call, its `step`. Off it is what sees other agents'
+values alone, what happens once a tick for all (`advance`), and the driver that carries bytes (here a bus, between
+processes `wire/driver`). A comprehension belongs to its function; compiled code, the standard library and packages do
+not count.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from typing import Any
 
 from msgspec.structs import replace
 
+from gridpeers.agents.laws.law import Neighbour, Own
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.plant.build import start_plant
 from gridpeers.plant.feeder.plant import Plant
@@ -123,7 +125,7 @@ class Value:
         """Return whether a thing, or one in its collections, passes a test."""
         if isinstance(thing, dict):
             thing = tuple(thing.values())
-        if isinstance(thing, list | tuple) and not isinstance(thing, Reading):
+        if isinstance(thing, list | tuple) and not isinstance(thing, Reading | Own | Neighbour):
             return depth > 0 and any(self._in(each, test, depth - 1) for each in thing)
         return test(thing)
 
@@ -132,6 +134,8 @@ class Value:
             return (thing.P, thing.Q, thing.V, thing.f) == self._reading
         if isinstance(thing, Measurement | State):
             return thing in self.messages
+        if isinstance(thing, Own):  # the measurement, per unit
+            return True
         return (isinstance(thing, bytes) and thing in self._bytes) or (
             isinstance(thing, float) and thing in self._numbers
         )
@@ -146,13 +150,14 @@ class Value:
 
     def _is_of_others(self, call: Call) -> bool:
         return not self.passes(call) and self._in(
-            (call.arguments, call.result), lambda x: isinstance(x, Measurement | State)
+            (call.arguments, call.result), lambda x: isinstance(x, Measurement | State | Neighbour)
         )
 
     def part(self, call: Call, *, passes: bool = False) -> list[Call]:
         """Return, of a call and the calls within, those on the value's way, in order."""
         passes = (passes and not self._is_of_others(call)) or self.passes(call)
-        inner = [each for within in call.calls for each in self.part(within, passes=passes)]
+        within = () if call.name.endswith(".step") else call.calls
+        inner = [each for it in within for each in self.part(it, passes=passes)]
         return [call, *inner] if passes or inner else []
 
 
