@@ -15,6 +15,7 @@ What may be lost is asked again: for nameplates, and by the same `Prepare` for e
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import partial
 from math import inf
 from typing import cast
@@ -87,6 +88,7 @@ class PlantNode:
         if isinstance(self.ticks, RealtimeTimer):
             sender = LinkCommandSender(post, links, self.reports.publish)
             self.reports.pacing, self.reports.impaired = self.ticks.pacing, lambda: sender.impaired(stepper.t)
+            self.reports.omitted = self.ticks.warnings.left_out
             self.roster = RealtimeRoster(self.meeting, self.ticks, self.reports, sender)
             RunCommands(self, cast(LivePlant, plant), self.ticks, sender)
             state_keys = [keys.state, keys.set_points]
@@ -174,9 +176,7 @@ class PlantNode:
         if self._timed is not None:
             self._timed.woken(now)
         verdict = self.ticks.passed(now, self.roster.missing())
-        for text in verdict.warnings:
-            self.stepper.note("warning", PLANT, text)
-            self.post.say(text)
+        self._warn(verdict.warnings)
         if verdict.kind == "break":
             self.abort(verdict.reason, now)
         elif verdict.kind == "tick":
@@ -204,6 +204,11 @@ class PlantNode:
             self._phases.on("leave")
             self.post.closed = True
             self.feed.end()
+
+    def _warn(self, texts: Iterable[str]) -> None:
+        for text in texts:
+            self.stepper.note("warning", PLANT, text)
+            self.post.say(text)
 
     def _break_if_broken(self, now: float) -> None:
         if self.stepper.broken:
@@ -321,6 +326,7 @@ class PlantNode:
 
     def close(self, reason: str, now: float) -> None:
         """End the run: tell all nodes to close, and report once they have."""
+        self._warn(self.reports.omitted())
         if pacing := self.reports.pacing():
             self.post.say(f"ends: {reason}. {sentence(pacing, self.config.T_c / self.config.speed)}")
         if self._tick_traffic is not None:

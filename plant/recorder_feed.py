@@ -144,6 +144,7 @@ class RunReports:
     ) -> None:
         self.pacing: Callable[[], Pacing | None] = lambda: None
         self.impaired: Callable[[], tuple[str, ...]] = tuple
+        self.omitted: Callable[[], list[str]] = list  # takes out lines on the warnings that came too often
         self._post, self._stepper, self._feed = post, stepper, feed
         self._every, self._links_every = every
         self._live = live

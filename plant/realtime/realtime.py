@@ -52,7 +52,7 @@ class RealtimeTimer:
         self.again_at = self._until = 0.0
         self._measured = -1  # the last tick that was measured
         self._heard_at: dict[str, float] = {}  # when the last state of each agent came (s, driver's clock)
-        self._warnings = RateLimit(burst=5)
+        self.warnings = RateLimit(burst=5)
 
     @property
     def messages_needed(self) -> int:
@@ -99,7 +99,7 @@ class RealtimeTimer:
         fails = self.pacer.take_failure(of=self._stepper.end_tick)
         if fails:
             warnings.append(f"cannot keep pace at speed {speed:g}: {self.pacer}; give it a lower speed or more cores")
-        told = tuple(line for each in warnings if (line := self._warnings.admit(each, now)) is not None)
+        told = tuple(line for each in warnings if (line := self.warnings.admit(each, now)) is not None)
         if fails and self._config.strict:
             return TickVerdict("break", f"plant: {warnings[-1]}", told)
         return TickVerdict("tick", warnings=told)

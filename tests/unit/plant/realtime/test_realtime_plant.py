@@ -121,6 +121,19 @@ def test_far_behind_it_puts_its_schedule_off_and_says_how_much() -> None:
     assert lab.side.ticks.pacer.report().slipped == pytest.approx(3.0)
 
 
+def test_the_end_has_the_number_of_the_warnings_that_came_too_often() -> None:
+    """Of seven slips five are events of their own; the last warning of the run counts the others."""
+    lab = running()
+    for _ in range(7):
+        lab.step(1, delay=0.5)
+    lab.side.close("the run was ended by command", lab.now)
+    lab.do()
+    slips = [event.text for event in lab.events("warning") if "behind" in event.text]
+
+    assert len(slips) == 6
+    assert slips[-1].startswith("2 more of this kind left out, the last: fell 0.500 s of wall time behind")
+
+
 def test_a_plant_without_solution_breaks_the_run() -> None:
     """The cause is kept for the log, the outcome says it, agents are told."""
     config, _ = toy_configs(3, end=2.0, P_set0=1.5)
