@@ -357,5 +357,7 @@ class AgentNode:
         """Go on under another rule of control, in a replay that asks what would have been; see `Agent.taken_over`."""
         self._config, self._agent = config, self._agent.taken_over(config, law)
         self._agent.rejects = self.rejects
+        if self._decisions is not None:
+            self._decisions = DecisionJournal(self._agent, self._decisions.journal)
         if self.upkeep is not None:
             self.upkeep.change(config, self._agent)
