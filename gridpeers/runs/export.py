@@ -22,14 +22,15 @@ PACKAGES = {"parquet": "pyarrow", "feather": "pyarrow", "xlsx": "openpyxl"}
 """Packages of the extra `export` that a format needs."""
 
 SHEET = 1_048_575  # Rows of a sheet below its header
+LONGEST = 63  # Characters of a name in MATLAB (namelengthmax)
 
 
 def export(record: RunRecord, to: Format, folder: Path) -> list[Path]:
     """Write the tables of a record into a folder, and return the files: one for each table, or one for all.
 
-    Columns have the names of history.csv, events.csv and links.csv, with their units; what the law
-    declares to share has a table of its own, "shared". Raise RecordFileError if the
-    record has no rows, FolderError if a format cannot hold them, OSError if a file cannot be written.
+    Columns have the names of history.csv, events.csv and links.csv, with their units. Values that the law declares to
+    share have a table of their own, "shared". Raise RecordFileError if the record has no rows, FolderError if a format
+    cannot hold them, OSError if a file cannot be written.
     """
     emulated = any(counts.sent for counts in record.link_counts().values())
     if to == "csv":
@@ -95,6 +96,10 @@ def _mat(tables: dict[str, pd.DataFrame]) -> bytes:
         fields = [re.sub(r"^(?=[^A-Za-z])", "x", re.sub(r"\W", "_", column)) for column in table]
         if len(set(fields)) < len(fields):
             raise FolderError(f"{name}: in MATLAB two of its columns would have one name; use --to parquet or csv")
+        if len(longest := max(fields, key=len)) > LONGEST:
+            raise FolderError(
+                f"{name}: {longest} has {len(longest)} characters, a name in MATLAB {LONGEST}; use --to parquet or csv"
+            )
         columns = [table[column] for column in table]
         arrays = [it.to_numpy(it.dtype if it.dtype.kind in "fi" else "U") for it in columns]
         structs[name] = dict(zip(fields, arrays, strict=True))

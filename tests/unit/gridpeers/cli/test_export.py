@@ -128,6 +128,18 @@ def test_bad_input_is_one_line(
     assert re.search(complaint, " ".join(text.split()))
 
 
+def test_a_column_with_too_long_a_name_for_matlab_is_named(
+    run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Exit code 2, and the formats that take it; names of inverters have up to 64 characters."""
+    monkeypatch.setattr(export, "LONGEST", 10)
+
+    code, text = invoke("export", str(run / "IV"), "--to", "mat", "--out", str(tmp_path))
+
+    assert code == 2
+    assert re.search(r"history: inv1_P_set_W has 12 characters, .* use --to parquet or csv", " ".join(text.split()))
+
+
 def test_a_missing_package_is_named_with_its_extra(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Only some formats need one."""
     monkeypatch.setattr(usage.util, "find_spec", lambda name: None)
