@@ -73,7 +73,7 @@ class Centralised(Law):
             P_set, V_set, shared = of_omega[2] / own.m_p, 1.0 + of_E[2], {"omega": of_omega[2], "E": of_E[2]}
             return SetPoints(P_set, V_set, shared, True, partial(_terms_of_centre, own, of_omega, of_E))
         for other in neighbours:
-            if other.name == self.centre and "omega" in other.shared:
+            if other.name == self.centre and {"omega", "E"} <= other.shared.keys():
                 P_set, V_set = other.shared["omega"] / own.m_p, 1.0 + other.shared["E"]
                 terms = partial(_terms_of_correction, own, P_set, V_set, other.name)
                 return SetPoints(P_set, V_set, {"V": own.V}, True, terms)

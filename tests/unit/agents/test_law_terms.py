@@ -40,7 +40,9 @@ def owns(draw: st.DrawFn) -> Own:
 @st.composite
 def neighbours(draw: st.DrawFn, name: str) -> Neighbour:
     shared = draw(
-        st.sampled_from(({}, {"V": 1.02}, {"omega": 0.006, "E": 0.01}, {"V": 0.97, "omega": -0.001, "E": -0.02}))
+        st.sampled_from(
+            ({}, {"V": 1.02}, {"omega": 0.002}, {"omega": 0.006, "E": 0.01}, {"V": 0.97, "omega": -0.001, "E": -0.02})
+        )
     )
     return Neighbour(
         name=name, leader=draw(st.booleans()), age=draw(st.floats(0.0, 5.0)),
