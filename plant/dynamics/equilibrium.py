@@ -13,7 +13,7 @@ import numpy as np
 from gridpeers.plant.dynamics.circuit import PHASES, Circuit, PlantError, aligned_sum
 from gridpeers.plant.dynamics.inverters import Inverters
 from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Real
-from gridpeers.plant.dynamics.power_flow_at_rest import PowerFlow, solve_by_droop
+from gridpeers.plant.dynamics.power_flow_at_rest import InverterPowerFlow, solve_by_droop
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,7 +59,7 @@ def equilibrium(
             sources=np.concatenate([circuit.sources, nodes]),
             source_voltage=np.concatenate([circuit.source_voltage, at_swing]),
         )
-    flow = PowerFlow(held, units, swing)
+    flow = InverterPowerFlow(held, units, swing)
     J = np.zeros((n, 3), complex)
     on_droop, on_edge = np.ones(n, bool), np.zeros(n, bool)
     if V_set is None:
@@ -75,7 +75,7 @@ def equilibrium(
         in_filter = np.sum(V * np.conj(units.y_f[:, None] * V), axis=1)
         V_1 = aligned_sum(V) / 3.0
         J[swing] = np.conj((S + in_filter) / (3.0 * V_1))[swing, None] * PHASES
-        flow = PowerFlow(circuit, units, np.zeros(n, bool))
+        flow = InverterPowerFlow(circuit, units, np.zeros(n, bool))
         J, V = flow.solve(J, P, Q, swing)
 
     I_out = J - flow.y[:, None] * V

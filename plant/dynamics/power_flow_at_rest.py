@@ -25,7 +25,7 @@ MOST_ROUNDS = 500  # rounds between network and inverters, within which the chan
 NEAR = 4  # rounds after which the voltages are near enough to the solution for a tangent that serves to the end
 
 
-class PowerFlow:
+class InverterPowerFlow:
     def __init__(self, circuit: Circuit, units: Inverters, held: Flags) -> None:
         # GFM filters stay in the network, because their EMF is balanced, not their current; a GFL is a pure current
         y = np.where(units.forming & ~held, units.y_f, 0.0)
@@ -158,7 +158,7 @@ MOST_PLACE_ROUNDS = 100  # rounds in which inverters may change their place at d
 
 
 def solve_by_droop(
-    flow: PowerFlow, J: Complex, P: Real, Q: Real, V_set: Real, swing: Flags
+    flow: InverterPowerFlow, J: Complex, P: Real, Q: Real, V_set: Real, swing: Flags
 ) -> tuple[Complex, Complex, Real, Flags, Flags]:
     """Find the Q (pu) that each characteristic gives at its terminal's voltage; J and Q are first guesses.
 
@@ -189,7 +189,14 @@ def solve_by_droop(
 
 
 def _at_places(
-    flow: PowerFlow, J: Complex, P: Real, Q: Real, at_rest: VoltVarAtRest, place: Integers, free: Integers, swing: Flags
+    flow: InverterPowerFlow,
+    J: Complex,
+    P: Real,
+    Q: Real,
+    at_rest: VoltVarAtRest,
+    place: Integers,
+    free: Integers,
+    swing: Flags,
 ) -> tuple[Complex, Complex, Real]:
     if not free.size:  # swings alone: they hold their voltage, and nothing is left to find
         return *flow.solve(J, P, Q, swing), Q

@@ -15,7 +15,7 @@ import numpy as np
 
 from gridpeers.plant.dynamics.circuit import PHASES, Circuit
 from gridpeers.plant.dynamics.inverters import Inverters
-from gridpeers.plant.dynamics.power_flow_at_rest import PowerFlow
+from gridpeers.plant.dynamics.power_flow_at_rest import InverterPowerFlow
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.equipment.named_loads import with_powers
 from gridpeers.plant.feeder.circuits import circuit_of
@@ -109,9 +109,9 @@ class IslandPowerFlow:
             network = network.with_loads(with_powers(network.feeder, dict(state.powers)))
         return circuit_of(network, state.closed, network.loads())
 
-    def _flow_in(self, state: NetworkState, online: tuple[bool, ...]) -> tuple[PowerFlow, Inverters]:
+    def _flow_in(self, state: NetworkState, online: tuple[bool, ...]) -> tuple[InverterPowerFlow, Inverters]:
         units = Inverters(self._units, list(online))
-        return PowerFlow(self._circuit(state), units, np.zeros(len(units), bool)), units
+        return InverterPowerFlow(self._circuit(state), units, np.zeros(len(units), bool)), units
 
 
 _latest: list[tuple[Feeder, tuple[str, ...], PlantSettings, IslandPowerFlow]] = []

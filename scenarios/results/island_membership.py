@@ -60,7 +60,7 @@ def is_closed(event: PlantEvent) -> bool:
     return " closed" in event.text if event.closed is None else event.closed
 
 
-class Island(NamedTuple):
+class RecordedIsland(NamedTuple):
     """An island with inverters in it."""
 
     inverters: tuple[str, ...]
@@ -69,7 +69,7 @@ class Island(NamedTuple):
     """True if the substation is part of it."""
 
 
-Islands = Mapping[str, Island]  # Islands by name: that of the first inverter
+Islands = Mapping[str, RecordedIsland]  # Islands by name: that of the first inverter
 
 
 class IslandInterval(NamedTuple):
@@ -111,7 +111,7 @@ def _islands(feeder: Feeder, inverters: Sequence[str], closed: frozenset[str]) -
     members: dict[frozenset[str], list[str]] = {}
     for name in inverters:
         members.setdefault(around[bus_of[name]], []).append(name)
-    return {names[0]: Island(tuple(names), source in buses) for buses, names in members.items()}
+    return {names[0]: RecordedIsland(tuple(names), source in buses) for buses, names in members.items()}
 
 
 def islands_at_end(intervals: Sequence[IslandInterval], window: Window) -> Islands:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 from gridpeers.scenarios.results.history import History, Nameplates
-from gridpeers.scenarios.results.island_membership import Island, IslandInterval, Islands
+from gridpeers.scenarios.results.island_membership import IslandInterval, Islands, RecordedIsland
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.scenarios.schema.configs import limits_of
 from gridpeers.scenarios.schema.participants import without_agent
@@ -64,7 +64,7 @@ class Drawing:
         title = self.titles.get(case, "")
         return f"{case}: {title}" if title else case
 
-    def island_title(self, island: Island) -> str:
+    def island_title(self, island: RecordedIsland) -> str:
         """Return a few words on an island: its microgrid if it lies in one, or its first inverter."""
         microgrids = {self.microgrid_of.get(name, "") for name in island.inverters}
         if len(microgrids) == 1 and (microgrid := microgrids.pop()):

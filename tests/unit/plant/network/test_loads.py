@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gridpeers.plant.dynamics.circuit import PlantError
 from gridpeers.plant.dynamics.inverters import Inverters
-from gridpeers.plant.dynamics.power_flow_at_rest import PowerFlow
+from gridpeers.plant.dynamics.power_flow_at_rest import InverterPowerFlow
 from gridpeers.plant.equipment import Bus, Feeder, Line, LineConfig, Load, Source, Switch
 from gridpeers.plant.equipment.imported_equipment import LinearElement
 from gridpeers.plant.network import Network, solve_power_flow
@@ -300,7 +300,7 @@ def exported(P: float) -> complex:
     y = 1.0 / (1j * REACTANCE * Z_B)
     Y = np.kron(np.array([[y, -y], [-y, y]]), np.eye(3))
     network = circuit(Y, [[3, 4, 5]], source=V_B * BALANCED)
-    flow = PowerFlow(network, Inverters((inverter(GFL_D),), [True]), np.zeros(1, bool))
+    flow = InverterPowerFlow(network, Inverters((inverter(GFL_D),), [True]), np.zeros(1, bool))
     V = flow.solve(np.zeros((1, 3), complex), np.array([P]), np.zeros(1), np.zeros(1, bool))[1]
     return complex(V[0, 0] / V_B)
 

@@ -14,7 +14,7 @@ from matplotlib.image import imread
 
 from gridpeers.plant.tables import read_feeder
 from gridpeers.scenarios.results.history import History, Nameplates
-from gridpeers.scenarios.results.island_membership import Island, IslandInterval
+from gridpeers.scenarios.results.island_membership import IslandInterval, RecordedIsland
 from gridpeers.scenarios.results.plots.drawing import Drawing, Mark
 from gridpeers.scenarios.results.plots.run_figures import draw, draw_all
 from gridpeers.scenarios.results.plots.style import GAP, LETTER, STYLES, Bounds, Format, from_zero, place_texts, save
@@ -151,7 +151,7 @@ def test_a_thousand_events_leave_the_curves_to_be_seen() -> None:
 def test_where_there_are_islands_the_worst_is_drawn() -> None:
     """Their mean hides what is wrong: here one is 0.03 Hz too fast, and the other two 0.015 Hz too slow."""
     it = drawing("IV")
-    islands = {f"inv{i}": Island((f"inv{i}", f"inv{i + 1}", f"inv{i + 2}"), False) for i in (1, 4, 7)}
+    islands = {f"inv{i}": RecordedIsland((f"inv{i}", f"inv{i + 1}", f"inv{i + 2}"), False) for i in (1, 4, 7)}
     history = it.histories["IV"]
     history.f[history.t > 4.0] = 60.0 + np.repeat([-0.015, 0.03, -0.015], 3)
     page = draw(replace(it, island_intervals={"IV": [IslandInterval(4.0, 7.0, islands)]}), "overview")
