@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gridpeers.plant.dynamics.circuit import aligned_sum
+from gridpeers.plant.dynamics.circuit import PlantError, aligned_sum
 from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Real
 from gridpeers.plant.dynamics.kernel.model_pass import TERMINAL, THETA, F, W, parameters_of, state_of
 from gridpeers.plant.dynamics.kernel.second_order_step import FeedForward
 from gridpeers.plant.equipment import F_NOM
 from gridpeers.plant.inverters.inverter_model import InverterModel, Kind, Method, UnitRating
+from gridpeers.wire.plugins.registry import ANYTHING, line_of, named
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,7 +133,12 @@ class Inverters:
         """Set a controller to rest at its present J, V and I, and the power and voltage (pu) that it measures."""
         self.state[i, W], self.state[i, F] = 0.0, self.f_nom
         own = self.constants(i), self.state_of(i)
-        self.units[i].parameters.rest(*own, self.V[i], self.I[i], self.J[i], S, v)
+        model = self.units[i].parameters
+        try:
+            model.rest(*own, self.V[i], self.I[i], self.J[i], S, v)
+        except ANYTHING as error:  # a model may be a user's own
+            where = f"{self.units[i].name}: rest of the inverter model {type(model).__name__} fails"
+            raise PlantError(f"{where}{line_of(model.rest, error)}: {named(error)}") from error
 
     def lock(self, i: int, w: float) -> None:
         """Let a controller at rest turn with an island (rad/s, relative to nominal) that it enters."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from copy import copy
 from functools import cache
+from inspect import getattr_static
 from types import SimpleNamespace
 from typing import Annotated, Any
 
@@ -43,7 +44,12 @@ def _trial(model: type[InverterModel]) -> str:
 def _objection(it: Any) -> str:
     if not (isinstance(it, type) and issubclass(it, InverterModel)):
         return "derive a class from gridpeers.InverterModel"
-    if missing := [name for name in ("advance", "rest") if getattr(it, name) is getattr(InverterModel, name)]:
+    own = {name: getattr_static(it, name) for name in ("advance", "rest")}
+    if missing := [
+        name
+        for name, found in own.items()
+        if not isinstance(found, staticmethod) or found is getattr_static(InverterModel, name)
+    ]:
         return f"it has no static method {missing[0]}; docs/inverter-models.md has the contract"
     if it.kind not in OURS:
         return f'its kind must be "GFM" or "GFL", got {it.kind!r}'

@@ -174,6 +174,7 @@ def test_what_is_wrong_with_a_model_is_said_at_its_key(tmp_path: Path) -> None:
         ("/ g.T_q", "/ g.T_x", "its pass fails (machine.py:23): AttributeError"),
         ("x.q = gp", "x.z = gp", "its pass sets z, which its STATES do not name"),
         ("def rest(", "def begin(", "it has no static method rest"),
+        ("    @staticmethod\n    def rest(", "    def rest(", "it has no static method rest"),
     ],
 )
 def test_a_pass_with_a_mistake_is_refused_with_its_line(tmp_path: Path, right: str, wrong: str, words: str) -> None:
@@ -184,6 +185,14 @@ def test_a_pass_with_a_mistake_is_refused_with_its_line(tmp_path: Path, right: s
     with pytest.raises(gp.ScenarioError) as error:
         gp.load(path)
     assert words in str(error.value)
+
+
+def test_a_start_with_a_mistake_names_the_inverter_and_the_line(tmp_path: Path) -> None:
+    path = scenario(tmp_path / "own", "machine:Machine", "machine:Machine")
+    (path.parent / "machine.py").write_text(OF_A_USER.replace('g["y_f"]', 'g["yf"]'))
+
+    with pytest.raises(gp.ScenarioError, match=r"inv1: rest of the inverter model Machine fails \(machine.py:34\)"):
+        gp.load(path).check()
 
 
 def test_predict_says_that_it_cannot(tmp_path: Path) -> None:
