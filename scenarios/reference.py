@@ -116,7 +116,9 @@ _INVERTER = """A class derived from gridpeers.InverterModel; `docs/inverter-mode
     class Mine(gridpeers.InverterModel):
         H: Annotated[float, Unit("s"), Plausible("an inertia constant", 0.01, 20.0), "Inertia."] = 0.1
         STATES: ClassVar = ("q",)
+        @staticmethod
         def advance(g, t, x0, x, d, h, second): ...
+        @staticmethod
         def rest(g, x, V, I, J, S, v): ...
 """
 
