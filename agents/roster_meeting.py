@@ -105,6 +105,8 @@ class RosterMeeting:
         processes = self._known.processes(message)
         if processes.get(self._post.name) != self._instance:
             raise RejectedError("unexpected", f"roster {message.seq} is without this process")
+        if not self._phases.allows("roster"):
+            raise RejectedError("unexpected", f"roster {message.seq}, but this agent leaves the run")
         self.roster, self.processes, self.ready, self._unproven = message, processes, False, None
         self._known.take(message)
         self._phases.on("roster")
@@ -143,8 +145,8 @@ class RosterMeeting:
         return True
 
     def _get_ready(self, now: float) -> None:
-        """Ask the in-neighbours of this roster for proof; be ready once nothing is missing."""
-        if self.roster is None or self.ready or self._unproven:
+        """Ask the in-neighbours of this roster for proof; be ready once nothing is missing, unless the agent leaves."""
+        if self.roster is None or self._unproven or not self._phases.allows("ready"):
             return
         if self._unproven is None:
             if self._known.unmet(self._post.name):

@@ -11,6 +11,7 @@ from gridpeers.agents.agent_config import Control, GraphRule
 from gridpeers.agents.agent_node import AgentNode
 from gridpeers.wire.codec import decode, encode
 from gridpeers.wire.keys import Keys
+from gridpeers.wire.links import Links
 from gridpeers.wire.messages import Measurement, Message, Nameplate, Prepare, Ready, State
 from gridpeers.wire.node import Fetch, Listen, Publish
 from tests.toy.toy_configs import agent_config
@@ -25,9 +26,9 @@ def nameplate(name: str, epoch: int = 1) -> Nameplate:
 class Lab:
     """inv1, whose process is "me"; the process of any other agent is its name, unless the test says otherwise."""
 
-    def __init__(self, graph: GraphRule = "full", **changes: Any) -> None:
+    def __init__(self, graph: GraphRule = "full", links: Links | None = None, **changes: Any) -> None:
         config = replace(agent_config("inv1", Control(secondary="all", graph=graph)), **changes)
-        self.node = AgentNode(config, "me")
+        self.node = AgentNode(config, "me", links)
         self.done: list[tuple[str, str]] = []
         """("listen", name), ("ask", process) and ("ready", number), in the order of the actions."""
         self.decided: list[State] = []

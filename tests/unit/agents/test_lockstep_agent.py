@@ -11,8 +11,12 @@ from hypothesis import strategies as st
 
 from gridpeers.agents.agent import Agent
 from gridpeers.agents.agent_config import Control, GraphRule
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.scenarios.emulation.emulated_links import EmulatedLinks
+from gridpeers.scenarios.emulation.link_data import EmulationConfig
+from gridpeers.wire.messages import Stop
 from tests.toy.toy_configs import agent_config
-from tests.unit.agents.lockstep_lab import Lab, nameplate, ticking
+from tests.unit.agents.lockstep_lab import KEYS, Lab, nameplate, ticking
 
 NAMES = ("inv1", "inv2", "inv3", "inv4")
 
@@ -47,6 +51,22 @@ def test_a_prepare_that_comes_again_is_answered_again() -> None:
     assert lab.node.rejects.counts == {}
     lab.measure(0)
     assert [state.seq for state in lab.decided] == [0]
+
+
+def test_who_leaves_gets_ready_for_no_roster() -> None:
+    """A run that breaks before its agents are ready: what was asked for is still on its way, and is no error."""
+    lab = Lab(links=EmulatedLinks("inv1", EmulationConfig(netem=Netem(), microgrids={"inv1": "mg1", "inv2": "mg1"})))
+    lab.token("inv2")
+    lab.prepare(0, "inv2")
+    lab.hear(KEYS.control, Stop(sender="plant", epoch=1, seq=0, t=0.0, reason="inv3 died before the run began"))
+    lab.take()
+    lab.answer("inv2")
+    lab.answer("inv2")
+    assert lab.node.rejects.counts == {}
+    lab.prepare(1, "inv2")
+
+    assert lab.node.rejects.counts == {"unexpected": 1}
+    assert ("ready", "0") not in lab.take()
 
 
 @pytest.mark.parametrize(
