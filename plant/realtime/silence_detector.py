@@ -95,6 +95,9 @@ class SilenceDetector:
                 yield name, f"{name} is silent: no state for {self._max_age:g} s, {why}"
             elif was and not agent.silent:
                 yield name, f"{name} is heard again"
+                for other in self._agents.values():  # its state is on the way to those that did not hear it
+                    if name in other.unheard:
+                        other.unheard[name] = self._clock + SETTLING
         for name, agent in self._agents.items():
             yield from self._take_unheard(name, agent)
 

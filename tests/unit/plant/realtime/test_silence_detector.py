@@ -127,8 +127,12 @@ def test_neighbours_of_a_frozen_agent_are_not_told_of_too() -> None:
     for seq, name in enumerate(("inv1", "inv3")):
         lab.hear(KEYS.status(name), status(name, {"inv2": 0.26}, seq))
     all_tick(lab, 60, ("inv1", "inv3"))
+    all_tick(lab, 2)  # it is back: its states are on their way to the others, too
+    for seq, name in enumerate(("inv1", "inv3"), 2):
+        lab.hear(KEYS.status(name), status(name, {"inv2": 0.0}, seq))
+    all_tick(lab, 20)
 
-    assert [text.split(":")[0] for _, text in told(lab)] == ["inv2 is silent"]
+    assert [text.split(",")[0].split(":")[0] for _, text in told(lab)] == ["inv2 is silent", "inv2 is heard again"]
 
 
 @pytest.mark.parametrize(("at", "why"), [(2, "nothing comes from it"), (90, "it says that it has no measurement")])
