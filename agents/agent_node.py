@@ -218,7 +218,7 @@ class AgentNode:
     def _follow(self, epoch: int) -> None:
         """Begin anew with another plant; one whose token was gone for a while goes on where it was."""
         if self._plant_epoch not in (0, epoch) and self.upkeep is not None:
-            self._hold("the plant has a new life; starts from what it measures")
+            self._hold("the plant restarted; starts from its measurement")
             self._ran = False
             self.upkeep.new_plant()
         self._plant_epoch = epoch
@@ -268,7 +268,7 @@ class AgentNode:
         for message in () if heard.links is None else self.admission.arrived(heard.links, at, self.rejects):
             heard.keep(message, at)
         if PLANT not in self.admission.epochs:
-            return  # what the dead plant said last would still look fresh
+            return  # the last measurement of a plant that is gone would still look fresh
         measured = heard.measurement if round(at - heard.measured_at, 9) <= self._config.max_age else None
         if measured is not None:
             if self.phases.now == "waiting":

@@ -1,4 +1,4 @@
-"""Whom an agent hears in real time, and how old the last word of each is. Pure."""
+"""The last messages that an agent has heard, with their ages; and the agents that it meets in real time. Pure."""
 
 from __future__ import annotations
 

@@ -39,6 +39,7 @@ class Timer:
         return self._start + self._n * self.period
 
     def take(self, now: float) -> int:
+        """Move on to the first due time after now; return how many due times between were missed."""
         past = max(0, int((now - self.due) / self.period))
         self._n += past + 1
         return past

@@ -1,8 +1,8 @@
 """The plant's messages for a recorder, in order and without gaps; when to ask for missing ones again. Pure.
 
 A recorder that stands still for longer than Zenoh's lease loses its link, and with it messages on the way. The plant
-publishes its latest messages again when asked by a `Command` (`gridpeers.plant.recorder_feed`). In simulated
-time the same question acknowledges all before its number (`gridpeers.plant.recorder_feed`).
+publishes its latest messages again when asked by a `Command` (`gridpeers.plant.recorder_feed`). In simulated time the
+same question acknowledges all before its number.
 """
 
 from __future__ import annotations

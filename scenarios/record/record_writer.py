@@ -198,8 +198,9 @@ class RecordWriter:
                 self._flush()
             self._written_at = monotonic()
             if not self._syncs and self._written_at - self._began > SYNC:  # a shorter run has no need of it
-                self._syncs, words = True, (self._file.descriptor(),)
-                threading.Thread(target=self._sync_all, args=words, name="sync", daemon=True).start()
+                self._syncs = True
+                descriptor = self._file.descriptor()
+                threading.Thread(target=self._sync_all, args=(descriptor,), name="sync", daemon=True).start()
         except OSError as error:
             self._fail(error)
 
