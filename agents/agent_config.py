@@ -14,7 +14,7 @@ from gridpeers.wire.schema.table_schema import NO_KEY, Below, Example, Plausible
 from gridpeers.wire.trust.credentials import Credentials
 
 MAX_AGE = 0.25
-"""Age (s of run time) of a state or a measurement beyond which it is not used in wall-clock time."""
+"""Age (s of run time) of a state or a measurement beyond which it is not used in real time."""
 
 
 class Gains(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -59,7 +59,7 @@ class DegradedCommunication(msgspec.Struct, frozen=True, forbid_unknown_fields=T
     T_age: Annotated[float, Unit("s"), Plausible("a time in which a state ages", 1e-3, 60.0, above_zero=True)] = 0.2
     """Time (s) in which the weight of an ageing state falls to 1/e, for "age-weighted"."""
     max_age: Annotated[float, Unit("s"), Plausible("the greatest age of a state", 0.0, 60.0)] = 0.0
-    """Age (s) beyond which a neighbour does not count at all. 0: none in simulated time, 0.25 s in wall-clock time."""
+    """Age (s) beyond which a neighbour does not count at all. 0: none in simulated time, 0.25 s in real time."""
     weights: Literal["paper", "degree-normalised"] = "paper"
     """Weights c_ij of the neighbours: 1 ("paper"), or 1 over their number ("degree-normalised")."""
     kappa_c: Annotated[float, Unit("1/s"), Plausible("gain kappa_c", 1e-3, 1e4, above_zero=True)] = 12.0
@@ -180,7 +180,7 @@ class AgentConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     """Control period (s)."""
     control: Control
     deadline: float
-    """Longest wait for any message (s). Wall-clock: for the plant's first sign of life; 0: no limit."""
+    """Longest wait for any message (s). Real time: for the plant's first sign of life; 0: no limit."""
     plant_wait: float = 0.0
     """Simulated time: longest wait (s) for the first sign of life of the plant, which may have to compile."""
     connect: tuple[str, ...]
@@ -194,15 +194,15 @@ class AgentConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     clock: Literal["simulated", "wall"] = "simulated"
     """Lock-step with the plant, or real time."""
     speed: float = 1.0
-    """Wall-clock: run time per wall time (s/s), > 0."""
+    """Real time: run time per wall time (s/s), > 0."""
     clock_rate: float = 1.0
-    """Rate of the agent's own clock: 1.0001 gains 100 ppm. Wall-clock: the agent ticks that much more often; simulated:
+    """Rate of the agent's own clock: 1.0001 gains 100 ppm. Real time: the agent ticks that much more often; simulated:
     it takes a period for that much longer."""
     links: dict[str, Any] = {}
     """Emulated links to this agent: `gridpeers.scenarios.emulation.link_data`, as a tree: agents know no netem.
     Empty: none."""
     max_age: float = MAX_AGE
-    """Age (s of run time) beyond which a measurement is not used; wall-clock: nor a neighbour's state."""
+    """Age (s of run time) beyond which a measurement is not used; real time: nor a neighbour's state."""
     record: RecordLevel = "physics"
     """How much this process notes in its journal, which a recorder gets."""
     credentials: Credentials | None = None

@@ -38,7 +38,7 @@ def run_agents(process: AgentProcess, make_links: MakeLinks = no_links) -> str:
 
     Agents of one process share a session; they are of one run, under one kind of time.
 
-    Raise ConfigurationError, SessionError if the configuration cannot work. In wall-clock time also if the plant
+    Raise ConfigurationError, SessionError if the configuration cannot work. In real time also if the plant
     refuses an agent, or there is none within the deadline.
     """
     configs = process if isinstance(process, tuple) else (process,)

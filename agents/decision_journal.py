@@ -67,7 +67,7 @@ class DecisionJournal:
         at: float,
         before: tuple[float, float] | None,
     ) -> None:
-        """Note a decision in wall-clock time.
+        """Note a decision in real time.
 
         `tick` and `measurement` are the numbers of the own state and measurement, `ages` (s of run time) those of the
         last states, infinite if none was heard and not used beyond `max_age`; `at` is the own clock (s, monotonic) and

@@ -115,7 +115,7 @@ GRAPHS: Registry[Any] = Registry(
 def check_graph(rule: Graph, members: Members, name: str) -> None:
     """Raise GraphError if a rule, by its name in the scenario, raises, or its result is no graph of these agents.
 
-    In a run a name that is no member is left out: in wall-clock time agents meet one after the other.
+    In a run a name that is no member is left out: in real time agents meet one after the other.
     """
     for one, heard in _evaluated(rule, members, name).items():
         if one not in members:

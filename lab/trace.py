@@ -39,7 +39,7 @@ def flows(record: RunRecord, since: float = 0.0, until: float = inf) -> list[Flo
 
     Of emulated links these are their verdicts, from the first one on. In simulated time a state arrives at a neighbour
     with the decision that can first use it, one period later or after its delay, and at the plant at once, like
-    measurements. In wall-clock time they arrive when the receiver noted them.
+    measurements. In real time they arrive when the receiver noted them.
     """
     found: dict[tuple[str, str, int, float], list[Flow]] = {}
     first: dict[tuple[str, str], float] = {}

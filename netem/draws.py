@@ -4,7 +4,7 @@ r"""Random numbers that are looked up, not drawn: a function of seed, link, purp
           h = \mathrm{BLAKE2b}_{64}(\text{seed}, \text{src}, \text{dst}, \text{purpose}; \text{seq}, \text{index})
 
 So an agent, a fault or a cut that is added changes no other fate, and a message has the same fate in simulated and in
-wall-clock time, seen by whatever process, in whatever order (Salmon et al.).
+real time, seen by whatever process, in whatever order (Salmon et al.).
 
 References
 ----------

@@ -1,7 +1,7 @@
 """All links into one receiver: messages are judged, delayed, and handed out when they are due. Pure.
 
 A driver calls `offer` for each message that has come and `due` when the time is; both take times as arguments (s of run
-time). `until` says when the next message is due, so that a wall-clock driver can sleep until then.
+time). `until` says when the next message is due, so that a driver in real time can sleep until then.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ class Receiver:
         """Judge a message, sent at `t` (s of run time) and here without faults at `at` (s, on the receiver's clock).
 
         `due` hands on the decoded `message` where there is one, so that nobody decodes it again. Messages that the
-        faults leave in order stay so: the way to this process, part of a wall-clock `at`, never makes one message
+        faults leave in order stay so: the way to this process, part of `at` in real time, never makes one message
         overtake another.
         """
         inbound = self._links.get(src) or self._link(src)

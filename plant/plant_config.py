@@ -143,7 +143,7 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     bridged: str | bool = False
     """Of older records: programs outside gave set-points to inverters without an agent."""
     T_c: float  # control period (s), a multiple of h
-    end: float | None  # duration of the run (s), a multiple of T_c; None, in wall-clock time: until a person ends it
+    end: float | None  # duration of the run (s), a multiple of T_c; None, in real time: until a person ends it
     record_step: float  # distance of the recorded rows (s): a multiple of h that divides T_c
     deadline: float  # longest wait for any agent (s)
     listen: tuple[str, ...]  # endpoints the plant listens on; the rendezvous of the run
@@ -154,12 +154,12 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     recorders: tuple[str, ...] = ()  # recorders of the telemetry that the plant waits for before tick 0
     epoch: int = 1  # epoch of this process; see `gridpeers.wire.membership`
     clock: Literal["simulated", "wall"] = "simulated"  # lock-step with the agents, or real time
-    speed: float = 1.0  # wall-clock: run time per wall time (s/s), > 0
-    max_age: float = 0.25  # wall-clock: age (s of run time) beyond which agents do not use a neighbour's state
-    wait_for_agents: float = 10.0  # wall-clock: longest wait (s) for the agents before the plant starts
-    strict: bool = False  # wall-clock: whether the run breaks when it cannot keep pace
-    agent_configs: dict[str, dict[str, Any]] = {}  # wall-clock: configurations of agents that join, by inverter
+    speed: float = 1.0  # real time: run time per wall time (s/s), > 0
+    max_age: float = 0.25  # real time: age (s of run time) beyond which agents do not use a neighbour's state
+    wait_for_agents: float = 10.0  # real time: longest wait (s) for the agents before the plant starts
+    strict: bool = False  # real time: whether the run breaks when it cannot keep pace
+    agent_configs: dict[str, dict[str, Any]] = {}  # real time: configurations of agents that join, by inverter
     record: RecordLevel = "physics"  # how much this process notes in its journal, which a recorder gets
     credentials: Credentials | None = None  # certificate of this process and members of its site; None: links are open
     on_law_failure: OnLawFailure = "droop"  # what follows when the law of an agent fails
-    feeder_map: dict[str, Any] = {}  # wall-clock: the one-line diagram, `scenarios.live.feeder_map`
+    feeder_map: dict[str, Any] = {}  # real time: the one-line diagram, `scenarios.live.feeder_map`

@@ -55,7 +55,7 @@ class PlantLike(Protocol):
 
 
 class LivePlant(PlantLike, Protocol):
-    """The further part that wall-clock time uses: switches that people operate, and loads that they set."""
+    """The further part that real time uses: switches that people operate, and loads that they set."""
 
     @property
     def switches(self) -> Mapping[str, bool]:

@@ -93,7 +93,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
         if outcome.pacing is not None:
             pacing[case] = outcome.pacing
             pace = sentence(outcome.pacing, scenario.time.T_c_s / request.speed)
-            notes.append(f"case {case}, wall-clock time at speed {request.speed:g}: {pace}")
+            notes.append(f"case {case}, real time at speed {request.speed:g}: {pace}")
         notes += [f"case {case}: {note}" for note in late_moves(scenario, recorded[case].events)]
         print(
             f"case {case}: start {outcome.start_s:.2f} s, run {outcome.run_s:.2f} s, {outcome.ticks} ticks",
@@ -116,7 +116,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
             one_case = replace(scenario, cases={case: scenario.cases[case]})
             compared[case] = compare(one_case, request.feeder, record.events, record.ended)
         notes += [f"case {case}: {one.note}" for case, one in compared.items() if one.note]
-        notes.append("in wall-clock time no two runs are the same: each has its own delays")
+        notes.append("in real time no two runs are the same: each has its own delays")
     facts = {}
     for case, record in recorded.items():
         unlike: dict[str, Any] = {}
@@ -136,7 +136,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
         from gridpeers.scenarios.results.history import as_they_came
         from gridpeers.scenarios.results.plots.drawing import drawing_of
 
-        last = recorded[list(recorded)[-1]]  # in wall-clock time each case has its own events
+        last = recorded[list(recorded)[-1]]  # in real time each case has its own events
         with drawn_on_all_cores(drawing_of(scenario, cases, as_they_came(scenario, last.events)), folder / "plots"):
             pass
     set_complete(folder)
@@ -219,7 +219,7 @@ def _configs(request: Request, case: str) -> tuple[PlantConfig, tuple[AgentConfi
     if request.clock == "simulated":
         return plant, agents
     if request.driver != "processes":
-        raise BrokenRunError("wall-clock time needs one process per agent: use the driver processes")
+        raise BrokenRunError("real time needs one process per agent: use the driver processes")
     clock, speed = request.clock, request.speed
     plant = replace(plant, clock=clock, speed=speed, strict=request.strict)
     return plant, tuple(replace(agent, clock=clock, speed=speed) for agent in agents)

@@ -52,7 +52,7 @@ class LawStopError(BrokenRunError):
 
 @dataclass(frozen=True, kw_only=True)
 class Request(RunMetrics):
-    """A run with its options; its folder is empty. Wall-clock time needs the driver "processes"."""
+    """A run with its options; its folder is empty. Real time needs the driver "processes"."""
 
     driver: Driver
     keys: str | Path | None = None
@@ -60,6 +60,6 @@ class Request(RunMetrics):
     processes: int = 0
     """Number of processes that agents share; 0 gives each agent its own. It decides no number."""
     strict: bool = False
-    """Wall-clock: the run breaks when the plant cannot keep pace."""
+    """Real time: the run breaks when the plant cannot keep pace."""
     lasting: bool = True
     """The folder stays; one that goes with the results of a notebook has no figures, and is not named."""

@@ -93,7 +93,7 @@ class PlantRows:
 
 
 GONE = 0.5
-"""Wall-clock: time (s) without a decision after which an agent counts as not there, if that is 2.5 control periods."""
+"""Real time: time (s) without a decision after which an agent counts as not there, if that is 2.5 control periods."""
 
 
 class AgentMoment(NamedTuple):

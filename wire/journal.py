@@ -135,12 +135,12 @@ class Decision(Entry, frozen=True, array_like=True, tag="decision"):
     tick: int
     """Number of the own state that came out."""
     measurement: int
-    """In simulated time the age of the own measurement in ticks, 0 without an emulated link; in wall-clock time its
+    """In simulated time the age of the own measurement in ticks, 0 without an emulated link; in real time its
     number."""
     neighbours: list[str]
     """In-neighbours by the graph, among those on the roster."""
     states: list[int | None]
-    """Last state that was heard of each: in simulated time its age in ticks, 1 without an emulated link; in wall-clock
+    """Last state that was heard of each: in simulated time its age in ticks, 1 without an emulated link; in real
     time its number. None if no state was heard."""
     unused: list[str]
     """Reason why the state of each was left out of the sums: "silent" (none was heard), "stale" (older than
@@ -338,7 +338,7 @@ class TickTraffic:
 
 
 class TimedTraffic:
-    """The messages and tokens of a node in wall-clock time, each with its time, in the order in which they came.
+    """The messages and tokens of a node in real time, each with its time, in the order in which they came.
 
     What went into the core is noted call by call, so that the core can be given the same again.
     Without `arrivals` only what the node sends is noted. With `whole` states are noted with their bytes, as by the

@@ -24,7 +24,7 @@ READING = ("status", "links", "telemetry")
 """Verbs of commands that change nothing: they have a key of their own, on which viewers may publish."""
 
 LATEST_ONLY = ("measurement", "state", "set_points", "status")
-"""Kinds of keys of which only the newest message matters: in wall-clock time a sender drops it rather than wait."""
+"""Kinds of keys of which only the newest message matters: in real time a sender drops it rather than wait."""
 
 
 ANY_ALIVE_PLANT = "gridpeers/*/alive/plant/*"
@@ -181,7 +181,7 @@ KEY_SPECS = (
     ),
     KeySpec(
         "stop_request/<inverter>/<instance>", "publication", "Stop", "plant", "the one instance",
-        "when its name is taken or is no inverter of the feeder; wall-clock: on `gridpeers stop`",
+        "when its name is taken or is no inverter of the feeder; real time: on `gridpeers stop`",
         _BY_PLANT, _BY_AGENT,
     ),
     KeySpec(
@@ -199,12 +199,12 @@ KEY_SPECS = (
     ),
     KeySpec(
         "set_points/<inverter>", "publication", "State", "agent", "plant",
-        "wall-clock: instead of state, at a tick at which the law sends nothing to the neighbours",
+        "real time: instead of state, at a tick at which the law sends nothing to the neighbours",
         _BY_AGENT, _BY_PLANT,
     ),
     KeySpec(
         "telemetry", "publication", "Telemetry, LinkReport, Journal, LinkRequest", "plant", "recorders",
-        "at tick 0, every tenth tick (wall-clock: every 0.2 s), and at the end", _BY_PLANT, _PEOPLE,
+        "at tick 0, every tenth tick (real time: every 0.2 s), and at the end", _BY_PLANT, _PEOPLE,
     ),
     KeySpec(
         "report/<inverter>", "publication", "LinkReport", "agent", "plant, which publishes it on telemetry",
@@ -212,50 +212,50 @@ KEY_SPECS = (
     ),
     KeySpec(
         "journal/<inverter>", "publication", "Journal", "agent", "plant, which publishes it on telemetry",
-        "in a recorded run: when the way in which the agent decides changes; wall-clock: every 0.2 s",
+        "in a recorded run: when the way in which the agent decides changes; real time: every 0.2 s",
         _BY_AGENT, _BY_PLANT,
     ),
     KeySpec(
         "link_request/<inverter>", "publication", "LinkRequest", "plant", "agent",
-        "wall-clock: at each link command, and all of them to an agent that joins; again "
+        "real time: at each link command, and all of them to an agent that joins; again "
         "every second, until it is acknowledged", _BY_PLANT, _BY_AGENT,
     ),
     KeySpec(
         "link_acknowledgement/<inverter>", "publication", "LinkAcknowledgement", "agent",
-        "plant, which publishes it on the client's key", "wall-clock: one for every LinkRequest, in their order",
+        "plant, which publishes it on the client's key", "real time: one for every LinkRequest, in their order",
         _BY_AGENT, _BY_PLANT,
     ),
     KeySpec(
         "leave/<inverter>", "publication", "Leave", "agent", "plant",
-        "wall-clock: when it leaves properly; the plant then takes its inverter off the network",
+        "real time: when it leaves properly; the plant then takes its inverter off the network",
         _BY_AGENT, _BY_PLANT,
     ),
     KeySpec(
         "status/<inverter>", "publication", "AgentStatus", "agent", "plant, watchers",
-        "wall-clock: every 0.5 s of wall time, and when its phase or its neighbours in use change",
+        "real time: every 0.5 s of wall time, and when its phase or its neighbours in use change",
         _BY_AGENT, _PEOPLE,
     ),
     KeySpec(
         "config/<inverter>", "queryable", "-", "plant", "an agent of a live run",
-        "wall-clock: asked once the plant's token is there; its AgentConfig as JSON", _BY_PLANT, ROLES,
+        "real time: asked once the plant's token is there; its AgentConfig as JSON", _BY_PLANT, ROLES,
     ),
     KeySpec(
         "feeder_map", "queryable", "-", "plant", "a client that draws the feeder",
-        "wall-clock: asked once the plant's token is there; buses, branches, switches, inverters as JSON",
+        "real time: asked once the plant's token is there; buses, branches, switches, inverters as JSON",
         _BY_PLANT, _PEOPLE,
     ),
     KeySpec(
         "command", "publication", "Command", "command line", "plant",
-        "wall-clock: once the plant's token is there, to change something", ("operator",), _BY_PLANT,
+        "real time: once the plant's token is there, to change something", ("operator",), _BY_PLANT,
     ),
     KeySpec(
         "request", "publication", "Command", "command line, recorder", "plant",
-        "wall-clock: once the plant's token is there, to learn something (status, links, telemetry); "
+        "real time: once the plant's token is there, to learn something (status, links, telemetry); "
         "simulated: by the recorder, after each Telemetry and every second", ROLES, _BY_PLANT,
     ),
     KeySpec(
         "answer/<id>", "publication", "Answer, LinkAcknowledgement", "plant", "the command line that asked",
-        "wall-clock: one Answer for every command; to a link command every LinkAcknowledgement, too; "
+        "real time: one Answer for every command; to a link command every LinkAcknowledgement, too; "
         "simulated: to a recorder that asks again", _BY_PLANT, ROLES,
     ),
 )  # fmt: skip

@@ -240,7 +240,7 @@ class Measurement(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw
     island: QuickNameOrNone
     """Name of the island: "grid", or the first inverter in it; `OFF` if the inverter is out of service."""
     roster: QuickNames | None = None
-    """In wall-clock time the agents that the plant hears, in the order of the inverters. None in simulated time, where
+    """In real time the agents that the plant hears, in the order of the inverters. None in simulated time, where
     the agents of a tick are those of the last `Prepare`."""
 
     def __post_init__(self) -> None:
@@ -274,16 +274,16 @@ class State(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=
     angle: Angle | None = None
     """Angle of the inverter at that measurement; only where agents tell islands apart by it."""
     idle: bool = False
-    """Whether the agent is idle: paused, or without a measurement. In wall-clock time it then sends nothing; in
+    """Whether the agent is idle: paused, or without a measurement. In real time it then sends nothing; in
     simulated time the tick waits for this state, which no neighbour uses."""
     shared: Shared = {}
     """Further values that the agent's law shares."""
     quiet: bool = False
     """Whether the law sends nothing to the neighbours: they keep its last state, the plant takes the set-points. In
-    wall-clock time such a state goes to the plant alone, under a key of its own; in simulated time it only grants the
+    real time such a state goes to the plant alone, under a key of its own; in simulated time it only grants the
     next tick."""
     skipped: Count = 0
-    """Quiet states since the last other one: no neighbour has missed those numbers. In wall-clock time only."""
+    """Quiet states since the last other one: no neighbour has missed those numbers. In real time only."""
     fault: Text = ""
     """Failure of the agent's law; from then on the agent is idle."""
 
@@ -327,7 +327,7 @@ class Stop(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=T
 
 
 class Leave(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
-    """Notice of a proper leave: the plant takes the inverter off the network (agent -> plant, wall-clock time)."""
+    """Notice of a proper leave: the plant takes the inverter off the network (agent -> plant, real time)."""
 
 
 class LinkReport(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
@@ -391,7 +391,7 @@ class LoadSetting(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
 
 
 class Command(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
-    """A command that a person gives the plant (command line -> plant, wall-clock time), or a recorder's question."""
+    """A command that a person gives the plant (command line -> plant, real time), or a recorder's question."""
 
     verb: Literal["open", "close", "synchronise", "load", "stop", "down", "status", "link", "links", "telemetry"]
     """Open or close a switch; close it if its sides are in step; set a load; let an agent leave; end the run; answer
@@ -427,7 +427,7 @@ class Answer(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only
 
 
 class AgentStatus(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
-    """Status of an agent (agent -> watchers, wall-clock time); `t` is its last measurement's."""
+    """Status of an agent (agent -> watchers, real time); `t` is its last measurement's."""
 
     phase: Literal["seeking", "waiting", "running"]
     """No plant found; plant found, but no fresh measurement; ticking."""
@@ -526,13 +526,13 @@ class Telemetry(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_o
     outcome: Text
     """Empty while running and after a clean end; else why the run broke."""
     reproducible: bool
-    """False once something unscripted (a dead agent) has entered the run; always false in wall-clock time."""
+    """False once something unscripted (a dead agent) has entered the run; always false in real time."""
     pacing: Pacing | None = None
-    """Delays of the plant's steps; only in wall-clock time."""
+    """Delays of the plant's steps; only in real time."""
     awaited: Names = ()
     """Agents that join now by the scenario: the process that runs the scenario starts them. Sent once."""
     impaired: Names = ()
-    """Agents whose links to the plant have an emulated fault now; only in wall-clock time."""
+    """Agents whose links to the plant have an emulated fault now; only in real time."""
     quiet: Annotated[tuple[tuple[Time, Count], ...], msgspec.Meta(max_length=2000)] = ()
     """Run time (s) of each tick, and its number of quiet states."""
     others: Count = 0

@@ -115,7 +115,7 @@ def changed_rule(record: RunRecord, changes: Changes) -> ChangedRule:
     if control != as_it_was and since > 0.0 and record.info.simulated:
         raise ReplayError(
             "in simulated time the law, its gains and the graph change from the start of the run only: leave the time "
-            "out, or take a record of a run in wall-clock time; links can change at any time"
+            "out, or take a record of a run in real time; links can change at any time"
         )
     written = after if netem == netem_before else _written(record, _with_links(after, case, netem))
     title = f"what would have been, {changes}" if changes else after.cases[case].title

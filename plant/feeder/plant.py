@@ -111,7 +111,7 @@ class Plant(RecordedPlant):
         self._events = self._islands.report_dead(0.0, self._switches.closed, self._dynamics.network.reduction)
         self._events += self._neutrals.report(0.0, self._switches.closed, self._dynamics)
         self._events += [hunting_event(units[i].name) for i in np.flatnonzero(point.on_edge).tolist()]
-        # the first scheduled networks are factored now: in wall-clock time an event must not be late
+        # the first scheduled networks are factored now: in real time an event must not be late
         for circuit in islice(self._foreseen(), KEPT - 1):
             self._dynamics.network.reduced(circuit)
 

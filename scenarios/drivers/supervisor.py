@@ -1,4 +1,4 @@
-"""The processes of a run: started, watched, and in wall-clock time killed and paused as the scenario says."""
+"""The processes of a run: started, watched, and in real time killed and paused as the scenario says."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ class EmulationConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
     microgrids: dict[str, str]
     """Microgrid of every inverter, spare ones too, in the order of their table."""
     real_nodes: bool = False
-    """Processes are really killed and paused, as in wall-clock time; else that is emulated."""
+    """Processes are really killed and paused, as in real time; else that is emulated."""
     keep_trace: bool = True
     """Every verdict is reported, not only their counts and their hash."""
 

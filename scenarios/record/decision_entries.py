@@ -1,7 +1,7 @@
 """The journal entries that say how agents decide: where each is in the file, and up to when the record has them.
 
 In simulated time an entry holds until the next one of its agent, which may be minutes away: one pass over the file
-notes the places of the entries. In wall-clock time each decision has its own entry.
+notes the places of the entries. In real time each decision has its own entry.
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ from gridpeers.wire.messages import AnyMessage, Journal, Measurement, State
 M = TypeVar("M", bound=AnyMessage)
 
 LATE = 2.0
-"""Longest time (s; of wall time in wall-clock runs) after which an entry of a journal may come into the record."""
+"""Longest time (s; of wall time in real time) after which an entry of a journal may come into the record."""
 
 
 @dataclass(frozen=True, kw_only=True)

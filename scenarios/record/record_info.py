@@ -49,7 +49,7 @@ class RecordInfo(msgspec.Struct, frozen=True, kw_only=True):
     )
     """Fields of the messages that journals have as lists of values."""
     started: str = ""
-    """Wall-clock time at which a run in real time was started, with its time zone; empty in simulated time, where the
+    """Date and time at which a run in real time was started, with its time zone; empty in simulated time, where the
     record does not depend on it."""
 
     @property

@@ -93,7 +93,7 @@ def _simulated(record: RunRecord, scenario: ScenarioModel, feeder: Feeder) -> _M
 
 
 def _live(record: RunRecord, scenario: ScenarioModel, feeder: Feeder) -> _Measured:
-    """Return what is measured of a run in wall-clock time: windows whose end it reached, those that people made too."""
+    """Return what is measured of a run in real time: windows whose end it reached, those that people made too."""
     history, events = record.physics(), record.events()
     end = float(history.t[-1])
     departures = compare(scenario, feeder, events, end)

@@ -27,7 +27,7 @@ RECORDED_DECISION = {"simulated": 75, "wall": 150}
 process) and 135 measured."""
 
 RECORDED_ARRIVAL, RECORDED_VERDICT = 9, 8
-"""Bytes of a message that arrives in wall-clock time, and of a verdict of an emulated link: 7.7 and 3 to 9 found."""
+"""Bytes of a message that arrives in real time, and of a verdict of an emulated link: 7.7 and 3 to 9 found."""
 
 LONG = 20_000_000  # Bytes from which on a run says its size before it starts
 HOUR = 3600.0  # Run time (s) for which a live run without an end says its size

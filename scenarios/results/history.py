@@ -185,7 +185,7 @@ def windows(events: Sequence[tuple[str, float]], end: float) -> tuple[Window, ..
 def as_they_came(scenario: ScenarioModel, recorded: Iterable[PlantEvent]) -> list[tuple[str, float]]:
     """Return label and time (s) of each event: the scenario's time, or that at which its last inverter moved.
 
-    In wall-clock time a process takes its time to start, and inverters join later than the scenario says.
+    In real time a process takes its time to start, and inverters join later than the scenario says.
     """
     moved = [(event.t, event.subject) for event in recorded if event.kind == "inverter"]
     ends = [*(event.t_s for event in scenario.events), scenario.time.end_s][1:]

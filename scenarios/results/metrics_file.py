@@ -37,7 +37,7 @@ class RunMetrics:
     folder: Path
     clock: Clock = "simulated"
     speed: float = 1.0
-    """Wall-clock: run time per wall time (s/s)."""
+    """Real time: run time per wall time (s/s)."""
 
 
 def case_facts(recorded: Recorded, pacing: Pacing | None = None, **more: Any) -> dict[str, Any]:

@@ -138,7 +138,7 @@ LATE = EmulationConfig(
 
 
 class LinkedAgentScene(RealtimeAgentScene):
-    """inv1 in wall-clock time, behind emulated links, with a journal."""
+    """inv1 in real time, behind emulated links, with a journal."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -79,7 +79,7 @@ def _comparable(action: Publish | Fetch | Listen | Log) -> object:
 
 
 class RealtimeAgentScene(Scene):
-    """inv1 in wall-clock time."""
+    """inv1 in real time."""
 
     def __init__(self) -> None:
         super().__init__(AgentNode(replace(agent_config("inv1"), clock="wall", epoch=EPOCH), "a"))
@@ -120,7 +120,7 @@ class AgentScene(Scene):
 
 
 class RealtimePlantScene(Scene):
-    """The toy plant in wall-clock time."""
+    """The toy plant in real time."""
 
     def __init__(self) -> None:
         config, _ = toy_configs(3, end=None)  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""A recorded run in wall-clock time whose clock is fake: one thread, no session, the same bytes every time.
+"""A recorded run in real time whose clock is fake: one thread, no session, the same bytes every time.
 
 The nodes are those of real processes, and are called as `gridpeers.wire.driver.drive` calls them. So what depends on
 lost and late messages, frozen agents and commands of people can be tested without a race.

@@ -45,7 +45,7 @@ loss = 0.1
 Clock = Literal["simulated", "one process", "wall"]
 
 CLOCKS: tuple[Clock, ...] = ("simulated", "one process", "wall")
-"""Kinds of runs: in simulated time with processes and without, and in wall-clock time."""
+"""Kinds of runs: in simulated time with processes and without, and in real time."""
 
 LATEST: dict[Clock, float] = {"simulated": 2.0, "one process": 0.6, "wall": 4.0}
 """Latest time (s) of a kill after the first row: some 30 s of run time, more of which would take minutes to be read."""

@@ -1,4 +1,4 @@
-"""A wall-clock run of real processes around the toy plant, and an observer who only waits for messages."""
+"""A run of real processes in real time around the toy plant, and an observer who only waits for messages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A Zenoh session, set up for lock-step or for wall-clock time; the only module that knows Zenoh.
+"""A Zenoh session, set up for lock-step or for real time; the only module that knows Zenoh.
 
 Zenoh's threads only enqueue into `Session.inbox`, and one thread, the owner's, takes the events out.
 """
@@ -67,7 +67,7 @@ class Session:
     does not listen `meets_all`: it connects to every peer, not only to those of lower id. `inbox` is that of a former
     session, which this one replaces.
 
-    A `rendezvous` is the peer to which others connect by its address. In wall-clock time any other peer becomes the
+    A `rendezvous` is the peer to which others connect by its address. In real time any other peer becomes the
     client of a router that answers: between two peers that know each other both directly and through a router, Zenoh
     changes the way of their declarations under way, and loses some. In a `star` the rendezvous relays all messages, as
     a router: then every other session is its client, with one link.
@@ -247,7 +247,7 @@ class Session:
         self._tokens.pop(key).undeclare()  # type: ignore[no-untyped-call]  # as zenoh declares it
 
     def publish(self, key: str, payload: bytes) -> None:
-        """Publish bytes on a key; block rather than drop, except in wall-clock time for keys of `LATEST_ONLY`."""
+        """Publish bytes on a key; block rather than drop, except in real time for keys of `LATEST_ONLY`."""
         publisher = self._publishers.get(key)
         if publisher is not None:
             publisher.put(payload)

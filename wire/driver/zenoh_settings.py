@@ -1,4 +1,4 @@
-"""Zenoh's settings for a session of a run, in lock-step and in wall-clock time. Pure.
+"""Zenoh's settings for a session of a run, in lock-step and in real time. Pure.
 
 `docs/protocol.md` has the measured reason of each setting.
 """

@@ -1,4 +1,4 @@
-"""Record the saved run in wall-clock time anew: `python -m tests.golden.records.pin`; see README.md beside it."""
+"""Record the saved run in real time anew: `python -m tests.golden.records.pin`; see README.md beside it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A record of a run in wall-clock time, saved once, is read and replayed by every later version."""
+"""A record of a run in real time, saved once, is read and replayed by every later version."""
 
 from __future__ import annotations
 

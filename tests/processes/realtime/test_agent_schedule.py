@@ -27,7 +27,7 @@ AWAY: Schedule = ((0.2, "inv2", "leave"), (0.3, "inv2", "join"))
 
 
 def run_of(folder: Path, schedule: Schedule, clock: str) -> tuple[ProcessRun, Outcome]:
-    """A short run of the toy in simulated or wall-clock time."""
+    """A short run of the toy in simulated or real time."""
     plant, agents = toy_configs(3, end=0.4 if clock == "simulated" else 3.0, schedule=schedule)
     run = ProcessRun(
         replace(plant, clock=clock),  # type: ignore[arg-type]

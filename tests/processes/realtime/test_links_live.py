@@ -1,4 +1,4 @@
-"""Emulated links in wall-clock time, with real processes: commanded while the run goes on, and as a scenario says."""
+"""Emulated links in real time, with real processes: commanded while the run goes on, and as a scenario says."""
 
 from __future__ import annotations
 

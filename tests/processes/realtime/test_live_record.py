@@ -1,4 +1,4 @@
-"""The record of runs in wall-clock time: what arrived when, what came of it, and what a dead process leaves behind."""
+"""The record of runs in real time: what arrived when, what came of it, and what a dead process leaves behind."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from tests.toy.toy_runs import TOY
 
 
 def recorded(folder: Path, plant: PlantConfig, agents: list[AgentConfig]) -> RunRecord:
-    """Run the toy in wall-clock time, and return its record."""
+    """Run the toy in real time, and return its record."""
     info = RecordInfo(
         level=plant.record,
         scenario="toy",

@@ -1,4 +1,4 @@
-"""Runs in wall-clock time, replayed: the same cores decide the same, and what would have been follows from it."""
+"""Runs in real time, replayed: the same cores decide the same, and what would have been follows from it."""
 
 from __future__ import annotations
 

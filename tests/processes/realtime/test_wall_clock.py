@@ -1,4 +1,4 @@
-"""Wall-clock time with real processes: people start, stop, kill and freeze agents and the plant. The plant is a toy.
+"""Real time with real processes: people start, stop, kill and freeze agents and the plant. The plant is a toy.
 
 Every wait is for a message, with a deadline.
 """
@@ -50,7 +50,7 @@ def settled(town: Town, of: tuple[int, ...] = (1, 2, 3)) -> Town:
 def test_a_frozen_agent_and_a_killed_one_are_out_and_in_again(tmp_path: Path) -> None:
     """SIGSTOP: neighbours drop it by age, long before its token is gone; SIGCONT: all use each other again.
 
-    Kill -9: reported, out of all sums, its inverter held; a new process of the name is a new life, and welcome.
+    Kill -9: reported, out of all sums, its inverter held; a new process of the name is welcome.
     """
     with Town(4, tmp_path).all() as town:
         settled(town)

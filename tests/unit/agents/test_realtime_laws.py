@@ -1,4 +1,4 @@
-"""Laws in wall-clock time: one that does not tell its neighbours, and one that fails."""
+"""Laws in real time: one that does not tell its neighbours, and one that fails."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Messages as flows, in wall-clock time and by the verdicts of emulated links."""
+"""Messages as flows, in real time and by the verdicts of emulated links."""
 
 from __future__ import annotations
 

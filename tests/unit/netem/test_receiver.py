@@ -154,7 +154,7 @@ def test_a_delay_of_whole_ticks_ends_at_that_tick() -> None:
 @steady
 @given(st.lists(st.floats(0.0, 0.015), min_size=20, max_size=20))
 def test_the_way_to_the_receiver_reorders_nothing_that_netem_leaves_in_order(jitter: list[float]) -> None:
-    """In wall-clock time the real way's jitter adds to netem's delays, and no message overtakes another by it."""
+    """In real time the real way's jitter adds to netem's delays, and no message overtakes another by it."""
     to = receiver(Fault(on="inv1 -> inv2", delay=Uniform(low_s=0.01, high_s=0.2, fifo=True)))
     at = 0.0
     for k in range(20):

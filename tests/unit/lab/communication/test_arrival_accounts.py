@@ -1,4 +1,4 @@
-"""The account of what arrives in wall-clock time: over joins, kills and freezes, and one message that is lost."""
+"""The account of what arrives in real time: over joins, kills and freezes, and one message that is lost."""
 
 from __future__ import annotations
 

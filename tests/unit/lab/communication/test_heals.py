@@ -1,4 +1,4 @@
-"""Heals in wall-clock time, where numbers of states have no gap while an agent stands still."""
+"""Heals in real time, where numbers of states have no gap while an agent stands still."""
 
 from __future__ import annotations
 

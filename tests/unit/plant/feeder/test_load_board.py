@@ -147,7 +147,7 @@ def test_switches_and_loads_of_one_step_change_at_once() -> None:
 
 
 def test_networks_of_scheduled_loads_are_factored_before_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    """In wall-clock time an event must not make its step late."""
+    """In real time an event must not make its step late."""
     factored: list[int] = []
     real = live_network.Reduction
 

@@ -125,7 +125,7 @@ def test_a_history_with_a_gap_is_no_history(tmp_path: Path) -> None:
 
 
 def test_a_gap_that_is_allowed_is_known_by_its_times(tmp_path: Path) -> None:
-    """In wall-clock time a recorder may be out of reach for too long: then it says which rows are missing."""
+    """In real time a recorder may be out of reach for too long: then it says which rows are missing."""
     with Recorder(tmp_path / "I", gaps=True) as recorder:
         recorder(telemetry(tuple(row(0.5 * k) for k in (0, 1, 2, 7, 8))))
         recorded = recorder.finish()
