@@ -341,10 +341,8 @@ class AgentNode:
         post, links = self.post, self.heard.links
         if not self._reported:
             self._reported = True
-            t, empty = (
-                (self.policy.t, links is not None) if isinstance(self.policy, AgentBarrier) else (self.heard.t, False)
-            )
-            post.send(self.keys.journal(self.name), *post.take_journal(t, empty=empty))
+            empty = links is not None and self.upkeep is None
+            post.send(self.keys.journal(self.name), *post.take_journal(self.policy.t, empty=empty))
             post.send(self.keys.report(self.name), *post.take_link_reports(links, instance=self._instance, last=True))
 
     def _end(self, *, stopped: str = "", failed: str = "") -> None:

@@ -27,7 +27,6 @@ from gridpeers.wire.trust.credentials import Credentials
 AgentProcess = AgentConfig | tuple[AgentConfig, ...]
 """Configuration of a process: one agent, or several."""
 
-
 OPENED_AGAIN, OPENED_WITHIN = 1.0, 60.0
 """Time (s) between two tries to open a session in place of a broken one, and time (s) for all of them: meanwhile keys
 are copied, or files closed."""

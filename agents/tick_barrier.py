@@ -152,9 +152,9 @@ class AgentBarrier:
     def passed(self, now: float, unmet: tuple[Awaited, ...] = ()) -> TickVerdict:
         if not self._waits.is_over(now):
             return WAIT
-        return (
-            TickVerdict("over") if self._leaving else TickVerdict("break", self._waits.complaint(self.missing(), now))
-        )
+        if self._leaving:
+            return TickVerdict("over")
+        return TickVerdict("break", self._waits.complaint(self.missing(), now))
 
     def decide(
         self, agent: Agent, measurement: Measurement | None, decisions: DecisionJournal | None, now: float

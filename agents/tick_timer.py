@@ -129,6 +129,11 @@ class AgentTimer:
     def deadline(self) -> float:
         return self._ticks.due
 
+    @property
+    def t(self) -> float:
+        """Run time (s) of the own measurement."""
+        return self.heard.t
+
     def start(self, now: float) -> None:
         self._ticks.start(now)
         if self.config.deadline > 0.0 and not self._plant_seen:
