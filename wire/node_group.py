@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
-from gridpeers.wire.node import Action, Core, Fetch, Listen, Log, Loss, Publish, WithdrawToken
+from gridpeers.wire.node import CLOCK_ALONE, Action, Core, Fetch, Listen, Log, Loss, Publish, WithdrawToken
 
 
 class GroupedNode(Core, Protocol):
@@ -90,7 +90,11 @@ class NodeGroup:
 
     @property
     def messages_needed(self) -> int:
-        return min(node.messages_needed for node in self._active)
+        least = CLOCK_ALONE
+        for node in self._active:  # each counts its awaited messages
+            if (least := min(least, node.messages_needed)) == 1:
+                break
+        return least
 
     @property
     def deadline(self) -> float | None:
