@@ -14,6 +14,7 @@ import numpy as np
 from gridpeers.agents.agent_config import SharedQuantity
 from gridpeers.scenarios.record.record_file import RecordFileError
 from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.results.case_tables import QUANTITIES
 from gridpeers.scenarios.results.history import Floats
 from gridpeers.scenarios.schema.plugin_keys import law_of
 from gridpeers.wire.messages import State
@@ -61,8 +62,9 @@ def shared_frame(record: RunRecord, name: str) -> pd.DataFrame:
     """
     shared = read_shared(record)
     if name not in shared:
-        known = suggestion(name, shared, "quantities") if shared else "no law shared anything"
-        raise RecordFileError(f'{record.path}: no state has a quantity "{name}"; {known}')
+        of_plant = [column.rpartition("_")[0] for column in QUANTITIES]
+        known = suggestion(name, (*of_plant, *shared), "quantities") + ("" if shared else "; no law shared anything")
+        raise RecordFileError(f'{record.path}: there is no quantity "{name}"; {known}')
     frame = _frame(shared[name])
     frame.index.name, frame.columns.name = "t", "inverter"
     frame.attrs["units"] = {"t": "s", name: _units(record).get(name, "")}

@@ -56,7 +56,7 @@ def test_a_shared_quantity_is_read_and_drawn_whatever_the_driver(
     assert list(Omega.index) == pytest.approx([1.02, 1.04, 1.06, 1.08])
     assert list(Omega.columns) == list(P_set.columns)
     assert result.plot("Omega").axes[0].get_ylabel() == "Omega (pu)"
-    with pytest.raises(RecordFileError, match='no state has a quantity "Omga"; did you mean "Omega"'):
+    with pytest.raises(RecordFileError, match='there is no quantity "Omga"; did you mean "Omega"'):
         result.quantity("Omga")
 
 
