@@ -22,6 +22,7 @@ from gridpeers.scenarios.versions import versions
 
 class Folders(NamedTuple):
     logs: Path
+    """Without `--out` a temporary folder, which the caller removes unless it has named a log there."""
     record: Path | None = None
     """For the files of the record, a folder in the run folder; None if nothing is recorded."""
     whole: Path | None = None
@@ -31,8 +32,7 @@ class Folders(NamedTuple):
 def folders(out: Path | None, scenario: ScenarioModel) -> Iterator[Folders]:
     """Make the folders of a run, as `--out` says; FolderError if the folder is not new, or cannot be written."""
     if out is None:
-        with tempfile.TemporaryDirectory(prefix="gridpeers-") as logs:
-            yield Folders(Path(logs))
+        yield Folders(Path(tempfile.mkdtemp(prefix="gridpeers-")))
         return
     whole = new_folder(out, scenario.name, datetime.now().astimezone())
     begun = "A live run begins with it; how long it lasted, and what people did, is in events.csv and run.mcap."

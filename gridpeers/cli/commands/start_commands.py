@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from shutil import rmtree
 from typing import Annotated
 
 import typer
@@ -126,6 +127,8 @@ def _start(start: Start, *, agents: bool) -> None:
             outcome = conclude(outcome, metrics)
         elif outcome.failed_laws:
             typer.secho(f"FAILED  {first_of(law_failures(outcome.failed_laws))}", fg="red", bold=True)
+    if kept.whole is None and not (agents and outcome.broke):  # what broke it names a log
+        rmtree(kept.logs, ignore_errors=True)
     stopped = ended_by_a_law(spec.on_law_failure, outcome.failed_laws)
     judged = bool(outcome.failed_laws) and judges_laws(spec)
     finish(outcome, law_failed=stopped or (judged and not outcome.broke))

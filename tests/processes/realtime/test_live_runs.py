@@ -7,6 +7,7 @@ import os
 import re
 import runpy
 import select
+import shutil
 import signal
 import subprocess
 import sys
@@ -177,6 +178,24 @@ def test_up_stays_until_it_is_ended_and_leaves_no_process(desk: Desk) -> None:
     early = metrics["cases"]["IV"]["early"]
     assert early["f_error_Hz"] is None  # 0.4 s after the event nothing is steady yet
     assert "last mean" in early["reasons"]["f_error_Hz"]
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds the children in /proc")
+def test_a_log_that_the_end_of_up_names_is_there(desk: Desk) -> None:
+    """Without `--out` logs are in a temporary folder, which stays if the plant dies."""
+    up = desk.open_bare("up", "calm.toml", "--run", "lab", "--listen", desk.options[-1])
+    up.expect("inv1 joined")
+    (plant,) = (
+        child
+        for child in children_of(up.pid)
+        if (Path("/proc") / str(child) / "cmdline").read_bytes().endswith(b"plant\0")
+    )
+    os.kill(plant, signal.SIGKILL)
+
+    assert up.end() == 3
+    log = Path(up.expect("Whole log: (.*plant.log)")[1])
+    assert log.exists()
+    shutil.rmtree(log.parent)
 
 
 def test_a_plant_and_an_agent_go_on_when_nobody_reads_their_log(desk: Desk) -> None:
