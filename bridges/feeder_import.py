@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from msgspec.structs import replace
 
-from gridpeers.plant.equipment import F_NOM, NODES, PHASES, Bus, Feeder, Source, Switch
+from gridpeers.plant.equipment import F_NOM, NODES, PHASES, Bus, Source, Switch, Tables
 from gridpeers.plant.equipment.connectivity import Connectivity, Node, by_bus, connected
 from gridpeers.plant.equipment.imported_equipment import BEHIND, LinearElement, LoadPart, bus_behind
 from gridpeers.plant.tables.feeder_columns import PART_CURRENT, power_of
@@ -145,7 +145,7 @@ class FeederImport:
         for name, text in refused.items():
             self.refuse(name, text)
 
-    def checked(self, program: str, remedy: str, node_name: Callable[[str], str], *, strict: bool) -> Feeder:
+    def checked(self, program: str, remedy: str, node_name: Callable[[str], str], *, strict: bool) -> Tables:
         """Return the feeder without what nothing can feed, checked as a network; FeederError has all problems.
 
         `remedy` says what to do where nothing determines a voltage to ground; `node_name` names a node by its letter
@@ -182,7 +182,7 @@ class FeederImport:
         self.raise_problems()
         return feeder
 
-    def _feeder(self) -> Feeder:
+    def _feeder(self) -> Tables:
         """Return the feeder of what was collected; its buses are those to which anything is connected."""
         used = {node for row in self.elements for node in row.nodes}
         used |= {(part.bus, p) for part in self.load_parts for p in part.ends}
@@ -197,7 +197,7 @@ class FeederImport:
                 V_nom, x, y = self.buses.get(name) or self.buses[like]
                 if phases := "".join(letter for letter in NODES if (name, letter) in used):
                     buses.append(Bus(name=name, phases=phases, V_nom=V_nom, x=x, y=y))
-        return Feeder(
+        return Tables(
             name=self.name,
             load_set="main",
             buses=tuple(buses),
@@ -301,7 +301,7 @@ def _idle(ends: Sequence[tuple[Node, ...]], supported: Collection[Node]) -> set[
     }
 
 
-def _named(feeder: Feeder, section: Collection[Node], node_name: Callable[[str], str]) -> tuple[str, str]:
+def _named(feeder: Tables, section: Collection[Node], node_name: Callable[[str], str]) -> tuple[str, str]:
     """Return the first bus of a section, and words for all of its buses."""
     nodes = [(bus.name, letter) for bus in feeder.buses for letter in bus.phases if (bus.name, letter) in section]
     buses = list(dict.fromkeys(bus for bus, _ in nodes))
@@ -309,7 +309,7 @@ def _named(feeder: Feeder, section: Collection[Node], node_name: Callable[[str],
     return buses[0], f"bus{'es' if len(buses) > 1 else ''} {first_of(buses, SHOWN_NAMES)} (first {first})"
 
 
-def difference(feeder: Feeder, theirs: Mapping[Node, complex]) -> tuple[float, Node]:
+def difference(feeder: Tables, theirs: Mapping[Node, complex]) -> tuple[float, Node]:
     """Return the largest difference (pu) between our voltages and another program's, `theirs` (V), and its node.
 
     ArithmeticError if our power flow does not converge.

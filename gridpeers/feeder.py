@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from msgspec.structs import replace
 
-from gridpeers.plant.equipment import NODES, PHASES, InverterRow
-from gridpeers.plant.equipment import Feeder as Tables
+from gridpeers.plant.equipment import NODES, PHASES, InverterRow, Tables
 from gridpeers.plant.equipment.imported_equipment import is_behind
 from gridpeers.plant.equipment.neutrals import neutral_for, neutrals_of
 from gridpeers.plant.inverters.inverter_model import InverterModel

@@ -27,7 +27,7 @@ from gridpeers.scenarios.results.metrics import mean_frequency as mean_frequency
 from gridpeers.scenarios.results.metrics import mean_voltage as mean_voltage
 
 if TYPE_CHECKING:
-    from gridpeers.plant.equipment import Feeder
+    from gridpeers.plant.equipment import Tables
     from gridpeers.scenarios.schema import ScenarioModel
 
 
@@ -39,7 +39,7 @@ def settling(history: History, nameplates: Nameplates, window: Window, f_nom: fl
     return metrics.settling(window.cut(history), nameplates, window, f_nom)
 
 
-def nameplates_of(spec: ScenarioModel, feeder: Feeder, case: str = "") -> Nameplates:
+def nameplates_of(spec: ScenarioModel, feeder: Tables, case: str = "") -> Nameplates:
     """Return the nameplates of a scenario's inverters, in the order of a record's columns.
 
     With a case, those without an agent in it are left out, as the sharing indices do.

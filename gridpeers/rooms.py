@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 from gridpeers.wire.plugins.registry import Registry
 
 if TYPE_CHECKING:
-    from gridpeers.plant.equipment import Feeder
+    from gridpeers.plant.equipment import Tables
 
 ROOMS: Registry[Any] = Registry("part of a room", "rooms", lambda it: "")
 """Functions, classes and modules by name."""
 
-READERS: Registry[Callable[..., Feeder]] = Registry(
+READERS: Registry[Callable[..., Tables]] = Registry(
     "reader of feeders", "feeder readers", lambda it: "" if callable(it) else "it cannot be called"
 )
 """Readers of feeders that were written for other programs, by the end of the file's name without its dot.

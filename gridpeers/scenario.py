@@ -16,7 +16,7 @@ from gridpeers.wire.wording import counted
 if TYPE_CHECKING:
     from typing import Unpack
 
-    from gridpeers.plant.equipment import Feeder
+    from gridpeers.plant.equipment import Tables
     from gridpeers.runs.result import Result, Results
     from gridpeers.runs.running import How
     from gridpeers.scenarios.run_request import Driver
@@ -183,7 +183,7 @@ class Scenario:
         return self._spec.events
 
     @property
-    def feeder(self) -> Feeder:
+    def feeder(self) -> Tables:
         """Tables of the feeder."""
         return self._feeder
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from gridpeers.plant.dynamics.kernel.compiled import is_compiled
 from gridpeers.plant.dynamics.kernel.step import run_steps
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 from gridpeers.plant.equipment.derived_feeders import changed
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.network import Network
@@ -37,7 +37,7 @@ def plant_at_rest(config: PlantConfig) -> Plant:
     return Plant(network, config.settings, config.T_c, config.record_step)
 
 
-def _feeder(config: PlantConfig) -> Feeder:
+def _feeder(config: PlantConfig) -> Tables:
     settings = config.settings
     return changed(read_feeder(settings.feeder, settings.load_set), settings.changes)
 

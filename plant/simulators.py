@@ -9,7 +9,7 @@ import msgspec
 from gridpeers.wire.plugins.registry import Registry
 
 if TYPE_CHECKING:
-    from gridpeers.plant.equipment import Feeder
+    from gridpeers.plant.equipment import Tables
     from gridpeers.plant.plant_config import PlantConfig
     from gridpeers.plant.plant_interface import LivePlant
 
@@ -26,11 +26,11 @@ class Simulator:
     table: ClassVar[type[msgspec.Struct] | None] = None
     """Its own table of a scenario, `[plant.NAME]`; a method `relations` returns what is wrong with the values."""
 
-    def start(self, config: PlantConfig, feeder: Feeder) -> LivePlant:
+    def start(self, config: PlantConfig, feeder: Tables) -> LivePlant:
         """Start the plant on a feeder with the scenario's changes; RuntimeError says why it cannot start."""
         raise NotImplementedError
 
-    def check(self, scenario: Any, feeder: Feeder, problems: Any) -> None:
+    def check(self, scenario: Any, feeder: Tables, problems: Any) -> None:
         """Note what a scenario asks for beyond this simulator.
 
         Types: `gridpeers.scenarios.schema.scenario_model.ScenarioModel`, and `Problems` beside it.

@@ -13,7 +13,7 @@ from math import cos, pi, sin
 
 from msgspec.structs import replace
 
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 from gridpeers.plant.tables import FeederError, read_feeder
 from gridpeers.rooms import ROOMS
 from gridpeers.scenarios.emulation.link_data import NO_MESSAGES
@@ -236,7 +236,7 @@ def _missing(record: RunRecord, *, has_feeder: bool) -> Iterator[str]:
         yield f"The feeder {info.plant.settings.feeder} is not here: its inverters stand in a ring."
 
 
-def feeder_of(info: RecordInfo) -> Feeder | None:
+def feeder_of(info: RecordInfo) -> Tables | None:
     """Return the feeder of a run; None if it is not here, or has other inverters now."""
     try:
         feeder = read_feeder(info.plant.settings.feeder, info.plant.settings.load_set)

@@ -22,7 +22,7 @@ from bench.validation.validation_part import CaseResult, ToleranceCheck, Validat
 from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.bridges.gridlabd.glm import write_tables
 from gridpeers.bridges.gridlabd.gridlabd_plant import GridlabdPlant
-from gridpeers.plant.equipment import Feeder, InverterRow
+from gridpeers.plant.equipment import InverterRow, Tables
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantConfig, SwitchEvent
@@ -83,7 +83,7 @@ def compare(run: ComparedRun, factor: float = 1.0) -> PlantDifferences:
     return PlantDifferences(t, {quantity: gaps[:, :, k] for k, quantity in enumerate(QUANTITIES)}, angles)
 
 
-def _started(ours: Plant, feeder: Feeder, run: ComparedRun, config: PlantConfig) -> GridlabdPlant:
+def _started(ours: Plant, feeder: Tables, run: ComparedRun, config: PlantConfig) -> GridlabdPlant:
     """Start GridLAB-D, from the shipped tables, or from tables with further inverters."""
     assert config.end is not None
     with tempfile.TemporaryDirectory() as folder:

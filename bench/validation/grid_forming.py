@@ -20,7 +20,7 @@ from bench.validation.validation_part import CaseResult, ToleranceCheck, Validat
 from bench.validation.write_opendss import LIMITS, write_opendss
 from gridpeers.plant.dynamics import Circuit, Dynamics, Inverter
 from gridpeers.plant.dynamics.circuit import aligned_sum
-from gridpeers.plant.equipment import Bus, Feeder, Source
+from gridpeers.plant.equipment import Bus, Source, Tables
 from gridpeers.plant.equipment.imported_equipment import LinearElement
 from gridpeers.plant.feeder.circuits import circuit_of
 from gridpeers.plant.inverters.gfm_droop import GfmDroop
@@ -65,7 +65,7 @@ Islanded snapshot; 1 s of dynamics from zero voltage; a zone is shed, 2 us later
 """
 
 
-def island_script(feeder: Feeder) -> str:
+def island_script(feeder: Tables) -> str:
     """Return the script, connected to the substation and with the storage idle.
 
     Loads become impedances below 0.85 pu, so that OpenDSS's start from zero voltage has solutions; in the states that
@@ -85,7 +85,7 @@ Solve
 """
 
 
-def behind_source(feeder: Feeder) -> Feeder:
+def behind_source(feeder: Tables) -> Tables:
     """Return our feeder, fed by 1 pu behind the storage's impedance instead of the substation."""
     V_nom = V_LL / sqrt(3.0)
     nodes = tuple((bus, phase) for bus in (EMF, BUS) for phase in "ABC")
@@ -96,7 +96,7 @@ def behind_source(feeder: Feeder) -> Feeder:
     return replace(feeder, buses=buses, elements=(link, _transformer(feeder)), inverters=(), source=source)
 
 
-def behind_inverter(feeder: Feeder) -> Feeder:
+def behind_inverter(feeder: Tables) -> Tables:
     """Return our feeder with a grid-forming inverter as the storage; the substation stays behind its switch."""
     V_nom = V_LL / sqrt(3.0)
     unit = inverter_row("gfm", "GFM", BUS, S_RATED, V_nom)
@@ -104,13 +104,13 @@ def behind_inverter(feeder: Feeder) -> Feeder:
     return replace(feeder, buses=buses, elements=(_transformer(feeder),), inverters=(unit,))
 
 
-def delivered(feeder: Feeder, V_low: NDArray[np.complex128], V_high: NDArray[np.complex128]) -> complex:
+def delivered(feeder: Tables, V_low: NDArray[np.complex128], V_high: NDArray[np.complex128]) -> complex:
     """Return the power into the transformer (VA) from the phasors at its two sides (V)."""
     Y = np.array(_transformer(feeder).Y)
     return complex(np.vdot((Y @ np.concatenate([V_low, V_high]))[:3], V_low))
 
 
-def _transformer(feeder: Feeder) -> LinearElement:
+def _transformer(feeder: Tables) -> LinearElement:
     """Return the transformer: winding k of the delta side is between phases k and k + 1."""
     V_nom = {bus.name: bus.V_nom for bus in feeder.buses}[AT]
     turns = V_LL / V_nom
@@ -145,7 +145,7 @@ ENGINE_STATE = {name: number for number, name in enumerate(CASES)}
 class GridFormingIsland:
     """Our island in the cases, beside an engine's voltages in `STATES`."""
 
-    def __init__(self, feeder: Feeder, theirs: SolvedStates) -> None:
+    def __init__(self, feeder: Tables, theirs: SolvedStates) -> None:
         self._feeder, self._theirs = feeder, theirs
         self.network = Network(behind_inverter(feeder))
         self._islanded = self.network.closed0 - {ISLANDING}

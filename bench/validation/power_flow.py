@@ -15,7 +15,7 @@ from bench.validation.opendss_engines import ENGINES, solve_scripts
 from bench.validation.validation_part import CaseResult, ToleranceCheck, ValidationPart
 from bench.validation.write_opendss import IDEAL_SOURCE, write_opendss
 from gridpeers.bridges.opendss import read_opendss
-from gridpeers.plant.equipment import PHASES, Feeder, Source
+from gridpeers.plant.equipment import PHASES, Source, Tables
 from gridpeers.plant.network import Network, solve_power_flow
 from gridpeers.plant.tables import read_feeder
 
@@ -28,7 +28,7 @@ class SwitchStates:
     a state has no operating point, and is left out.
     """
 
-    def __init__(self, feeder: Feeder) -> None:
+    def __init__(self, feeder: Tables) -> None:
         self._feeder = feeder
         assert feeder.source is not None
         self._substation = feeder.source.bus
@@ -135,13 +135,13 @@ def _run(case: str) -> CaseResult:
         return _switch_states(feeder, script) if case == SWITCH_STATES else _feeder(case, feeder, script)
 
 
-def _feeder(case: str, feeder: Feeder, script: Path) -> CaseResult:
+def _feeder(case: str, feeder: Tables, script: Path) -> CaseResult:
     ours, nominal = _our_voltages(feeder)
     differences = {engine: _differences(ours, nominal, engine, script) for engine in ENGINES}
     return _result(case, differences, {"nodes": str(len(differences[ENGINES[0]])), "states": "1"})
 
 
-def _switch_states(feeder: Feeder, script: Path) -> CaseResult:
+def _switch_states(feeder: Tables, script: Path) -> CaseResult:
     """Compare every node in every switch state that has an operating point."""
     states, network = SwitchStates(feeder), Network(feeder)
     every = states.combinations()
@@ -167,7 +167,7 @@ def _node_names(network: Network) -> list[str]:
     return [f"{bus}.{'ABC456789'.index(phase) + 1}" for bus, phase in network.nodes]
 
 
-def _our_voltages(feeder: Feeder) -> tuple[dict[str, complex], dict[str, float]]:
+def _our_voltages(feeder: Tables) -> tuple[dict[str, complex], dict[str, float]]:
     """Return voltage and nominal voltage (V) of each node, named as OpenDSS names them."""
     network = Network(feeder)
     V = solve_power_flow(network, network.closed0, tolerance=1e-12).V

@@ -19,7 +19,7 @@ from bench.validation.random_script import RandomFeeder, Shape, random_feeder
 from bench.validation.validation_part import CaseResult, ToleranceCheck, ValidationPart, inverter_row
 from gridpeers.bridges.opendss import read_opendss
 from gridpeers.plant.dynamics import Dynamics, PlantError
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 from gridpeers.plant.equipment.named_loads import with_powers
 from gridpeers.plant.feeder.circuits import circuit_of
 from gridpeers.plant.feeder.plant import installed_inverters
@@ -66,7 +66,7 @@ def run_states(drawn: RandomFeeder, script: Path) -> FeederStates:
 
 
 class _Run:
-    def __init__(self, drawn: RandomFeeder, feeder: Feeder) -> None:
+    def __init__(self, drawn: RandomFeeder, feeder: Tables) -> None:
         V_nom = {bus.name: bus.V_nom for bus in feeder.buses}
         rows = [
             inverter_row(

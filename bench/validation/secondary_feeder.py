@@ -16,13 +16,13 @@ import pandas as pd
 from msgspec.structs import replace
 
 import gridpeers.plant
-from gridpeers.plant.equipment import Bus, Feeder, Line, LineConfig
+from gridpeers.plant.equipment import Bus, Line, LineConfig, Tables
 
 V_NOM = 2401.7
 """Nominal voltage (V, line-to-neutral)."""
 
 Row = dict[str, str]
-Tables = dict[str, list[Row]]
+IslandTables = dict[str, list[Row]]
 
 TABLES = Path(gridpeers.plant.__file__).parent / "data" / "standard123"
 
@@ -43,7 +43,7 @@ INVERTERS = {
 """Kind, bus and rating (kW)."""
 
 
-def island_tables() -> Tables:
+def island_tables() -> IslandTables:
     """Return the tables with the load at 251 switched off; a machine stands in for the substation of `source`."""
     tables = {path.stem: _read(path) for path in sorted(TABLES.glob("*.csv")) if path.stem != "published_voltages"}
     tables["line_configs"] = _read(Path(__file__).with_name("secondary_line_configs.csv"))
@@ -79,7 +79,7 @@ def island_tables() -> Tables:
     return tables
 
 
-def write_tables(tables: Tables, folder: Path) -> None:
+def write_tables(tables: IslandTables, folder: Path) -> None:
     """Write tables as the CSV files of a feeder."""
     for name, rows in tables.items():
         pd.DataFrame(rows).to_csv(folder / f"{name}.csv", index=False)
@@ -90,7 +90,7 @@ def _read(path: Path) -> list[Row]:
     return rows
 
 
-def _set_switch(tables: Tables, first: str, second: str, state: str) -> None:
+def _set_switch(tables: IslandTables, first: str, second: str, state: str) -> None:
     for switch in tables["switches"]:
         if {switch["from_bus"], switch["to_bus"]} == {first, second}:
             switch["state"] = state
@@ -124,7 +124,7 @@ Z_REGULATOR = 1e-4 + 0j
 """Of each phase of a regulator, on its regulated side (ohm): GridLAB-D's `default_resistance`."""
 
 
-def with_impedances(feeder: Feeder) -> Feeder:
+def with_impedances(feeder: Tables) -> Tables:
     """Give the feeder with an impedance in series with every switch and every regulator."""
     V_nom = {bus.name: bus.V_nom for bus in feeder.buses}
     phases: dict[tuple[str, str], str] = {}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from math import pi, sqrt
 
-from gridpeers.plant.equipment import Feeder, LineConfig, Load
+from gridpeers.plant.equipment import LineConfig, Load, Tables
 
 NUMBER = {"A": "1", "B": "2", "C": "3"}
 MODEL = {"P": 1, "Z": 2, "I": 5}
@@ -20,12 +20,12 @@ IDEAL_SOURCE = "r1=0 r0=0 x1=1e-7 x0=1e-7"
 """Impedance of a stiff source (ohm)."""
 
 
-def write_opendss(feeder: Feeder) -> str:
+def write_opendss(feeder: Tables) -> str:
     """Return a script with the feeder's source, lines, switches, regulators, transformers, capacitors and loads."""
     return "\n".join(_commands(feeder)) + "\n"
 
 
-def _commands(feeder: Feeder) -> Iterator[str]:
+def _commands(feeder: Tables) -> Iterator[str]:
     source, kV = feeder.source, {bus.name: bus.V_nom * sqrt(3.0) / 1e3 for bus in feeder.buses}
     assert source is not None
     yield f"Clear\nSet DefaultBaseFrequency={feeder.f_nom!r}"

@@ -12,7 +12,7 @@ from typing import Any
 
 from gridpeers.bridges.gridlabd.glm_network import F_NOM, TableRow, block, network_blocks
 from gridpeers.bridges.gridlabd.gridlabd_simulator import unrepresentable
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings
@@ -199,7 +199,7 @@ module powerflow {{
 """Head of the model of a feeder without inverters, whose power flow is solved once."""
 
 
-def export_glm(feeder: Feeder, settings: PlantSettings, seconds: int, voltages: str) -> str:
+def export_glm(feeder: Tables, settings: PlantSettings, seconds: int, voltages: str) -> str:
     """Return a feeder as a GridLAB-D model: with inverters in delta mode, without any as a power flow.
 
     Each inverter begins with the power of our operating point; GridLAB-D finds the set-points that belong to it. The
@@ -227,7 +227,7 @@ def export_glm(feeder: Feeder, settings: PlantSettings, seconds: int, voltages: 
     return f'{head}{text}\nobject voltdump {{\n\tfilename "{voltages}";\n\tmode RECT;\n}}\n'
 
 
-def write_tables(feeder: Feeder, folder: Path) -> None:
+def write_tables(feeder: Tables, folder: Path) -> None:
     """Write the tables of a feeder, for `write_glm`.
 
     Regulators have whole taps: of the usual step, or one tap of a step of their own.

@@ -8,7 +8,7 @@ from contextlib import closing
 from msgspec.structs import replace
 
 from gridpeers.bridges.gridlabd.glm_network import F_NOM
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 from gridpeers.plant.equipment.connectivity import Node
 from gridpeers.plant.inverters.gfl import Gfl
 from gridpeers.plant.plant_config import FeederChanges, PlantConfig
@@ -26,7 +26,7 @@ class GridlabdSimulator(Simulator):
     package = "gridlabd"
     words = 'the plant of simulator "gridlabd"'
 
-    def start(self, config: PlantConfig, feeder: Feeder) -> LivePlant:
+    def start(self, config: PlantConfig, feeder: Tables) -> LivePlant:
         from gridpeers.bridges.gridlabd.glm import write_tables
         from gridpeers.bridges.gridlabd.gridlabd_plant import GridlabdPlant  # scenarios are checked without it
         from gridpeers.plant.feeder import Plant
@@ -49,7 +49,7 @@ class GridlabdSimulator(Simulator):
                 deadline=0.8 * config.deadline,  # the plant tells the agents before they give it up
             )
 
-    def check(self, scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
+    def check(self, scenario: ScenarioModel, feeder: Tables, problems: Problems) -> None:
         for text in unrepresentable(feeder):
             path = "plant.feeder" if scenario.plant.f_nom_Hz is None else "plant.f_nom_Hz"
             problems.add(path, f"{text}; change it, {_OTHERWISE}")
@@ -91,7 +91,7 @@ class GridlabdSimulator(Simulator):
 GRIDLABD = GridlabdSimulator()
 
 
-def _check_supply(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
+def _check_supply(scenario: ScenarioModel, feeder: Tables, problems: Problems) -> None:
     """Note events that leave an inverter without voltage, or give it back to a part that had none.
 
     An inverter of GridLAB-D does not return from there, and its power flow finds no solution from 0 V. Nor does an
@@ -131,7 +131,7 @@ GLM_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 """Names that GridLAB-D takes for an object: a dot would begin the name of a property."""
 
 
-def unrepresentable(feeder: Feeder) -> list[str]:
+def unrepresentable(feeder: Tables) -> list[str]:
     """Return a sentence for everything that the model cannot represent."""
     if feeder.elements or feeder.load_parts:
         return [

@@ -31,7 +31,7 @@ from gridpeers.bridges.gridlabd.glm_text import (
     messages,
 )
 from gridpeers.bridges.gridlabd.gridlabd_power_flow import PV, SWING
-from gridpeers.plant.equipment import Feeder, Source
+from gridpeers.plant.equipment import Source, Tables
 from gridpeers.plant.tables.read import FeederError
 from gridpeers.wire.wording import printable, suggestion
 
@@ -48,7 +48,7 @@ KNOWN = DATA | WATCHING | LINEAR | SWITCHES | NOTED.keys() | set(CHILD_OF_BUS)
 
 def read_glm(
     path: str | Path, f_nom: float | None = None, *, leave_out: Sequence[str] = (), switches: Sequence[str] = ()
-) -> Feeder:
+) -> Tables:
     """Return the feeder of a model for GridLAB-D (`gridpeers.Feeder.from_glm`).
 
     Its `notes` list what was done instead of what the model says.

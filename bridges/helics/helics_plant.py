@@ -22,7 +22,7 @@ from gridpeers.bridges.helics.federate import (
     topics,
 )
 from gridpeers.bridges.helics.helics_simulator import settings_of
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_interface import Reading, RecordedPlant, SimulatedPlant
 from gridpeers.wire.codec import decode_foreign
@@ -41,7 +41,7 @@ class HelicsPlant(SimulatedPlant, RecordedPlant):
     t, as ours has. It gets its federate before all else: others give up to connect while a plant is compiled.
     """
 
-    def __init__(self, config: PlantConfig, feeder: Feeder) -> None:
+    def __init__(self, config: PlantConfig, feeder: Tables) -> None:
         settings, helics = config.settings, settings_of(config.settings)
         self.tick = 0
         self._T_c, self._record = config.T_c, config.record_step

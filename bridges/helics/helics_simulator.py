@@ -7,7 +7,7 @@ from typing import Annotated
 
 import msgspec
 
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 from gridpeers.plant.plant_config import PlantConfig, PlantSettings
 from gridpeers.plant.plant_interface import LivePlant
 from gridpeers.plant.simulators import Simulator
@@ -59,7 +59,7 @@ class HelicsSimulator(Simulator):
     elsewhere = True
     table = HelicsSettings
 
-    def start(self, config: PlantConfig, feeder: Feeder) -> LivePlant:
+    def start(self, config: PlantConfig, feeder: Tables) -> LivePlant:
         from gridpeers.bridges.helics.helics_plant import HelicsPlant  # scenarios are checked without it
 
         return HelicsPlant(config, feeder)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from gridpeers.bridges.engine_process import EngineError, EngineProcess
 from gridpeers.bridges.feeder_import import FeederImport, file_of, number_of
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 from gridpeers.plant.tables.read import FeederError
 from gridpeers.wire.wording import damaged, printable
 
@@ -26,7 +26,7 @@ SHOWN = 100  # letters of a command that an error shows
 
 def read_opendss(
     path: str | Path, f_nom: float | None = None, *, leave_out: Sequence[str] = (), switches: Sequence[str] = ()
-) -> Feeder:
+) -> Tables:
     """Return the feeder of a script for OpenDSS (`gridpeers.Feeder.from_opendss`).
 
     Its `notes` list what was done instead of what the script says.

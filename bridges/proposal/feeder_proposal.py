@@ -12,7 +12,7 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from gridpeers.plant.equipment import PHASES, Feeder, InverterRow
+from gridpeers.plant.equipment import PHASES, InverterRow, Tables
 from gridpeers.plant.equipment.connectivity import Connectivity, by_bus
 from gridpeers.plant.equipment.imported_equipment import is_behind
 from gridpeers.plant.equipment.neutrals import neutral_for, neutrals_of
@@ -25,7 +25,7 @@ LINES = {"line": "Line", "overhead_line": "overhead_line", "underground_line": "
 """Classes of lines in OpenDSS and GridLAB-D, as a line that is to be a switch is written."""
 
 
-def islanding_switch(feeder: Feeder) -> tuple[str, str, frozenset[str]]:
+def islanding_switch(feeder: Tables) -> tuple[str, str, frozenset[str]]:
     """Return the closed switch that cuts most load off the substation, its far bus, and the buses beyond it."""
     if feeder.source is None:
         raise NoProposalError("the feeder has no substation to island from")
@@ -50,7 +50,7 @@ def islanding_switch(feeder: Feeder) -> tuple[str, str, frozenset[str]]:
     return best, head, beyond
 
 
-def _heads(feeder: Feeder, source: str, three_phase: set[str], more_than: float, *, small: bool) -> list[str]:
+def _heads(feeder: Tables, source: str, three_phase: set[str], more_than: float, *, small: bool) -> list[str]:
     """Return up to three three-phase lines that would make switches, the best first.
 
     They cut off more than so much load (W): half of all load or more as near to the substation as possible, else
@@ -74,7 +74,7 @@ def _heads(feeder: Feeder, source: str, three_phase: set[str], more_than: float,
     return [name for *_, name in sorted(found)[:3]]
 
 
-def three_phase(feeder: Feeder) -> list[str]:
+def three_phase(feeder: Tables) -> list[str]:
     """Return the buses that have phases A, B and C, unless some of them are de-energised and others not."""
     graph = Connectivity(feeder)
     fed = {node for part in graph.fed(graph.closed_at_start(), ())[0] for node in part}
@@ -83,7 +83,7 @@ def three_phase(feeder: Feeder) -> list[str]:
 
 
 def possible_places(
-    feeder: Feeder, known: Collection[str], section: Collection[str], rating: float, count: int
+    feeder: Tables, known: Collection[str], section: Collection[str], rating: float, count: int
 ) -> list[str]:
     """Return the buses of a section, out of those with three phases, at which inverters of this rating (W) can stand.
 
@@ -134,7 +134,7 @@ GROUP_LOAD = 2e6  # load (W) beyond which a section has more groups: one leader 
 MOST_GROUPS = 12  # groups that are proposed for all sections together, about
 
 
-def phase_powers(feeder: Feeder, switch: str, head: str) -> NDArray[np.complex128]:
+def phase_powers(feeder: Tables, switch: str, head: str) -> NDArray[np.complex128]:
     """Return the power (VA) through a switch of each phase of its far side, while the substation feeds everything.
 
     It is without fixed generation. So loads between phases, behind transformers and on split-phase services count where
@@ -159,7 +159,7 @@ def heaviest_phase(S: NDArray[np.complex128]) -> float:
     return float(3.0 * S.real.max() / S.real.sum()) if S.real.sum() > 0.0 else 1.0
 
 
-def neighbours(feeder: Feeder) -> dict[str, list[str]]:
+def neighbours(feeder: Tables) -> dict[str, list[str]]:
     near: dict[str, list[str]] = {bus.name: [] for bus in feeder.buses}
     ties = [(switch.from_bus, switch.to_bus) for switch in feeder.switches if switch.closed]
     for one, other in [*((one, other) for one, other, _ in feeder.branches()), *ties]:
@@ -238,7 +238,7 @@ class Proposal(NamedTuple):
     heaviest: float  # load of the heaviest phase in relation to the mean of the phases
 
 
-def propose(feeder: Feeder) -> Proposal:
+def propose(feeder: Tables) -> Proposal:
     """Return where to island a feeder, and inverters that can then carry its load; its own are not considered.
 
     The switch is the one that cuts off most load. Each section between switches beyond it has a leader and followers,
@@ -303,7 +303,7 @@ def propose(feeder: Feeder) -> Proposal:
 
 
 def _groups(
-    feeder: Feeder, known: set[str], section: Sequence[str], load: Mapping[str, float], rating: float, number: int
+    feeder: Tables, known: set[str], section: Sequence[str], load: Mapping[str, float], rating: float, number: int
 ) -> list[dict[str, float]]:
     """Return the buses of each group of a section, each with the rating (W) of its group.
 

@@ -19,7 +19,7 @@ from gridpeers.wire.driver.ending import StopSignal
 from gridpeers.wire.wording import DISTRIBUTIONS, damaged, printable, requirement, suggestion
 
 if TYPE_CHECKING:
-    from gridpeers.plant.equipment import Feeder
+    from gridpeers.plant.equipment import Tables
     from gridpeers.plant.tables import FeederError
     from gridpeers.scenarios.schema import ScenarioError, ScenarioModel
 
@@ -50,7 +50,7 @@ OPTIONS = {
 """Options that change a key of the scenario, by this key."""
 
 
-def load(name: str, changes: Mapping[str, Any] | None = None) -> tuple[ScenarioModel, Feeder]:
+def load(name: str, changes: Mapping[str, Any] | None = None) -> tuple[ScenarioModel, Tables]:
     """Return a checked scenario, with keys changed by the command line, and its feeder; or end with every problem."""
     from gridpeers.scenario import load as load_face
     from gridpeers.scenarios.schema import ScenarioError

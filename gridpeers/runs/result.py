@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 import pandas as pd
 
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 from gridpeers.rooms import ROOMS
 from gridpeers.runs import frames
 from gridpeers.runs.run_folder import RunFolder, new_home
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 class _FromFolder:
     """What one case and all cases of a run share."""
 
-    def __init__(self, folder: RunFolder, spec: model.ScenarioModel, feeder: Feeder) -> None:
+    def __init__(self, folder: RunFolder, spec: model.ScenarioModel, feeder: Tables) -> None:
         self._folder, self._feeder = folder, feeder
         self.spec = spec
         """The scenario as it was run."""
@@ -73,7 +73,7 @@ class _FromFolder:
 class Results(_FromFolder, Mapping[str, "Result"]):
     """Results of several cases of one run, by case; made by `Scenario.run()` and `gridpeers.read`."""
 
-    def __init__(self, folder: RunFolder, spec: model.ScenarioModel, feeder: Feeder) -> None:
+    def __init__(self, folder: RunFolder, spec: model.ScenarioModel, feeder: Tables) -> None:
         super().__init__(folder, spec, feeder)
         self._results = {case: Result(folder, spec, feeder, self, case) for case in spec.cases}
 
@@ -171,7 +171,7 @@ class Results(_FromFolder, Mapping[str, "Result"]):
 class Result(_FromFolder):
     """Result of one case; made by `Scenario.run(case)` and `gridpeers.read`. Tables are read when first asked for."""
 
-    def __init__(self, folder: RunFolder, spec: model.ScenarioModel, feeder: Feeder, run: Results, case: str) -> None:
+    def __init__(self, folder: RunFolder, spec: model.ScenarioModel, feeder: Tables, run: Results, case: str) -> None:
         super().__init__(folder, spec, feeder)
         self._run = run
         self.case = case

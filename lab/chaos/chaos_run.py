@@ -16,7 +16,7 @@ from typing import NamedTuple
 import msgspec
 
 from gridpeers.lab.chaos.disturbed_scenario import RESTORED, WITHIN_S, ChaosBase, Schedule
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 from gridpeers.plant.equipment.connectivity import bus_islands
 from gridpeers.scenarios.checks.check_registry import LAW_FAILED
 from gridpeers.scenarios.checks.check_verdict import SHOWN_VIOLATIONS, CheckVerdict
@@ -229,7 +229,7 @@ class Collapse(NamedTuple):
     """Inverters of the islands in which inverters tripped, as the switches were then."""
 
 
-def collapses_at_changes(scenario: ScenarioModel, feeder: Feeder, events: Iterable[PlantEvent]) -> tuple[Collapse, ...]:
+def collapses_at_changes(scenario: ScenarioModel, feeder: Tables, events: Iterable[PlantEvent]) -> tuple[Collapse, ...]:
     """Return the collapses of a run, one for each change that makes inverters trip within `PERIODS`.
 
     The first trip of an inverter counts alone: who has tripped before may trip again for the reason of that time.

@@ -21,7 +21,7 @@ from msgspec.structs import replace
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem, NodeFault
 from gridpeers.netem.schema.partition import Partition
-from gridpeers.plant.equipment import Feeder, InverterRow
+from gridpeers.plant.equipment import InverterRow, Tables
 from gridpeers.plant.equipment.connectivity import Connectivity
 from gridpeers.plant.equipment.named_loads import named_loads
 from gridpeers.plant.tables import read_feeder
@@ -124,7 +124,7 @@ def in_order(schedule: Schedule) -> list[Disturbance]:
 @dataclass(frozen=True)
 class ChaosBase:
     scenario: ScenarioModel
-    feeder: Feeder
+    feeder: Tables
     tree: Mapping[str, Any] = field(init=False, repr=False)
     supply: FeasibleSupply = field(init=False, repr=False)
 
@@ -304,7 +304,7 @@ class _State(NamedTuple):
 class FeasibleSupply:
     """Finds islands that their inverters cannot feed: no control can change that, so it is not drawn."""
 
-    def __init__(self, feeder: Feeder) -> None:
+    def __init__(self, feeder: Tables) -> None:
         self._feeder, self._graph = feeder, Connectivity(feeder)
         self._rows = (*feeder.inverters, *feeder.spares)
         self._switches = {name: switch.name for switch in feeder.switches for name in switch.names}

@@ -21,7 +21,7 @@ from scipy.sparse.csgraph import connected_components
 
 from gridpeers.agents.laws.resilient import Resilient
 from gridpeers.lab.predict.inverter_group import InverterGroup, inverter_group_of
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 from gridpeers.scenarios.results.history import Floats
 from gridpeers.scenarios.schema.plugin_keys import law_of
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
@@ -203,7 +203,7 @@ def _exact(links: np.ndarray[tuple[int, int], np.dtype[np.bool_]]) -> int:
     return int(np.maximum(reach[proper], least[whole ^ proper]).min())
 
 
-def robustness_notes(scenario: ScenarioModel, feeder: Feeder) -> Iterator[str]:
+def robustness_notes(scenario: ScenarioModel, feeder: Tables) -> Iterator[str]:
     """Yield a sentence for each case with the law "resilient" whose F is more than its graph bears for certain.
 
     It is for `gridpeers check`: robustness is of the graph, the rest of a prediction of the paper's law alone.

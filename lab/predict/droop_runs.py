@@ -38,7 +38,7 @@ from gridpeers.lab.predict.inverter_group import InverterGroup
 from gridpeers.lab.predict.linear_model import AT_REST
 from gridpeers.lab.predict.times import LoadStep
 from gridpeers.plant.build import build_plant
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 from gridpeers.plant.feeder import GRID, Plant, raise_for_trip
 from gridpeers.scenarios.results.history import Floats
 from gridpeers.scenarios.schema import ScenarioModel
@@ -76,7 +76,7 @@ class VarResponse:
         return np.asarray(self.v.sum(axis=0))
 
 
-def var_response(scenario: ScenarioModel, feeder: Feeder) -> VarResponse:
+def var_response(scenario: ScenarioModel, feeder: Tables) -> VarResponse:
     """Return the response of the plant on droop alone at the end of the first event's window."""
     config, _ = configs(scenario, feeder, next(iter(scenario.cases)))
     end = scenario.events[1].t_s if len(scenario.events) > 1 else scenario.time.end_s
@@ -190,7 +190,7 @@ class IslandStep:
     load: LoadStep | None
 
 
-def load_steps(scenario: ScenarioModel, feeder: Feeder) -> tuple[IslandStep, ...]:
+def load_steps(scenario: ScenarioModel, feeder: Tables) -> tuple[IslandStep, ...]:
     """Return the islands without the grid after each event, and their steps of load; PlantError if it has none."""
     config, _ = configs(scenario, feeder, next(iter(scenario.cases)))
     rating = {row.name: row.P_rated for row in inverters_of(scenario, feeder)}

@@ -12,7 +12,7 @@ from scipy.linalg import expm
 
 from gridpeers.agents.agent_config import Control, Gains
 from gridpeers.agents.graphs import in_neighbours
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 from gridpeers.plant.inverters.inverter_model import DroopLag, FollowerLag, InverterModel
 from gridpeers.scenarios.results.history import Flags, Floats
 from gridpeers.scenarios.schema import ScenarioModel
@@ -104,7 +104,7 @@ def response_of(model: InverterModel) -> DroopLag | FollowerLag:
 
 def inverter_group_of(
     scenario: ScenarioModel,
-    feeder: Feeder,
+    feeder: Tables,
     case: str,
     *,
     roster: Collection[str] | None = None,

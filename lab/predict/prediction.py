@@ -35,7 +35,7 @@ from gridpeers.lab.predict.inverter_group import InverterGroup, inverter_group_o
 from gridpeers.lab.predict.linear_model import Loop, delay_limit
 from gridpeers.lab.predict.times import Times, predicted_times
 from gridpeers.plant.dynamics import PlantError
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 from gridpeers.runs.choices import with_cases
 from gridpeers.scenario import Scenario, as_scenario
 from gridpeers.scenarios.run_request import BrokenRunError
@@ -62,7 +62,7 @@ def predict(scenario: Scenario | str | Path, case: str, *, voltage: bool = True)
     return predictions(with_cases(known.spec, [case]), known.feeder, voltage=voltage)[case]
 
 
-def predictions(spec: ScenarioModel, feeder: Feeder, *, voltage: bool) -> dict[str, Prediction]:
+def predictions(spec: ScenarioModel, feeder: Tables, *, voltage: bool) -> dict[str, Prediction]:
     others = {case: law.name for case in spec.cases if (law := law_of(spec, case)).name != PAPER}
     if others:
         raise ScenarioError(

@@ -12,18 +12,18 @@ from gridpeers.lab.predict.inverter_group import InverterGroup, inverter_group_o
 from gridpeers.lab.predict.linear_model import Loop, Ticks, delay_limit
 from gridpeers.lab.predict.times import LoadStep, Times, predicted_times, sharing_index
 from gridpeers.netem.schema.netem import Netem
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 from gridpeers.plant.tables import read_feeder
 from gridpeers.scenarios.schema import Case, ScenarioModel
 from gridpeers.scenarios.schema.configs import as_in
 
 __all__ = [
     "Case",
-    "Feeder",
     "InverterGroup",
     "LoadStep",
     "Loop",
     "ScenarioModel",
+    "Tables",
     "Ticks",
     "Times",
     "VarResponse",
@@ -41,7 +41,7 @@ __all__ = [
 ]
 
 
-def feeder_of(spec: ScenarioModel) -> Feeder:
+def feeder_of(spec: ScenarioModel) -> Tables:
     return as_in(spec, read_feeder(spec.plant.feeder, spec.plant.load_set))
 
 

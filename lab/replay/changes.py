@@ -17,7 +17,7 @@ from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.netem.schema.partition import Partition
 from gridpeers.netem.schema.pattern import objections
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.schema.configs import configs
@@ -63,7 +63,7 @@ class ChangedRule:
     scenario: ScenarioModel
     """The scenario as changed, links too; the title of its case says what is changed."""
     links_written: bool
-    feeder: Feeder
+    feeder: Tables
     case: str
     control: Control | None
     """Rule of control of every agent; None keeps that of the record."""
@@ -147,7 +147,7 @@ def _tables(record: RunRecord) -> Tree:
     return {key: value for key, value in tables.items() if key not in (AS_RUN, "paper", "claims")}
 
 
-def _checked(record: RunRecord, tables: Tree, changed: frozenset[str]) -> tuple[ScenarioModel, Feeder]:
+def _checked(record: RunRecord, tables: Tree, changed: frozenset[str]) -> tuple[ScenarioModel, Tables]:
     problems = Problems(f"scenario of {record.path}", "", changed=changed)
     try:
         scenario, feeder = check_tables(tables, Path("scenario.toml").absolute(), problems)
@@ -218,7 +218,7 @@ def _with_links(scenario: ScenarioModel, case: str, netem: Netem) -> ScenarioMod
     return replace(scenario, netem=common, cases={case: replace(scenario.cases[case], netem=own)})
 
 
-def _setup(record: RunRecord, scenario: ScenarioModel, feeder: Feeder, netem: Netem) -> dict[str, Any]:
+def _setup(record: RunRecord, scenario: ScenarioModel, feeder: Tables, netem: Netem) -> dict[str, Any]:
     was = record.info.plant.links
     setup = EmulationConfig.of_tree(was) if was else setup_of(netem, scenario, feeder, real_nodes=True)
     nodes = setup.netem.nodes if was else ()

@@ -138,7 +138,7 @@ class InverterRow(msgspec.Struct, frozen=True, kw_only=True):
     phases: Literal["ABC", "A", "B", "C"] = "ABC"  # phases of the bus at which it stands: all three, or one
     neutral: str = ""  # node of the bus to which its phases return, by its letter; empty for earth
     spare: bool = False  # whether it stays off until an agent joins for it
-    parameters: str = ""  # name of its set, of `Feeder.parameter_sets` or published; empty for none
+    parameters: str = ""  # name of its set, of `Tables.parameter_sets` or published; empty for none
     own: ParameterSet = {}  # parameters that a scenario gives it
 
     @property
@@ -146,7 +146,7 @@ class InverterRow(msgspec.Struct, frozen=True, kw_only=True):
         return self.bus, self.phases[0]
 
 
-class Feeder(msgspec.Struct, frozen=True, kw_only=True):
+class Tables(msgspec.Struct, frozen=True, kw_only=True):
     """All tables of a feeder with one load set, checked by `gridpeers.plant.tables.read_feeder`."""
 
     name: str

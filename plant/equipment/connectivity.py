@@ -6,17 +6,17 @@ from collections.abc import Collection, Hashable, Iterable, Iterator
 from itertools import chain
 from typing import TypeVar
 
-from gridpeers.plant.equipment import PHASES, Feeder, InverterRow, Line, Regulator, Switch, Transformer
+from gridpeers.plant.equipment import PHASES, InverterRow, Line, Regulator, Switch, Tables, Transformer
 from gridpeers.wire.wording import suggestion
 
 SwitchOperations = tuple[Iterable[str], Iterable[str]]  # switches that open, and that close, by any of their names
 
 
-def switch_names(feeder: Feeder) -> dict[str, str]:
+def switch_names(feeder: Tables) -> dict[str, str]:
     return {name: switch.name for switch in feeder.switches for name in switch.names}
 
 
-def switch_name(feeder: Feeder, text: str) -> str:
+def switch_name(feeder: Tables, text: str) -> str:
     """Resolve a switch's name in either order of its buses, or its alias ("sw1_2"), to its name in the tables."""
     known = switch_names(feeder)
     if text not in known:
@@ -26,7 +26,7 @@ def switch_name(feeder: Feeder, text: str) -> str:
     return known[text]
 
 
-def bus_islands(feeder: Feeder, closed: Collection[str]) -> tuple[frozenset[str], ...]:
+def bus_islands(feeder: Tables, closed: Collection[str]) -> tuple[frozenset[str], ...]:
     """Return the sets of buses joined by branches and these closed switches, in the order of their first buses."""
     joined = [(one, other) for one, other, _ in feeder.branches()]
     joined += [(switch.from_bus, switch.to_bus) for switch in feeder.switches if switch.name in closed]
@@ -54,7 +54,7 @@ def connected(things: Iterable[T], joined: Iterable[tuple[T, T]]) -> tuple[froze
     return tuple(frozenset(group) for group in members.values())
 
 
-def islands_after(feeder: Feeder, operations: Iterable[SwitchOperations]) -> Iterator[tuple[frozenset[str], ...]]:
+def islands_after(feeder: Tables, operations: Iterable[SwitchOperations]) -> Iterator[tuple[frozenset[str], ...]]:
     """Yield the islands after each of some operations of switches, from those that are closed at the start."""
     closed = {switch.name for switch in feeder.switches if switch.closed}
     for opened, shut in operations:
@@ -73,7 +73,7 @@ class Connectivity:
     grid-forming inverter of three phases join all three. Other equipment joins none.
     """
 
-    def __init__(self, feeder: Feeder) -> None:
+    def __init__(self, feeder: Tables) -> None:
         self._feeder = feeder
         self.nodes: tuple[Node, ...] = tuple((bus.name, phase) for bus in feeder.buses for phase in bus.phases)
         self._fixed: list[tuple[Node, Node]] = []

@@ -8,12 +8,12 @@ from typing import TypeVar
 import msgspec
 from msgspec.structs import replace
 
-from gridpeers.plant.equipment import Feeder, InverterRow, Switch
+from gridpeers.plant.equipment import InverterRow, Switch, Tables
 from gridpeers.plant.plant_config import FeederChanges, InverterChange
 from gridpeers.wire.messages import MOST_INVERTERS
 
 
-def changed(feeder: Feeder, changes: FeederChanges) -> Feeder:
+def changed(feeder: Tables, changes: FeederChanges) -> Tables:
     """Return the feeder with changes applied; without any it is the same object.
 
     At another nominal frequency the equipment stays and its reactances change: those of lines and transformers, the
@@ -42,7 +42,7 @@ def _inverter(row: InverterRow, changes: FeederChanges) -> InverterRow:
     return replace(row, **values | {name: value for name, value in given.items() if value is not None})
 
 
-def _at_frequency(feeder: Feeder, f_nom: float) -> Feeder:
+def _at_frequency(feeder: Tables, f_nom: float) -> Tables:
     if f_nom == feeder.f_nom:
         return feeder
     k = f_nom / feeder.f_nom
@@ -63,7 +63,7 @@ def _at_frequency(feeder: Feeder, f_nom: float) -> Feeder:
 
 
 TIE_LENGTH = 0.3  # length (km) of the line of a tie
-AnyFeeder = TypeVar("AnyFeeder", bound=Feeder)
+AnyFeeder = TypeVar("AnyFeeder", bound=Tables)
 Row = TypeVar("Row", bound=msgspec.Struct)
 
 _REFERENCES = ("bus", "from_bus", "to_bus")  # fields of equipment that name a bus

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import msgspec
 from msgspec.structs import replace
 
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 from gridpeers.wire.messages import LoadSetting
 from gridpeers.wire.schema.table_schema import Plausible
 from gridpeers.wire.wording import first_of, suggestion
@@ -24,7 +24,7 @@ class NamedLoad(msgspec.Struct, frozen=True, kw_only=True):
     S: complex  # power at nominal voltage (VA), of all branches
 
 
-def named_loads(feeder: Feeder) -> dict[str, NamedLoad]:
+def named_loads(feeder: Tables) -> dict[str, NamedLoad]:
     found: dict[str, NamedLoad] = {}
     for name, bus, S in (
         *((load.bus, load.bus, sum(load.S)) for load in feeder.loads),
@@ -58,7 +58,7 @@ def _bare(name: str) -> str:
     return name[5:] if name[:5].lower() == "load." else name
 
 
-def with_powers(feeder: Feeder, powers: Mapping[str, complex]) -> Feeder:
+def with_powers(feeder: Tables, powers: Mapping[str, complex]) -> Tables:
     """Return a feeder in which some loads have another power at nominal voltage (VA), by name.
 
     Branches keep their shares of the real and of the reactive power; a power that was none is shared by their sizes.
@@ -107,7 +107,7 @@ MOST = 10.0  # greatest power of one load, over that of all loads, or of the inv
 class LoadPowers:
     """The loads of a feeder by name, and the powers that each can have; `P_rated`: of all inverters (W)."""
 
-    def __init__(self, feeder: Feeder, P_rated: float) -> None:
+    def __init__(self, feeder: Tables, P_rated: float) -> None:
         self._loads = named_loads(feeder)
         self._most = MOST * max(sum(abs(load.S) for load in self._loads.values()), P_rated) / 1e3
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from gridpeers.plant.equipment import PHASES, Bus, Feeder, Switch
+from gridpeers.plant.equipment import PHASES, Bus, Switch, Tables
 from gridpeers.plant.equipment.imported_equipment import LinearElement, LoadPart
 from gridpeers.wire.wording import first_of
 
@@ -18,7 +18,7 @@ SHOWN = 6  # inverters that a sentence names
 Node = tuple[str, str]
 
 
-def neutrals_of(feeder: Feeder) -> dict[str, str]:
+def neutrals_of(feeder: Tables) -> dict[str, str]:
     return neutrals_by_bus(feeder.buses, feeder.load_parts, feeder.elements, feeder.switches)
 
 
@@ -37,7 +37,7 @@ def neutral_for(text: str, bus: Bus, phases: str, neutral: str) -> str:
     return text
 
 
-def returns_in_words(feeder: Feeder) -> list[str]:
+def returns_in_words(feeder: Tables) -> list[str]:
     """Return sentences that say where the inverters of a feeder with neutrals return; none of another feeder."""
     if not (neutrals := neutrals_of(feeder)):
         return []

@@ -15,7 +15,7 @@ from scipy.sparse.linalg import splu
 
 from gridpeers.plant.dynamics.circuit import LoadLaw
 from gridpeers.plant.dynamics.kernel.compiled import Complex, Integers, Real
-from gridpeers.plant.equipment import PHASES, Feeder, InverterRow, Regulator, Switch
+from gridpeers.plant.equipment import PHASES, InverterRow, Regulator, Switch, Tables
 from gridpeers.plant.equipment.connectivity import bus_islands, switch_name
 from gridpeers.plant.equipment.imported_equipment import LoadPart
 from gridpeers.plant.equipment.named_loads import named_loads
@@ -43,7 +43,7 @@ class Network:
     last; `Y_branches`, `Y_capacitors`, `Y_loads`: parts of the admittance matrix (S) before merging.
     """
 
-    def __init__(self, feeder: Feeder, *, line_charging: bool = True, spares: Iterable[str] = ()) -> None:
+    def __init__(self, feeder: Tables, *, line_charging: bool = True, spares: Iterable[str] = ()) -> None:
         self.feeder = self._first = feeder
         self.line_charging = line_charging
         self.nodes = tuple((bus.name, phase) for bus in feeder.buses for phase in bus.phases)
@@ -128,7 +128,7 @@ class Network:
             "load between phases"
         )
 
-    def with_loads(self, feeder: Feeder) -> Network:
+    def with_loads(self, feeder: Tables) -> Network:
         """Return the same network with other powers of loads; a load that is set to nothing keeps its branches."""
         other = copy(self)
         other.feeder = feeder
@@ -252,7 +252,7 @@ class Network:
         )
 
 
-def _chosen(feeder: Feeder, spares: tuple[str, ...]) -> tuple[InverterRow, ...]:
+def _chosen(feeder: Tables, spares: tuple[str, ...]) -> tuple[InverterRow, ...]:
     known = {row.name: row for row in feeder.spares}
     for name in spares:
         if name not in known:

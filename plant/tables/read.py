@@ -1,4 +1,4 @@
-"""From a feeder's folder to a checked `Feeder`; all of its problems come at once."""
+"""From a feeder's folder to a checked `Tables`; all of its problems come at once."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from gridpeers.plant.equipment import PHASES, Feeder, Load
+from gridpeers.plant.equipment import PHASES, Load, Tables
 from gridpeers.plant.equipment.connectivity import Connectivity, buses_without_ground, by_bus
 from gridpeers.plant.equipment.neutrals import neutrals_by_bus
 from gridpeers.plant.tables import branches, shunts
@@ -53,7 +53,7 @@ def is_folder(path: Path) -> bool:
         return False
 
 
-def read_feeder(feeder: str, load_set: str = "main") -> Feeder:
+def read_feeder(feeder: str, load_set: str = "main") -> Tables:
     """Read all tables of a feeder and check them.
 
     `feeder`: name of a feeder in `plant/data`, or the path of a folder of the same layout; `load_set`: which loads:
@@ -73,7 +73,7 @@ def read_feeder(feeder: str, load_set: str = "main") -> Feeder:
 
 
 @lru_cache(KEPT)
-def _read_tables(folder: Path, feeder: str, load_set: str, contents: tuple[tuple[str, bytes], ...]) -> Feeder:
+def _read_tables(folder: Path, feeder: str, load_set: str, contents: tuple[tuple[str, bytes], ...]) -> Tables:
     """Read and check all tables; with other `contents` of the files a folder is read anew."""
     problems = [
         f"{file}: not a table of a feeder; {suggestion(file, TABLES, 'tables')}"
@@ -107,7 +107,7 @@ def _read_tables(folder: Path, feeder: str, load_set: str, contents: tuple[tuple
     source = shunts.read_source(buses)
     manifest, found = read_table(Manifest, _manifest(folder / MANIFEST, problems))
     problems += [f"{MANIFEST}: {path}: {text}" for path, text in found]
-    whole = Feeder(
+    whole = Tables(
         name=folder.name,
         load_set=load_set,
         buses=buses.rows,
@@ -148,7 +148,7 @@ def _manifest(path: Path, problems: list[str]) -> dict[str, Any]:
     return {}
 
 
-def _report_unconnected(feeder: Feeder, buses: branches.BusTable) -> None:
+def _report_unconnected(feeder: Tables, buses: branches.BusTable) -> None:
     """Note every node that is cut off even with all switches closed: a feeder is one network, in each phase."""
     inverters = (*feeder.inverters, *feeder.spares)
     of_three = [row.bus for row in inverters if len(row.phases) > 1]

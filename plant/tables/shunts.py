@@ -8,7 +8,7 @@ from collections.abc import Container, Mapping
 from math import radians
 from typing import Any, NamedTuple
 
-from gridpeers.plant.equipment import Bus, Capacitor, Feeder, InverterRow, Load, Source
+from gridpeers.plant.equipment import Bus, Capacitor, InverterRow, Load, Source, Tables
 from gridpeers.plant.equipment.connectivity import buses_without_ground
 from gridpeers.plant.equipment.imported_equipment import LoadPart
 from gridpeers.plant.equipment.neutrals import neutral_for, neutrals_of
@@ -175,7 +175,7 @@ def read_inverters(
     return tuple(inverters.values())
 
 
-def problems_of(inverter: InverterRow, bus: Bus, feeder: Feeder) -> list[str]:
+def problems_of(inverter: InverterRow, bus: Bus, feeder: Tables) -> list[str]:
     """Return what is wrong with a further inverter at a bus of a feeder, as its tables would say."""
     problems: list[str] = []
     others = (*feeder.inverters, *feeder.spares)

@@ -8,7 +8,7 @@ from math import degrees, sqrt
 from pathlib import Path
 from typing import Any
 
-from gridpeers.plant.equipment import Feeder, InverterRow, Line, LineConfig, Regulator, Transformer
+from gridpeers.plant.equipment import InverterRow, Line, LineConfig, Regulator, Tables, Transformer
 from gridpeers.plant.equipment.imported_equipment import LoadPart
 from gridpeers.plant.equipment.neutrals import EARTH, neutrals_of
 from gridpeers.plant.inverters.inverter_registry import ParameterSet, chosen_own
@@ -20,7 +20,7 @@ TAP_STEP = 0.00625  # step (pu) in which the ratios of regulators are written
 Row = Sequence[Any]  # cells in the order of a table's columns
 
 
-def write_feeder(feeder: Feeder, folder: Path) -> None:
+def write_feeder(feeder: Tables, folder: Path) -> None:
     """Write a feeder's tables into a folder, which is made if need be; they replace those of a feeder that is there.
 
     Numbers are converted to the units of the tables, so what is read back may differ in the last digit.
@@ -39,7 +39,7 @@ def write_feeder(feeder: Feeder, folder: Path) -> None:
     (folder / "feeder.toml").write_text(f"f_nom_Hz = {feeder.f_nom!r}\n", encoding="utf-8")
 
 
-def _tables(feeder: Feeder) -> Iterator[tuple[str, list[Row]]]:
+def _tables(feeder: Tables) -> Iterator[tuple[str, list[Row]]]:
     kV = sqrt(3.0) / 1e3
     yield "buses.csv", [(it.name, it.phases, it.V_nom * kV, it.zone, it.x, it.y) for it in feeder.buses]
     if feeder.elements or not feeder.lines:

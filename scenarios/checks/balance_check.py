@@ -16,7 +16,7 @@ import numpy as np
 from gridpeers.plant.dynamics.circuit import PHASES, Circuit
 from gridpeers.plant.dynamics.inverters import Inverters
 from gridpeers.plant.dynamics.power_flow_at_rest import InverterPowerFlow
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 from gridpeers.plant.equipment.named_loads import with_powers
 from gridpeers.plant.feeder.circuits import circuit_of
 from gridpeers.plant.feeder.plant import installed_inverters
@@ -56,7 +56,7 @@ class IslandBalance(NamedTuple):
 class IslandPowerFlow:
     """Power flows of one feeder; each state of switches and inverters is factored once."""
 
-    def __init__(self, feeder: Feeder, names: tuple[str, ...], settings: PlantSettings) -> None:
+    def __init__(self, feeder: Tables, names: tuple[str, ...], settings: PlantSettings) -> None:
         spares = [row.name for row in feeder.spares if row.name in names]
         self.network = Network(feeder, spares=spares)
         self._at = [names.index(unit.name) for unit in self.network.inverters]
@@ -114,7 +114,7 @@ class IslandPowerFlow:
         return InverterPowerFlow(self._circuit(state), units, np.zeros(len(units), bool)), units
 
 
-_latest: list[tuple[Feeder, tuple[str, ...], PlantSettings, IslandPowerFlow]] = []
+_latest: list[tuple[Tables, tuple[str, ...], PlantSettings, IslandPowerFlow]] = []
 """The power flows of the last feeder: the cases of a run have one in common."""
 
 

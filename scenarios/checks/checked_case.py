@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 from gridpeers.scenarios.checks.check_registry import READERS
 from gridpeers.scenarios.checks.check_verdict import NotJudgedError, Violation
 from gridpeers.scenarios.results.history import (
@@ -63,7 +63,7 @@ class CheckedCase:
 
     scenario: ScenarioModel
     """As run."""
-    feeder: Feeder
+    feeder: Tables
     case: str
     history: History
     """All rows, as read-only arrays (rows, inverters)."""
@@ -82,7 +82,7 @@ class CheckedCase:
     def of(
         cls,
         scenario: ScenarioModel,
-        feeder: Feeder,
+        feeder: Tables,
         case: str,
         recorded: Recorded,
         folder: Path | None = None,

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 from gridpeers.plant.equipment.connectivity import switch_names
 from gridpeers.plant.equipment.named_loads import load_name, named_loads
 from gridpeers.scenarios.live.run_monitor import line_of
@@ -63,7 +63,7 @@ class Departures:
 
 def compare(
     scenario: ScenarioModel,
-    feeder: Feeder,
+    feeder: Tables,
     events: Sequence[PlantEvent],
     ended: float,
     missing: Sequence[tuple[float, float]] = (),
@@ -107,7 +107,7 @@ def compare(
     )
 
 
-def _departures(scenario: ScenarioModel, feeder: Feeder, events: Iterable[PlantEvent]) -> Iterator[PlantEvent]:
+def _departures(scenario: ScenarioModel, feeder: Tables, events: Iterable[PlantEvent]) -> Iterator[PlantEvent]:
     """Yield each event that the scenario does not have: of a switch, a load or an agent at another time, or of links.
 
     A fault of the scenario may silence agents, and kill or pause those that it names.
@@ -124,7 +124,7 @@ def _departures(scenario: ScenarioModel, feeder: Feeder, events: Iterable[PlantE
             yield event
 
 
-def _planned(scenario: ScenarioModel, feeder: Feeder) -> dict[str, list[tuple[float, float]]]:
+def _planned(scenario: ScenarioModel, feeder: Tables) -> dict[str, list[tuple[float, float]]]:
     """Return the times (s) within which the scenario moves a switch, a load or an agent, by its name."""
     switches, loads = switch_names(feeder), named_loads(feeder)
     found = defaultdict[str, list[tuple[float, float]]](list)

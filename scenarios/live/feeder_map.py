@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 from gridpeers.plant.equipment.named_loads import named_loads
 from gridpeers.scenarios.results.plots.places import has_coordinates, places
 from gridpeers.wire.codec import decode_foreign
@@ -54,7 +54,7 @@ class FeederMap(msgspec.Struct, frozen=True):
     case: str = ""
 
 
-def feeder_map(feeder: Feeder) -> FeederMap:
+def feeder_map(feeder: Tables) -> FeederMap:
     at = places(feeder)
     number = {bus.name: i for i, bus in enumerate(feeder.buses)}
     return FeederMap(

@@ -6,7 +6,7 @@ import msgspec
 from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.scenarios.live.feeder_map import feeder_map
 from gridpeers.scenarios.live.run_address import (
@@ -55,7 +55,7 @@ def chosen_case(scenario: ScenarioModel, case: str) -> str:
 
 def configure(
     scenario: ScenarioModel,
-    feeder: Feeder,
+    feeder: Tables,
     listen: str,
     beyond: tuple[str, ...] = (),
     *,

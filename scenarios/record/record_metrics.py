@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import msgspec
 
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 from gridpeers.plant.tables import FeederError, read_feeder
 from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.live.departures import compare
@@ -59,7 +59,7 @@ def report_of(record: RunRecord) -> RunReport:
     )
 
 
-def _scenario_of(record: RunRecord) -> tuple[ScenarioModel, Feeder]:
+def _scenario_of(record: RunRecord) -> tuple[ScenarioModel, Tables]:
     info = record.info
     if not info.toml or not info.case:
         raise RecordFileError(f"{record.path}: a live run without a scenario: it has no events to be measured after")
@@ -75,7 +75,7 @@ def _scenario_of(record: RunRecord) -> tuple[ScenarioModel, Feeder]:
         raise RecordFileError(f"{record.path}: what it says about its scenario cannot be read: {text}") from None
 
 
-def _simulated(record: RunRecord, scenario: ScenarioModel, feeder: Feeder) -> _Measured:
+def _simulated(record: RunRecord, scenario: ScenarioModel, feeder: Tables) -> _Measured:
     """Return what is measured of a run in simulated time: windows end where the record does."""
     history = record.physics()
     end = min(float(history.t[-1]), scenario.time.end_s)
@@ -92,7 +92,7 @@ def _simulated(record: RunRecord, scenario: ScenarioModel, feeder: Feeder) -> _M
     return history, kept, notes
 
 
-def _live(record: RunRecord, scenario: ScenarioModel, feeder: Feeder) -> _Measured:
+def _live(record: RunRecord, scenario: ScenarioModel, feeder: Tables) -> _Measured:
     """Return what is measured of a run in real time: windows whose end it reached, those that people made too."""
     history, events = record.physics(), record.events()
     end = float(history.t[-1])

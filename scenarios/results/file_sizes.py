@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from gridpeers.agents.graphs import GraphError, in_neighbours
 from gridpeers.netem.schema.pattern import Link
-from gridpeers.plant.equipment import Feeder, InverterRow
+from gridpeers.plant.equipment import InverterRow, Tables
 from gridpeers.scenarios.results.case_tables import QUANTITIES
 from gridpeers.scenarios.results.metrics_file import Clock
 from gridpeers.scenarios.results.run_files import FolderError, shown
@@ -55,7 +55,7 @@ class FileSizes(NamedTuple):
 
 
 def file_sizes(
-    scenario: ScenarioModel, feeder: Feeder, seconds: float | None = None, clock: Clock = "simulated"
+    scenario: ScenarioModel, feeder: Tables, seconds: float | None = None, clock: Clock = "simulated"
 ) -> FileSizes:
     """Return the size of the files of all cases of a scenario, which last for their own or other `seconds`.
 
@@ -82,7 +82,7 @@ def file_sizes(
     return FileSizes(history, links, record, history + links + record + most)
 
 
-def _links_used(scenario: ScenarioModel, feeder: Feeder, case: str, members: Mapping[str, InverterRow]) -> list[Link]:
+def _links_used(scenario: ScenarioModel, feeder: Tables, case: str, members: Mapping[str, InverterRow]) -> list[Link]:
     """Return the links that carry messages in a case; between agents all that are possible, by a graph that fails."""
     used = [link for name in members for link in (Link(PLANT, name), Link(name, PLANT))]
     for agent in configs(scenario, feeder, case)[1]:

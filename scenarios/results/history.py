@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gridpeers.plant.equipment import Feeder, InverterRow
+from gridpeers.plant.equipment import InverterRow, Tables
 from gridpeers.scenarios.results.case_tables import QUANTITIES
 from gridpeers.scenarios.schema.participants import with_agent
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
@@ -60,7 +60,7 @@ class Nameplates:
         )
 
     @classmethod
-    def of_columns(cls, names: Sequence[str], feeder: Feeder) -> Nameplates:
+    def of_columns(cls, names: Sequence[str], feeder: Tables) -> Nameplates:
         """Take the nameplates of the columns of a history, spare inverters among them."""
         rows = {row.name: row for row in (*feeder.inverters, *feeder.spares)}
         return cls.of([rows[name] for name in names])
@@ -209,7 +209,7 @@ def late_moves(scenario: ScenarioModel, recorded: Iterable[PlantEvent]) -> list[
 
 
 def messages_saved(
-    scenario: ScenarioModel, feeder: Feeder, case: str, quiet: Sequence[tuple[float, int]], windows: Sequence[Window]
+    scenario: ScenarioModel, feeder: Tables, case: str, quiet: Sequence[tuple[float, int]], windows: Sequence[Window]
 ) -> dict[str, float]:
     """Return the share of states that the laws did not send, by window; nothing if they sent all."""
     if not quiet:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 from gridpeers.plant.equipment.connectivity import bus_islands, switch_name, switch_names
 from gridpeers.plant.simulators import SIMULATORS
 from gridpeers.scenarios.results.history import UNITS, Floats, History, Nameplates, Window
@@ -19,7 +19,7 @@ from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.wire.messages import PlantEvent
 
 
-def switch_events(scenario: ScenarioModel, feeder: Feeder, recorded: Iterable[PlantEvent]) -> tuple[PlantEvent, ...]:
+def switch_events(scenario: ScenarioModel, feeder: Tables, recorded: Iterable[PlantEvent]) -> tuple[PlantEvent, ...]:
     """Return the operations of switches that a plant recorded, in the order of time.
 
     A federation's plant need not record any: then they are those that the scenario plans. Of every other plant, no
@@ -37,7 +37,7 @@ def switch_events(scenario: ScenarioModel, feeder: Feeder, recorded: Iterable[Pl
 
 
 def closed_switches(
-    feeder: Feeder, events: Iterable[PlantEvent], before: Collection[str] | None = None
+    feeder: Tables, events: Iterable[PlantEvent], before: Collection[str] | None = None
 ) -> frozenset[str]:
     """Return the switches that are closed after some events; `before` are those closed before, by default at the start.
 
@@ -86,7 +86,7 @@ RowMeasure = Callable[[History, Nameplates], Floats]  # A measure of each row
 
 
 def island_intervals(
-    scenario: ScenarioModel, feeder: Feeder, inverters: Sequence[str], recorded: Iterable[PlantEvent]
+    scenario: ScenarioModel, feeder: Tables, inverters: Sequence[str], recorded: Iterable[PlantEvent]
 ) -> tuple[IslandInterval, ...]:
     """Return the islands of a run over time, in the order of time and without gaps.
 
@@ -104,7 +104,7 @@ def island_intervals(
     )
 
 
-def _islands(feeder: Feeder, inverters: Sequence[str], closed: frozenset[str]) -> Islands:
+def _islands(feeder: Tables, inverters: Sequence[str], closed: frozenset[str]) -> Islands:
     bus_of = {row.name: row.bus for row in (*feeder.inverters, *feeder.spares)}
     source = feeder.source.bus if feeder.source else None
     around = {bus: buses for buses in bus_islands(feeder, closed) for bus in buses}
@@ -130,7 +130,7 @@ def part_of(history: History, nameplates: Nameplates, names: tuple[str, ...]) ->
     return replace(history, inverters=names, **columns), replace(nameplates, names=names, **mine)
 
 
-def taken_part(scenario: ScenarioModel, feeder: Feeder, history: History) -> History:
+def taken_part(scenario: ScenarioModel, feeder: Tables, history: History) -> History:
     """Return the history of a live run without the spare inverters that nobody ever started."""
     own, present = {row.name for row in inverters_of(scenario, feeder)}, history.present
     names = tuple(name for i, name in enumerate(history.inverters) if name in own or bool(present[:, i].any()))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import msgspec
 
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 from gridpeers.scenarios.results.metric import UNITS
 from gridpeers.scenarios.results.record import Recorded
 from gridpeers.scenarios.schema import ScenarioModel
@@ -31,7 +31,7 @@ class RunMetrics:
 
     scenario: ScenarioModel
     """Checked; with the seed and the cases asked for."""
-    feeder: Feeder
+    feeder: Tables
     driver: str
     """Driver of the run: "processes", "inprocess", or "live"."""
     folder: Path

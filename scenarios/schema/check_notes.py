@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from gridpeers.plant.build import plant_at_rest
 from gridpeers.plant.dynamics import PlantError
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 from gridpeers.plant.simulators import SIMULATORS
 from gridpeers.scenarios.schema.configs import configs
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 
 
-def start_problem(scenario: ScenarioModel, feeder: Feeder) -> str:
+def start_problem(scenario: ScenarioModel, feeder: Tables) -> str:
     """Return why the plant has no operating point at t = 0, or cannot operate an event's switches; "" if it can."""
     if SIMULATORS.resolve(scenario.plant.simulator).elsewhere:  # it finds its own
         return ""

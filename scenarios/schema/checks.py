@@ -7,7 +7,7 @@ import re
 import unicodedata
 from itertools import pairwise
 
-from gridpeers.plant.equipment import Feeder, InverterRow
+from gridpeers.plant.equipment import InverterRow, Tables
 from gridpeers.plant.inverters.inverter_model import InverterModel
 from gridpeers.plant.inverters.inverter_registry import foreign, given, with_published
 from gridpeers.plant.known_names import DEFAULTS, defaults
@@ -56,7 +56,7 @@ def check_names(scenario: ScenarioModel, problems: Problems) -> None:
         problems.add("case", "there is no case; write at least one table [case.NAME]")
 
 
-def check_start(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
+def check_start(scenario: ScenarioModel, feeder: Tables, problems: Problems) -> None:
     """Note first set-points that an inverter cannot give: the start would be no equilibrium."""
     plant, P, V = scenario.plant, scenario.plant.P_set0_pu, scenario.plant.V_set0_pu
     if problems.touch("plant.gfm", "plant.gfl"):
@@ -137,7 +137,7 @@ _MOVES = {
 """Keys of an event that move switches or agents: the state after it, words for that state before it, and the remedy."""
 
 
-def check_moves(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
+def check_moves(scenario: ScenarioModel, feeder: Tables, problems: Problems) -> None:
     """Note unknown switches and agents in events, and those that are already where an event moves them."""
     switches = {name: switch.name for switch in feeder.switches for name in switch.names}
     names_shown = [switch.alias or switch.name for switch in feeder.switches]
@@ -170,7 +170,7 @@ def check_moves(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> 
                 (there.add if into else there.discard)(which)
 
 
-def check_limits(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
+def check_limits(scenario: ScenarioModel, feeder: Tables, problems: Problems) -> None:
     rows, plant = {row.name: row for row in inverters_of(scenario, feeder)}, scenario.plant
     limits = [(f"event[{i}].P_max_kW", event.P_max_kW) for i, event in enumerate(scenario.events)]
     for case, rule in scenario.cases.items():
@@ -193,7 +193,7 @@ def check_limits(scenario: ScenarioModel, feeder: Feeder, problems: Problems) ->
             problems.add(path, f"{name} can have from 0 to {most:g} kW available, got {kW:g} kW{hint}")
 
 
-def check_changes(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
+def check_changes(scenario: ScenarioModel, feeder: Tables, problems: Problems) -> None:
     rows = {row.name: row for row in (*feeder.inverters, *feeder.spares)}
     for name, table in scenario.plant.inverter.items():
         path = f"plant.inverter.{name}"
@@ -247,7 +247,7 @@ def check_protection(scenario: ScenarioModel, f_nom: float, problems: Problems) 
             )
 
 
-def _check_own(row: InverterRow, scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
+def _check_own(row: InverterRow, scenario: ScenarioModel, feeder: Tables, problems: Problems) -> None:
     plant, path = scenario.plant, f"plant.inverter.{row.name}"
     own = row.parameters or row.own
     if not own or problems.touch("plant.gfm", "plant.gfl", path, f"{path}.parameters") or problems.below(path):
@@ -311,7 +311,7 @@ def check_times(scenario: ScenarioModel, problems: Problems) -> None:
             )
 
 
-def check_step(scenario: ScenarioModel, feeder: Feeder | None, problems: Problems) -> None:
+def check_step(scenario: ScenarioModel, feeder: Tables | None, problems: Problems) -> None:
     gfm, gfl = scenario.plant.gfm, scenario.plant.gfl
     of = {
         (table, name): T

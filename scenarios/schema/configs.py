@@ -8,7 +8,7 @@ from pathlib import Path
 import msgspec
 
 from gridpeers.agents.agent_config import MAX_AGE, AgentConfig, Control
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 from gridpeers.plant.equipment.derived_feeders import changed
 from gridpeers.plant.inverters.inverter_registry import given
 from gridpeers.plant.plant_config import (
@@ -26,7 +26,7 @@ from gridpeers.scenarios.schema.supply import load_events
 
 
 def configs(
-    scenario: ScenarioModel, feeder: Feeder, case: str, endpoint: str = "", *, real_nodes: bool = False
+    scenario: ScenarioModel, feeder: Tables, case: str, endpoint: str = "", *, real_nodes: bool = False
 ) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
     """Return the configurations of the plant and of every agent for one case of a checked scenario, later joiners last.
 
@@ -170,7 +170,7 @@ def changes_of(scenario: ScenarioModel) -> FeederChanges:
     )
 
 
-def as_in(scenario: ScenarioModel, feeder: Feeder) -> Feeder:
+def as_in(scenario: ScenarioModel, feeder: Tables) -> Tables:
     return changed(feeder, changes_of(scenario))
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from gridpeers.plant.equipment import F_NOM, Feeder
+from gridpeers.plant.equipment import F_NOM, Tables
 from gridpeers.plant.simulators import SIMULATORS
 from gridpeers.plant.tables import FeederError, feeders, is_folder, read_feeder
 from gridpeers.scenarios.catalogue_files import CATALOGUE, names_in
@@ -23,7 +23,7 @@ from gridpeers.scenarios.schema.supply import check_loads, check_supply
 from gridpeers.wire.text_file import TextFileError, text_of
 from gridpeers.wire.wording import suggestion
 
-ReadFeeder = Callable[[str, str], Feeder]
+ReadFeeder = Callable[[str, str], Tables]
 
 
 def catalogue() -> tuple[str, ...]:
@@ -54,7 +54,7 @@ def find_file(name: str, folder: Path, what: str) -> Path:
     raise ScenarioError([f'no {what} "{name}"; {suggestion(name, names, f"{what}s of the catalogue")}'])
 
 
-def load_scenario(name: str | Path) -> tuple[ScenarioModel, Feeder]:
+def load_scenario(name: str | Path) -> tuple[ScenarioModel, Tables]:
     """Read and check a scenario of the catalogue or a file, and its feeder; ScenarioError has every problem of both."""
     path = find_scenario(str(name))
     text, data = read_toml(path)
@@ -85,7 +85,7 @@ def read_tables(data: Mapping[str, Any], problems: Problems) -> ScenarioModel:
 
 def check_tables(
     data: Mapping[str, Any], path: Path, problems: Problems, read_feeder: ReadFeeder = read_feeder
-) -> tuple[ScenarioModel, Feeder | None]:
+) -> tuple[ScenarioModel, Tables | None]:
     """Read the tables of a scenario and note every problem; the scenario is of use only if there is none.
 
     Relative paths start at the folder of `path`, whose name is that of a scenario without one.
@@ -130,7 +130,7 @@ def _malformed(file: str, text: str, reason: str) -> str:
     return f"{file}:{line}: not valid TOML: {reason.partition(' (at')[0]}: {lines[line - 1].strip()}"
 
 
-def _feeder_of(scenario: ScenarioModel, problems: Problems, read_feeder: ReadFeeder) -> Feeder | None:
+def _feeder_of(scenario: ScenarioModel, problems: Problems, read_feeder: ReadFeeder) -> Tables | None:
     if problems.touch("plant.feeder"):
         return None
     name, load_set = scenario.plant.feeder, scenario.plant.load_set

@@ -10,7 +10,7 @@ import msgspec
 
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.netem.schema.trace_file import with_traces
-from gridpeers.plant.equipment import Feeder, InverterRow
+from gridpeers.plant.equipment import InverterRow, Tables
 from gridpeers.plant.equipment.connectivity import SwitchOperations, islands_after
 from gridpeers.plant.plant_config import ScheduledAction
 from gridpeers.plant.simulators import OURS, SIMULATORS
@@ -22,7 +22,7 @@ from gridpeers.wire.schema.table_schema import NO_KEY, Problem, fields_of
 from gridpeers.wire.wording import suggestion
 
 
-def inverters_of(scenario: ScenarioModel, feeder: Feeder) -> tuple[InverterRow, ...]:
+def inverters_of(scenario: ScenarioModel, feeder: Tables) -> tuple[InverterRow, ...]:
     joining = {name for event in scenario.events for name in event.join}
     return (*feeder.inverters, *(row for row in feeder.spares if row.name in joining))
 
@@ -39,7 +39,7 @@ def without_agent(scenario: ScenarioModel, case: str) -> frozenset[str]:
     return frozenset((*scenario.without_agent, *scenario.cases[case].without_agent))
 
 
-def with_agent(scenario: ScenarioModel, feeder: Feeder, case: str) -> tuple[InverterRow, ...]:
+def with_agent(scenario: ScenarioModel, feeder: Tables, case: str) -> tuple[InverterRow, ...]:
     """Return the inverters that have an agent in a case, those that join later last."""
     without = without_agent(scenario, case)
     return tuple(row for row in inverters_of(scenario, feeder) if row.name not in without)
@@ -73,7 +73,7 @@ def check_simulator(scenario: ScenarioModel, problems: Problems) -> None:
                 problems.add(f"event[{i}].{key}", what)
 
 
-def check_agentless(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
+def check_agentless(scenario: ScenarioModel, feeder: Tables, problems: Problems) -> None:
     names = tuple(row.name for row in inverters_of(scenario, feeder))
     _check_names("without_agent", scenario.without_agent, names, problems)
     moved = {name: event.label for event in scenario.events for name in (*event.leave, *event.join)}
@@ -126,7 +126,7 @@ def netem_of(scenario: ScenarioModel, case: str) -> Netem:
     return Netem(seed=scenario.seed, **entries)
 
 
-def setup_of(netem: Netem, scenario: ScenarioModel, feeder: Feeder, *, real_nodes: bool) -> EmulationConfig:
+def setup_of(netem: Netem, scenario: ScenarioModel, feeder: Tables, *, real_nodes: bool) -> EmulationConfig:
     """Return a case's faults as the processes take them: islands resolved, as the scenario's switches make them."""
     if any(partition.by == "island" for partition in netem.partitions):
         netem = netem.over(_islands_over_time(scenario, feeder))
@@ -138,7 +138,7 @@ def deaths_of(netem: Netem) -> tuple[ScheduledAction, ...]:
     return tuple(ScheduledAction(t=node.from_s, inverter=node.name, action="die") for node in netem.nodes if node.kill)
 
 
-def _islands_over_time(scenario: ScenarioModel, feeder: Feeder) -> list[tuple[float, dict[str, str]]]:
+def _islands_over_time(scenario: ScenarioModel, feeder: Tables) -> list[tuple[float, dict[str, str]]]:
     times = [0.0, *(event.t_s for event in scenario.events)]
     operations: list[SwitchOperations] = [((), ()), *((event.open, event.close) for event in scenario.events)]
     rows = (*feeder.inverters, *feeder.spares)
@@ -167,7 +167,7 @@ def with_delays(scenario: ScenarioModel, folder: Path, problems: Problems) -> Sc
     return msgspec.structs.replace(scenario, netem=read(scenario.netem, ""), cases=cases)
 
 
-def check_netem(scenario: ScenarioModel, feeder: Feeder | None, problems: Problems) -> None:
+def check_netem(scenario: ScenarioModel, feeder: Tables | None, problems: Problems) -> None:
     """Note unknown names, values that are not plausible, and contradictory entries; without a feeder all names pass."""
     rows = inverters_of(scenario, feeder) if feeder else ()
     names = tuple(row.name for row in rows) if feeder else None

@@ -15,7 +15,7 @@ from gridpeers.agents.carriers.law_registry import KEYS, LAWS, shared_by
 from gridpeers.agents.graphs import GRAPHS, check_graph, make_graph
 from gridpeers.netem.models.own_fault import FAULTS
 from gridpeers.netem.schema.netem import Netem
-from gridpeers.plant.equipment import Feeder, InverterRow
+from gridpeers.plant.equipment import InverterRow, Tables
 from gridpeers.plant.inverters.inverter_registry import INVERTERS, given
 from gridpeers.scenarios.checks.check_registry import ALWAYS as ALWAYS_CHECKED
 from gridpeers.scenarios.checks.check_registry import CHECKS, LAW_FAILED, switched_off
@@ -140,7 +140,7 @@ def _labelled(key: PluginKey, registry: Registry[Any]) -> PluginKey:
     return table | {"name": use} if registry.reference(use) != use and "name" not in table and good_name(use) else key
 
 
-def check_plugins(scenario: ScenarioModel, feeder: Feeder | None, problems: Problems) -> None:
+def check_plugins(scenario: ScenarioModel, feeder: Tables | None, problems: Problems) -> None:
     key = scenario.paper  # one known by name is not imported before a run is judged: to read a scenario takes no numpy
     if not problems.touch("paper") and key and not (isinstance(key, str) and key in BENCHMARKS.names):
         _check("paper", key, BENCHMARKS, problems)
@@ -197,7 +197,7 @@ def _check_laws(scenario: ScenarioModel, problems: Problems) -> None:
             problems.add(f"case.{name}.degraded_communication.weights", text)
 
 
-def _check_graphs(scenario: ScenarioModel, feeder: Feeder | None, problems: Problems) -> None:
+def _check_graphs(scenario: ScenarioModel, feeder: Tables | None, problems: Problems) -> None:
     for name, case in scenario.cases.items():
         path = f"case.{name}.graph"
         if problems.touch(path):
@@ -252,7 +252,7 @@ def _check(path: str, key: PluginKey, registry: Registry[Any], problems: Problem
     return plugin
 
 
-def _rosters(scenario: ScenarioModel, feeder: Feeder, case: str) -> Iterator[dict[str, InverterRow]]:
+def _rosters(scenario: ScenarioModel, feeder: Tables, case: str) -> Iterator[dict[str, InverterRow]]:
     rows = with_agent(scenario, feeder, case)
     present = {row.name for row in rows if not row.spare}
     yield {row.name: row for row in rows if row.name in present}

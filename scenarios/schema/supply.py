@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator
 from itertools import chain
 from typing import NamedTuple
 
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 from gridpeers.plant.equipment.connectivity import Connectivity, Node
 from gridpeers.plant.equipment.named_loads import LoadPowers, with_powers
 from gridpeers.plant.plant_config import LoadEvent
@@ -24,7 +24,7 @@ def load_events(scenario: ScenarioModel) -> tuple[LoadEvent, ...]:
     )
 
 
-def powers_after(scenario: ScenarioModel, feeder: Feeder) -> Iterator[tuple[Event, dict[str, complex]]]:
+def powers_after(scenario: ScenarioModel, feeder: Tables) -> Iterator[tuple[Event, dict[str, complex]]]:
     """Yield each event of a checked scenario, and the loads whose power (VA, nominal) an event has set until then."""
     powers, now = _load_powers(scenario, feeder), dict[str, complex]()
     for event in scenario.events:
@@ -34,7 +34,7 @@ def powers_after(scenario: ScenarioModel, feeder: Feeder) -> Iterator[tuple[Even
         yield event, dict(now)
 
 
-def check_loads(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
+def check_loads(scenario: ScenarioModel, feeder: Tables, problems: Problems) -> None:
     powers, now = _load_powers(scenario, feeder), dict[str, complex]()
     for i, event in enumerate(scenario.events):
         named: set[str] = set()
@@ -58,7 +58,7 @@ def check_loads(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> 
                 problems.add(path, f"{error}{more}")
 
 
-def _load_powers(scenario: ScenarioModel, feeder: Feeder) -> LoadPowers:
+def _load_powers(scenario: ScenarioModel, feeder: Tables) -> LoadPowers:
     return LoadPowers(feeder, sum(row.P_rated for row in inverters_of(scenario, feeder)))
 
 
@@ -82,7 +82,7 @@ class SupplyState(NamedTuple):
     inverters: frozenset[str]
 
 
-def check_supply(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
+def check_supply(scenario: ScenarioModel, feeder: Tables, problems: Problems) -> None:
     start = next(supply_states(scenario, feeder))
     if what := _what(start.dead, start.inverters, feeder):
         problems.add(
@@ -92,7 +92,7 @@ def check_supply(scenario: ScenarioModel, feeder: Feeder, problems: Problems) ->
         )
 
 
-def supply_notes(scenario: ScenarioModel, feeder: Feeder) -> tuple[str, ...]:
+def supply_notes(scenario: ScenarioModel, feeder: Tables) -> tuple[str, ...]:
     """Return sentences on what each event of a checked scenario de-energises or overloads: it may be meant."""
     notes, rows = [], inverters_of(scenario, feeder)
     after = (with_powers(feeder, powers) if powers else feeder for _, powers in powers_after(scenario, feeder))
@@ -116,7 +116,7 @@ def supply_notes(scenario: ScenarioModel, feeder: Feeder) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def supply_states(scenario: ScenarioModel, feeder: Feeder) -> Iterator[SupplyState]:
+def supply_states(scenario: ScenarioModel, feeder: Tables) -> Iterator[SupplyState]:
     graph = Connectivity(feeder)
     closed = graph.closed_at_start()
     names = {name: switch.name for switch in feeder.switches for name in switch.names}
@@ -136,12 +136,12 @@ def supply_states(scenario: ScenarioModel, feeder: Feeder) -> Iterator[SupplySta
         before = nodes
 
 
-def _load(nodes: Collection[Node], feeder: Feeder) -> float:
+def _load(nodes: Collection[Node], feeder: Tables) -> float:
     """Real power (W) of the loads at some nodes; of a delta load every branch that has one of its ends there."""
     return sum(S.real for bus, ends, S in feeder.demands() if any((bus, phase) in nodes for phase in ends))
 
 
-def _what(nodes: frozenset[Node], inverters: frozenset[str], feeder: Feeder) -> str:
+def _what(nodes: frozenset[Node], inverters: frozenset[str], feeder: Tables) -> str:
     """Buses with their load and inverters; "" where there is nothing that would miss its voltage."""
     buses = [bus.name for bus in feeder.buses if any((bus.name, phase) in nodes for phase in bus.phases)]
     lost = _load(nodes, feeder)

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 from gridpeers.plant.tables import read_feeder
 from gridpeers.scenarios.catalogue_files import SWEEPS, names_in
 from gridpeers.scenarios.schema import ScenarioError, ScenarioModel, find_scenario, load_scenario
@@ -62,7 +62,7 @@ class BaseScenario(NamedTuple):
     path: Path
     """Its file: relative paths start there."""
     scenario: ScenarioModel
-    feeder: Feeder
+    feeder: Tables
 
 
 def checked_runs(
@@ -72,13 +72,13 @@ def checked_runs(
     cases: Sequence[str],
     origin: Mapping[str, str],
     problems: Problems,
-) -> tuple[list[Run], Sequence[Feeder]]:
+) -> tuple[list[Run], Sequence[Tables]]:
     """Check every sample, and return its runs and all feeders; both are of use only when no problem is noted.
 
     Each problem is noted at its `origin`, the key of the sweep file by key of the scenario.
     """
     runs: list[Run] = []
-    feeders: dict[tuple[str, str], Feeder] = {}
+    feeders: dict[tuple[str, str], Tables] = {}
     wrong: dict[tuple[str, str], list[int]] = {}
     reader = lru_cache(maxsize=None)(read_feeder)
     for i, setting in enumerate(settings):

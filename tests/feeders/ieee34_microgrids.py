@@ -16,7 +16,7 @@ from msgspec.structs import replace
 
 import gridpeers.plant.data
 from gridpeers.bridges.opendss import read_opendss
-from gridpeers.plant.equipment import Feeder, InverterRow
+from gridpeers.plant.equipment import InverterRow, Tables
 from gridpeers.plant.tables.write import write_feeder
 
 SCRIPT = Path(__file__).parent / "ieee34.dss"
@@ -47,7 +47,7 @@ PLACES = {
 """Buses of each zone, with drawing coordinates of ours (units)."""
 
 
-def ieee34_microgrids() -> Feeder:
+def ieee34_microgrids() -> Tables:
     """Return the feeder, by the OpenDSS engine."""
     text = SCRIPT.read_text(encoding="utf-8")
     text = re.sub(r"taps=\(1 [\d.]+\)", "taps=(1 1)", text).replace("pu=1.05", "pu=1.0")

@@ -31,7 +31,7 @@ from gridpeers.cli.usage import (
 from gridpeers.rooms import ROOMS
 
 if TYPE_CHECKING:
-    from gridpeers.plant.equipment import Feeder
+    from gridpeers.plant.equipment import Tables
     from gridpeers.runs.choices import Pace
     from gridpeers.scenarios.run_request import Driver
     from gridpeers.scenarios.schema import ScenarioModel
@@ -82,7 +82,7 @@ def run(
 
 def _carry_out(
     spec: ScenarioModel,
-    feeder: Feeder,
+    feeder: Tables,
     driver: Driver,
     out: Path | None,
     pace: Pace,
@@ -140,7 +140,7 @@ def _carry_out(
     raise typer.Exit(CLAIM_FAILED if failed else PASSED)
 
 
-def _check_keys(folder: Path, spec: ScenarioModel, feeder: Feeder) -> None:
+def _check_keys(folder: Path, spec: ScenarioModel, feeder: Tables) -> None:
     """End with every problem of the certificates that a run needs, before anything starts; say which end soon."""
     from gridpeers.scenarios.schema.configs import configs, secured
     from gridpeers.scenarios.schema.participants import inverters_of

@@ -12,7 +12,7 @@ import pandas as pd
 
 from gridpeers import measures, theory
 from gridpeers.measures import STEADY, Floats, History, Settling, Window, nameplates_of
-from gridpeers.theory import Feeder, InverterGroup, LoadStep, ScenarioModel, Times, VarResponse, inverter_group_of
+from gridpeers.theory import InverterGroup, LoadStep, ScenarioModel, Tables, Times, VarResponse, inverter_group_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,7 +20,7 @@ class CaseData:
     """A scenario that was run, with the history of each case."""
 
     scenario: ScenarioModel
-    feeder: Feeder
+    feeder: Tables
     histories: Mapping[str, History]
 
     def t(self, case: str) -> Floats:
@@ -129,7 +129,7 @@ class SweepData:
         return {style: self.base.cases[case].title for style, case in enumerate(cases)}
 
     @cached_property
-    def feeder(self) -> Feeder:
+    def feeder(self) -> Tables:
         return theory.feeder_of(self.base)
 
     @cached_property

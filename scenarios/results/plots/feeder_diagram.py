@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
-from gridpeers.plant.equipment import Feeder, Switch
+from gridpeers.plant.equipment import Switch, Tables
 from gridpeers.plant.equipment.connectivity import Connectivity
 from gridpeers.scenarios.results.plots.places import PlacedLabel, Places, has_coordinates, label_sides, places
 from gridpeers.wire.wording import counted
@@ -30,7 +30,7 @@ MOST_ZONES = 10  # Microgrids and other zones that the legend names
 MOST_LABELS = 15  # Inverters beyond which their names are left out, which would cover each other
 
 
-def feeder_diagram(feeder: Feeder, V: Mapping[str, float] | None = None) -> Figure:
+def feeder_diagram(feeder: Tables, V: Mapping[str, float] | None = None) -> Figure:
     """Draw a feeder on its coordinates, or as a tree where it has none."""
     picture = Figure(figsize=(10.5, 7.2), layout="constrained")
     at, on_coordinates = places(feeder), has_coordinates(feeder)
@@ -73,7 +73,7 @@ def feeder_diagram(feeder: Feeder, V: Mapping[str, float] | None = None) -> Figu
     return picture
 
 
-def _zones(feeder: Feeder) -> dict[str, str]:
+def _zones(feeder: Tables) -> dict[str, str]:
     """Return the zone of each bus: as its table says, else the microgrid whose inverters its section has."""
     if any(bus.zone for bus in feeder.buses):
         return {bus.name: bus.zone for bus in feeder.buses}
@@ -87,7 +87,7 @@ def _zones(feeder: Feeder) -> dict[str, str]:
     return found
 
 
-def _colours(feeder: Feeder, zones: Mapping[str, str]) -> dict[str, str]:
+def _colours(feeder: Tables, zones: Mapping[str, str]) -> dict[str, str]:
     beside = {"", zones[feeder.source.bus] if feeder.source is not None else ""}
     first = [row.microgrid for row in feeder.inverters]
     named = [zone for zone in dict.fromkeys((*first, *zones.values())) if zone not in beside]
@@ -99,7 +99,7 @@ def _middle(switch: Switch, at: Places) -> tuple[float, float]:
     return (a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0
 
 
-def _draw_labels(feeder: Feeder, at: Places, axes: Axes) -> None:
+def _draw_labels(feeder: Tables, at: Places, axes: Axes) -> None:
     """Write the names of marks where they cover least, then those of buses where they cover nothing."""
     marked: list[PlacedLabel] = []
     if feeder.source is not None:
@@ -152,7 +152,7 @@ def _on_paper(axes: Axes, places: list[tuple[float, float]]) -> NDArray[np.float
     return np.asarray(axes.transData.transform(np.array(places, float).reshape(-1, 2)) * scale)
 
 
-def _zone_handles(feeder: Feeder, zones: Mapping[str, str], colours: Mapping[str, str]) -> list[Line2D]:
+def _zone_handles(feeder: Tables, zones: Mapping[str, str], colours: Mapping[str, str]) -> list[Line2D]:
     """Return the lines of the legend that say what the colours are: microgrids and other zones, and what they have."""
     load = dict.fromkeys(zones.values(), 0.0)
     for bus, P in feeder.load_by_bus().items():
@@ -171,7 +171,7 @@ def _zone_handles(feeder: Feeder, zones: Mapping[str, str], colours: Mapping[str
     return handles
 
 
-def _mark_handles(feeder: Feeder, *, coloured: bool, loads: bool) -> list[Line2D]:
+def _mark_handles(feeder: Tables, *, coloured: bool, loads: bool) -> list[Line2D]:
     kinds, states = {row.kind for row in feeder.inverters}, {switch.closed for switch in feeder.switches}
     of = ", in its microgrid's colour" if coloured else ""
     marks = (

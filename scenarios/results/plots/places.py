@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 
 Places = Mapping[str, tuple[float, float]]  # Place of each bus (drawing units)
 
 
-def places(feeder: Feeder) -> dict[str, tuple[float, float]]:
+def places(feeder: Tables) -> dict[str, tuple[float, float]]:
     """Return where each bus is drawn: its coordinates, else beside a neighbour; a tree if the feeder has none."""
     if not has_coordinates(feeder):
         return _tree(feeder)
@@ -28,12 +28,12 @@ def places(feeder: Feeder) -> dict[str, tuple[float, float]]:
     return {bus.name: known.get(bus.name, (bus.x, bus.y)) for bus in feeder.buses}
 
 
-def has_coordinates(feeder: Feeder) -> bool:
+def has_coordinates(feeder: Tables) -> bool:
     """Return whether a feeder is drawn on its coordinates: more than a quarter of its buses stand apart."""
     return len({(bus.x, bus.y) for bus in feeder.buses}) > len(feeder.buses) // 4
 
 
-def _neighbours(feeder: Feeder) -> dict[str, list[str]]:
+def _neighbours(feeder: Tables) -> dict[str, list[str]]:
     found: dict[str, list[str]] = {bus.name: [] for bus in feeder.buses}
     ends = [(a, b) for a, b, _ in feeder.branches()]
     for a, b in (*ends, *((switch.from_bus, switch.to_bus) for switch in feeder.switches)):
@@ -42,7 +42,7 @@ def _neighbours(feeder: Feeder) -> dict[str, list[str]]:
     return found
 
 
-def _tree(feeder: Feeder) -> dict[str, tuple[float, float]]:
+def _tree(feeder: Tables) -> dict[str, tuple[float, float]]:
     """Place each bus by its distance from the substation, and its branches side by side: none crosses another."""
     neighbours = _neighbours(feeder)
     first = feeder.source.bus if feeder.source else feeder.buses[0].name

@@ -11,7 +11,7 @@ import pandas as pd
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.papers.singhal2022.experiments.experiment_data import CaseData, SweepData
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.results.history import History
 from gridpeers.scenarios.results.record import Recorder
@@ -52,7 +52,7 @@ def theory(scenario: str) -> SweepData:
     return SweepData(rows=pd.DataFrame(), base=load_scenario(scenario)[0], window="event1")
 
 
-def _history(spec: ScenarioModel, feeder: Feeder, case: str) -> History:
+def _history(spec: ScenarioModel, feeder: Tables, case: str) -> History:
     plant, agents = configs(spec, feeder, case)
     recorder = Recorder()
     outcome = run_inprocess(plant, agents, recorder, plant=plant_at_start(plant))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from gridpeers.plant.equipment import Bus, Feeder
+from gridpeers.plant.equipment import Bus, Tables
 from gridpeers.plant.network import Network
 
 PAPER_ISLANDS = ("13-152", "sw1_2", "sw2_3")
@@ -21,11 +21,11 @@ def zones(network: Network, *names: str) -> frozenset[str]:
     return frozenset(bus.name for bus in network.feeder.buses if bus.zone in names)
 
 
-def feeder(**tables: Any) -> Feeder:
+def feeder(**tables: Any) -> Tables:
     """A feeder of which only some tables have rows."""
     empty: dict[str, Any] = dict.fromkeys(("lines", "line_configs", "switches", "loads", "capacitors"), ())
     empty |= dict.fromkeys(("regulators", "transformers", "inverters"), ())
-    return Feeder(name="test", load_set="test", **(empty | {"source": None} | tables))
+    return Tables(name="test", load_set="test", **(empty | {"source": None} | tables))
 
 
 def three_phase_bus(name: str, V_nom: float = 2400.0) -> Bus:

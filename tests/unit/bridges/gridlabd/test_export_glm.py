@@ -12,7 +12,7 @@ import pytest
 from msgspec.structs import replace
 
 from gridpeers.bridges.gridlabd.glm import export_glm, inverter_blocks
-from gridpeers.plant.equipment import Feeder, Load
+from gridpeers.plant.equipment import Load, Tables
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.inverters.gfl import Gfl
 from gridpeers.plant.inverters.gfm_droop import GfmDroop
@@ -43,7 +43,7 @@ def voltages(text: str, folder: Path) -> dict[str, list[complex]]:
     return {name: [complex(float(a), float(b)) for a, b in list(pairwise(values))[::2]] for name, *values in rows}
 
 
-def largest_difference(feeder: Feeder, theirs: dict[str, list[complex]]) -> float:
+def largest_difference(feeder: Tables, theirs: dict[str, list[complex]]) -> float:
     """Largest difference (pu) over all nodes of a power flow; behind a delta winding, over phase to phase."""
     network = Network(feeder)
     V = solve_power_flow(network, network.closed0, tolerance=1e-12).V

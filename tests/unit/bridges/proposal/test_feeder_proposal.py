@@ -17,7 +17,7 @@ from gridpeers.bridges.proposal.feeder_proposal import (
     cut_off_sums,
     propose,
 )
-from gridpeers.plant.equipment import Bus, Feeder, Source, Switch
+from gridpeers.plant.equipment import Bus, Source, Switch, Tables
 from gridpeers.plant.equipment.imported_equipment import LinearElement, LoadPart
 from gridpeers.plant.tables import read_feeder
 from gridpeers.scenarios.results.plots.feeder_diagram import feeder_diagram
@@ -32,7 +32,7 @@ def series(name: str, start: str, end: str, phases: str) -> LinearElement:
     return LinearElement(name=name, nodes=nodes, Y=rows)
 
 
-def feeder(phases: str = "ABC", P: float = 5e5, *, switched: bool = False, places: bool = False) -> Feeder:
+def feeder(phases: str = "ABC", P: float = 5e5, *, switched: bool = False, places: bool = False) -> Tables:
     """A substation, a line (behind a switch if there is one) and a second line to a load."""
     names = ("s", "s~l", "a", "b") if switched else ("s", "a", "b")
     buses = tuple(
@@ -41,7 +41,7 @@ def feeder(phases: str = "ABC", P: float = 5e5, *, switched: bool = False, place
     )
     switch = Switch(name="s-s~l", alias="l", from_bus="s", to_bus="s~l", phases=phases, closed=True)
     part = LoadPart(name="load.l", bus="b", ends=(phases[0], ""), S=complex(P), V_nom=2400.0, exponents=(2.0, 2.0))
-    return Feeder(
+    return Tables(
         name="small",
         load_set="main",
         buses=buses,
@@ -84,7 +84,7 @@ def test_without_a_switch_lines_to_be_one_are_named() -> None:
         (feeder(P=0.0, switched=True), "the feeder has no load"),
     ],
 )
-def test_what_cannot_be_islanded_says_why(small: Feeder, told: str) -> None:
+def test_what_cannot_be_islanded_says_why(small: Tables, told: str) -> None:
     """A feeder of one phase, and one without load, are refused in one line."""
     with pytest.raises(NoProposalError, match=told):
         propose(small)
@@ -116,13 +116,13 @@ def test_inverters_carry_the_load_and_each_group_has_one_leader() -> None:
     assert leaders == dict.fromkeys(groups, 1)
 
 
-def two_sections(buses: int) -> Feeder:
+def two_sections(buses: int) -> Tables:
     """Beyond one switch a line with so many buses and little load, beyond another a bus with most of it."""
     names = ["s", "s~a", *(f"a{k}" for k in range(buses)), "b", "b1"]
     ties = [("s", "s~a"), (names[-3], "b")]
     lines = [(one, other) for one, other in pairwise(names) if (one, other) not in ties]
     loads = {**dict.fromkeys(names[2:-2], 2e5), "b1": 2e6}
-    return Feeder(
+    return Tables(
         name="two",
         load_set="main",
         buses=tuple(Bus(name=name, phases="ABC", V_nom=2400.0, x=0.0, y=0.0) for name in names),
@@ -170,7 +170,7 @@ def test_a_load_too_large_for_a_group_gets_more_and_one_too_large_for_all_is_ref
     """There are as many groups as a section's load and its voltage need, as far as it has buses."""
     feeder = read_feeder("standard123")
 
-    def times(k: float) -> Feeder:
+    def times(k: float) -> Tables:
         return replace(feeder, loads=tuple(replace(load, S=tuple(k * S for S in load.S)) for load in feeder.loads))
 
     assert len(propose(times(10.0)).inverters) > len(propose(feeder).inverters)

@@ -10,7 +10,7 @@ import numpy as np
 from gridpeers.agents.agent import Agent
 from gridpeers.lab.predict.inverter_group import InverterGroup, inverter_group_of
 from gridpeers.plant.build import build_plant
-from gridpeers.plant.equipment import F_NOM, Feeder
+from gridpeers.plant.equipment import F_NOM, Tables
 from gridpeers.plant.plant_stepper import measurement_of
 from gridpeers.scenarios.results.history import Floats
 from gridpeers.scenarios.results.metrics import F_BAND, MPSI_BAND, sharing_index
@@ -37,7 +37,7 @@ GRAPHS = {
 
 def scenario_of(
     graph: str, *, kappa: float | None = None, still_voltage: bool = False, end_s: float = 7.0
-) -> tuple[ScenarioModel, Feeder]:
+) -> tuple[ScenarioModel, Tables]:
     """Islanding alone, case "x" with this graph; kappa (1/s) instead of the scenario's 14.3; V_set left where it is."""
     scenario, feeder = load_scenario("islanding")
     case = scenario.cases["IV"]

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from bench.validation.kirchhoff import kirchhoff_residual
 from gridpeers.bridges.opendss import read_opendss
 from gridpeers.plant.dynamics import Dynamics
-from gridpeers.plant.equipment import Feeder, InverterRow, Line, LineConfig, Load, Source, Switch, Transformer
+from gridpeers.plant.equipment import InverterRow, Line, LineConfig, Load, Source, Switch, Tables, Transformer
 from gridpeers.plant.feeder.circuits import circuit_of
 from gridpeers.plant.feeder.plant import installed_inverters
 from gridpeers.plant.network import Network
@@ -38,7 +38,7 @@ Solve
 """Rotating machines and their like have another impedance of negative than of positive sequence: z12 is not z21."""
 
 
-def asymmetric(folder: Path) -> Feeder:
+def asymmetric(folder: Path) -> Tables:
     """Import a feeder with such elements, and three inverters."""
     lines = "".join(
         f"New {'Reactor' if k % 2 else 'Line'}.l{k} bus1=b{k} bus2=b{k + 1} "
@@ -79,7 +79,7 @@ def test_currents_balance_where_couplings_are_not_mutual(tmp_path: Path) -> None
     assert kirchhoff_residual(dynamics) < LARGEST
 
 
-def with_open_ends(seed: int) -> Feeder:
+def with_open_ends(seed: int) -> Tables:
     """Make a feeder with lines without charging whose far ends are open, behind a wye-wye transformer.
 
     Seen from their near end they are nothing: the couplings of the phases there cancel, exactly or nearly. Every second

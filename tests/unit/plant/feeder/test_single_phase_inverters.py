@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from msgspec.structs import replace
 
-from gridpeers.plant.equipment import Bus, Feeder, InverterRow, Line, LineConfig, Load, Source, Switch
+from gridpeers.plant.equipment import Bus, InverterRow, Line, LineConfig, Load, Source, Switch, Tables
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings, PowerLimit, Protection, SwitchEvent
@@ -31,7 +31,7 @@ def unit(name: str, kind: str, bus: str, phases: str, P_rated: float) -> Inverte
     )
 
 
-def small(*inverters: InverterRow, lateral_load: float = 40e3) -> Feeder:
+def small(*inverters: InverterRow, lateral_load: float = 40e3) -> Tables:
     """A substation 0, a switch, a line to bus 2, a line to bus 3, and from there behind a switch a lateral of phase B.
 
     ::
@@ -72,7 +72,7 @@ ON_LATERAL = (
 )
 
 
-def plant(of: Feeder, *events: SwitchEvent, **settings: object) -> Plant:
+def plant(of: Tables, *events: SwitchEvent, **settings: object) -> Plant:
     """The plant of a feeder, started at half of the ratings, with these switchings."""
     chosen = {"P_set0": 0.5, "events": events} | settings
     return Plant(Network(of), PlantSettings(**chosen), T_C, T_C)  # type: ignore[arg-type]

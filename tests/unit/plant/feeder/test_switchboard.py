@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from gridpeers.bridges.opendss import read_opendss
 from gridpeers.plant.dynamics import PlantError
-from gridpeers.plant.equipment import Feeder, InverterRow
+from gridpeers.plant.equipment import InverterRow, Tables
 from gridpeers.plant.equipment.imported_equipment import LoadPart, bus_behind
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.feeder.limit_events import PAUSE, LoadLimits
@@ -134,7 +134,7 @@ PV = "New PVSystem.pv bus1=d phases=3 kv=0.48 kva=60 pmpp=50 irradiance=1"
 HARDLY_GROUNDED = f"{GENERATOR}\nNew Load.r bus1=d phases=3 kv=0.48 kw=3 model=2"
 
 
-def scaled(folder: Path, connection: tuple[str, str], unit: str, factor: float) -> Feeder:
+def scaled(folder: Path, connection: tuple[str, str], unit: str, factor: float) -> Tables:
     """Import a feeder with a unit behind a transformer, its loads times a factor, and one inverter before it."""
     buses, windings = connection
     script = folder / "unit.dss"

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gridpeers.plant.dynamics.circuit import PlantError
 from gridpeers.plant.dynamics.inverters import Inverters
 from gridpeers.plant.dynamics.power_flow_at_rest import InverterPowerFlow
-from gridpeers.plant.equipment import Bus, Feeder, Line, LineConfig, Load, Source, Switch
+from gridpeers.plant.equipment import Bus, Line, LineConfig, Load, Source, Switch, Tables
 from gridpeers.plant.equipment.imported_equipment import LinearElement
 from gridpeers.plant.network import Network, solve_power_flow
 from gridpeers.plant.network.merging import DELTA, Merge
@@ -28,7 +28,7 @@ A = np.exp(2j * np.pi / 3.0)
 def one_bus(*loads: Load) -> Network:
     """A lone three-phase bus with loads."""
     return Network(
-        Feeder(
+        Tables(
             name="one bus",
             load_set="test",
             buses=(Bus(name="1", phases="ABC", V_nom=V_NOM),),

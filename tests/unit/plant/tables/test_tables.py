@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 from gridpeers.plant.tables import FeederError, feeders, read_feeder
 from gridpeers.plant.tables.read import DATA
 
@@ -36,7 +36,7 @@ def problems(folder: Path, load_set: str = "main") -> tuple[str, ...]:
     return caught.value.problems
 
 
-def zone_powers(feeder: Feeder) -> dict[str, complex]:
+def zone_powers(feeder: Tables) -> dict[str, complex]:
     """Sum of the loads of each zone (VA)."""
     zone = {bus.name: bus.zone for bus in feeder.buses}
     powers: dict[str, complex] = {}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from gridpeers.plant.equipment import Bus, Feeder, InverterRow
+from gridpeers.plant.equipment import Bus, InverterRow, Tables
 from gridpeers.plant.equipment.imported_equipment import LinearElement, LoadPart
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.network import Network
@@ -21,7 +21,7 @@ LOADS = {"A": 160e3 + 40e3j, "B": 80e3 + 20e3j, "C": 120e3 + 30e3j}
 """Constant powers (VA) by phase: unequal, so that the mean of the phases is no positive sequence."""
 
 
-def island(follower: float) -> Feeder:
+def island(follower: float) -> Tables:
     """A leader of 200 kVA, and over a line of one siemens a follower (W), the loads and a capacitor."""
     capacitor = LinearElement(
         name="capacitor.b",
@@ -29,7 +29,7 @@ def island(follower: float) -> Feeder:
         Y=tuple(tuple(0.01j if i == j else 0j for j in range(3)) for i in range(3)),
     )
     rows = [("inv1", "GFM", "a", 200e3), ("inv2", "GFL", "b", follower)]
-    return Feeder(
+    return Tables(
         name="island",
         load_set="main",
         source=None,
@@ -46,7 +46,7 @@ def island(follower: float) -> Feeder:
     )
 
 
-def balance_at_start(feeder: Feeder, settings: PlantSettings) -> IslandBalance:
+def balance_at_start(feeder: Tables, settings: PlantSettings) -> IslandBalance:
     """The balance of a plant's first row."""
     readings = Plant(Network(feeder), settings, 0.02, 0.02).measure()
     P, Q, V = np.array([(reading.P, reading.Q, reading.V) for reading in readings.values()]).T

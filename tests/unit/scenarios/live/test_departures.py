@@ -13,7 +13,7 @@ import pytest
 
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem, NodeFault
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.live.departures import compare
@@ -29,7 +29,7 @@ from gridpeers.scenarios.schema.scenario_model import Event, LoadChange
 from gridpeers.wire.messages import PlantEvent
 
 
-def one_case(name: str) -> tuple[ScenarioModel, Feeder]:
+def one_case(name: str) -> tuple[ScenarioModel, Tables]:
     """A scenario of the catalogue with its case IV alone, as a live run has it."""
     scenario, feeder = load_scenario(name)
     return msgspec.structs.replace(scenario, cases={"IV": scenario.cases["IV"]}), feeder

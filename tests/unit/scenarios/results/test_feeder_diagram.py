@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Tables
 from gridpeers.plant.equipment.derived_feeders import joined_copies
 from gridpeers.plant.tables import read_feeder
 from gridpeers.scenarios.results.plots.feeder_diagram import feeder_diagram
@@ -18,7 +18,7 @@ from gridpeers.scenarios.results.plots.places import PlacedLabel, label_sides
 Place = tuple[float, float]
 
 
-def legend(feeder: Feeder, V: dict[str, float] | None = None) -> list[str]:
+def legend(feeder: Tables, V: dict[str, float] | None = None) -> list[str]:
     """The words of a diagram's legend."""
     return [text.get_text() for text in feeder_diagram(feeder, V).legends[0].get_texts()]
 
