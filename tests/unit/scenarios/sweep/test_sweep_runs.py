@@ -69,7 +69,7 @@ from time import sleep
 from gridpeers.scenarios.sweep.workers import on_workers
 try:
     for _ in on_workers([(0.0,), *[(60.0,)] * 3], 2, sleep):
-        print("3 left")
+        print("10 % done")
 except KeyboardInterrupt:
     print("interrupted")
 """
@@ -92,7 +92,7 @@ def python(code: str, *words: str, cwd: Path) -> Iterator[subprocess.Popen[str]]
 def reached_a_tenth(running: subprocess.Popen[str]) -> bool:
     """Read what the command tells until a tenth of its runs is done."""
     assert running.stdout is not None
-    return any(line.endswith(" left\n") for line in running.stdout)
+    return any(line.endswith(" % done\n") and " 0 % " not in line for line in running.stdout)
 
 
 def test_a_killed_sweep_goes_on_and_gives_the_table_of_an_undisturbed_one(many: Path, tmp_path: Path) -> None:
