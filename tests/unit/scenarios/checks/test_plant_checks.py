@@ -188,20 +188,6 @@ def test_a_time_of_overload_longer_than_the_run_is_not_judged(sound: CheckedCase
     assert verdict(sound, "rating", since_s=5.9).status == "passed"
 
 
-def test_a_load_whose_new_power_is_not_told_ends_the_balance(sound: CheckedCase) -> None:
-    """Nobody knows what such a load takes: rows from then on are not judged."""
-
-    def fault(of: Arrays) -> None:
-        of["P"][of["t"] > 5.0, 1] *= 1.1
-
-    wrong = changed(sound, fault)
-    at = {t: PlantEvent(t=t, kind="load", subject="48", text="load 48 set to 0.5 of its power") for t in (1.0, 5.0)}
-
-    assert verdict(wrong, "power_balance").status == "failed"
-    assert verdict(replace(wrong, events=(*wrong.events, at[5.0])), "power_balance").status == "passed"
-    assert verdict(replace(wrong, events=(*wrong.events, at[1.0])), "power_balance").status == "not judged"
-
-
 @pytest.mark.parametrize(
     ("check", "limits"),
     [
