@@ -6,6 +6,7 @@ a row of a table; its model sees the row as a record.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from functools import cache
 from typing import Any
@@ -98,12 +99,19 @@ def address_of(model: type[InverterModel]) -> int:
     try:
         code.compile()
     except Exception as error:  # the compiler's, of what a pass of somebody's does
-        why = " ".join(str(error).split())[:300]
-        raise ValueError(
-            f"{model.__name__}: its pass `advance` cannot be compiled: {type(error).__name__}: {why}"
-        ) from None
+        raise ValueError(f"{model.__name__}: its pass `advance` cannot be compiled{_why(error)}") from None
     _kept.append(code)
     return int(code.address)
+
+
+def _why(error: Exception) -> str:
+    """Return where and why, as the compiler has it of the innermost function, at the end of a page on our own."""
+    text = str(error).rpartition("Failed in nopython mode pipeline")[2]
+    first = next((line.strip() for line in text.splitlines()[1:] if line.strip()), str(error))
+    line = re.search(r'File "(?:[^"]*/)?([^"]+)", line (\d+)', text)
+    where = f" ({line[1]}:{line[2]})" if line else ""
+    advice = "; if it is a function of yours, decorate it with `compiled`" if first.startswith("Untyped global") else ""
+    return f"{where}: {type(error).__name__}: {first[:300]}{advice}"
 
 
 def _called(function: Any) -> Iterator[Any]:
