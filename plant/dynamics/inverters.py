@@ -130,15 +130,21 @@ class Inverters:
         return v
 
     def rest(self, i: int, S: complex, v: float) -> None:
-        """Set a controller to rest at its present J, V and I, and the power and voltage (pu) that it measures."""
+        """Set a controller to rest at its present J, V and I, and the power and voltage (pu) that it measures.
+
+        PlantError if its model fails, which may be somebody's, or leaves a state that is no number.
+        """
         self.state[i, W], self.state[i, F] = 0.0, self.f_nom
-        own = self.constants(i), self.state_of(i)
+        own, state = self.constants(i), self.state_of(i)
         model = self.units[i].parameters
+        where = f"{self.units[i].name}: rest of the inverter model {type(model).__name__}"
         try:
-            model.rest(*own, self.V[i], self.I[i], self.J[i], S, v)
+            model.rest(own, state, self.V[i], self.I[i], self.J[i], S, v)
         except ANYTHING as error:  # a model may be a user's own
-            where = f"{self.units[i].name}: rest of the inverter model {type(model).__name__} fails"
-            raise PlantError(f"{where}{line_of(model.rest, error)}: {named(error)}") from error
+            raise PlantError(f"{where} fails{line_of(model.rest, error)}: {named(error)}") from error
+        named_states = zip(state.dtype.names or (), state, strict=True)
+        if wrong := [f"{name} = {value}" for name, value in named_states if value != value]:
+            raise PlantError(f"{where} gives {', '.join(wrong)}; every state must be a number there")
 
     def lock(self, i: int, w: float) -> None:
         """Let a controller at rest turn with an island (rad/s, relative to nominal) that it enters."""

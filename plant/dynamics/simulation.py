@@ -29,6 +29,7 @@ class Trip(NamedTuple):
     inverters: tuple[int, ...]  # disconnected inverters
     substation: bool  # whether the substation was disconnected too
     V_min: float  # their lowest terminal voltage before (pu); inf where only the substation was left
+    unreal: tuple[int, ...] = ()  # those whose model gave a current or a state that is no finite number
 
 
 class Dynamics:
@@ -120,7 +121,7 @@ class Dynamics:
         for i, w in speed.items() if on else ():
             units.lock(i, w)  # a PLL has locked to the island's frequency before the contactor closes
 
-    def _trip(self, islands: Iterable[int], step: int) -> None:
+    def _trip(self, islands: Iterable[int], step: int, unreal: Flags | None = None) -> None:
         """Disconnect all inverters of these islands; where there are none, the substation, which stays off.
 
         An island with the substation thus first loses only its inverters: the grid may be able to feed it without them.
@@ -133,7 +134,8 @@ class Dynamics:
         if bare:
             self.network.substation_on = False
         lowest = float(np.min(v, initial=np.inf))
-        self._trips.append(Trip(step, tuple(np.flatnonzero(lost).tolist()), bool(bare), lowest))
+        culprits = () if unreal is None else tuple(np.flatnonzero(lost & unreal).tolist())
+        self._trips.append(Trip(step, tuple(np.flatnonzero(lost).tolist()), bool(bare), lowest, culprits))
 
     def _solve_without(self, away: Flags) -> None:
         """Find the voltages at the open terminals of inverters that are about to return.
@@ -203,9 +205,10 @@ class Dynamics:
                 except NoSolutionError as error:
                     islands = set(error.islands)
             units = self.inverters  # go back to the start of the step that failed
+            finite = np.isfinite(units.J).all(axis=1) & np.isfinite(units.state).all(axis=1)
             units.state[:], units.J[:] = units.start, units.J_0
             network.note()
-            self._trip(sorted(islands), step)
+            self._trip(sorted(islands), step, ~finite)
             self.connect(network.circuit, step)
             begin, renewed = 2 * step, -1
         network.refresh(status, 2 * steps - begin)
