@@ -208,7 +208,7 @@ class Dynamics:
             finite = np.isfinite(units.J).all(axis=1) & np.isfinite(units.state).all(axis=1)
             units.state[:], units.J[:] = units.start, units.J_0
             network.note()
-            self._trip(sorted(islands), step, ~finite)
+            self._trip(sorted(islands), step, np.asarray(~finite))
             self.connect(network.circuit, step)
             begin, renewed = 2 * step, -1
         network.refresh(status, 2 * steps - begin)

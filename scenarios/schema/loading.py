@@ -80,7 +80,11 @@ def read_toml(path: Path) -> tuple[str, dict[str, Any]]:
 
 def read_tables(data: Mapping[str, Any], problems: Problems) -> ScenarioModel:
     """Return the scenario of parsed TOML; it is of use only while no problem is noted."""
-    return problems.read(ScenarioModel, {key: value for key, value in data.items() if key != AS_RUN})
+    tables = {key: value for key, value in data.items() if key != AS_RUN}
+    match tables.get("plant"):
+        case {"helics": {"federates": 0, **helics}, **plant}:  # runs saved until November 2026 have it
+            tables["plant"] = plant | {"helics": helics}
+    return problems.read(ScenarioModel, tables)
 
 
 def check_tables(

@@ -361,3 +361,10 @@ def test_an_event_is_measured_from_when_it_came() -> None:
     assert as_they_came(scenario, [left]) == [("islanding", 1.0), ("leave", 2.0), ("return", 3.0)]
     assert late_moves(scenario, [left]) == []
     assert late_moves(scenario, [left, back])[0].startswith("return, meant for t = 3 s, came at 3.32 s")
+
+
+def test_a_run_saved_with_a_key_that_is_no_more_can_be_read(tmp_path: Path) -> None:
+    """Its default means what there is without it; another value asks for what is gone, and is refused."""
+    load_scenario(written(tmp_path, f"{PLUG}\n[plant.helics]\nfederates = 0\n"))
+
+    assert "unknown key" in problems(tmp_path, f"{PLUG}\n[plant.helics]\nfederates = 2\n")[0]
