@@ -137,7 +137,7 @@ class LinkSchedules:
     Examples
     --------
     >>> schedules = LinkSchedules(Netem(), {"inv1": "MG1", "inv2": "MG1"})
-    >>> schedules.apply(Fault(on="inv1 -> inv2", cut=Cut(), from_s=1.0))
+    >>> schedules.apply(Fault(on="inv1 -> inv2", cut=True, from_s=1.0))
     >>> [kind for kind in schedules.of(Link("inv1", "inv2")).at(2.0).active]
     ['cut']
     """
