@@ -172,10 +172,10 @@ def measurement_of(
 
     Beyond its range a sensor shows the end of its scale, so a plant that swings wildly still grants its ticks.
     """
-    shown = list[float]()
-    for value, (low, high) in zip(reading[:6], _SCALES, strict=True):
-        shown.append(value if low <= value <= high else min(max(value, low), high))
-    P, Q, V, f, P_set, V_set = shown
+    P, Q, V, f, P_set, V_set = [
+        value if low <= value <= high else min(max(value, low), high)
+        for value, (low, high) in zip(reading[:6], _SCALES, strict=True)
+    ]
     return Measurement(
         sender=PLANT,
         epoch=epoch,
