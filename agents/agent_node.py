@@ -74,7 +74,7 @@ class AgentNode:
         self.stopped = ""
         self.failed = ""
         """Why the agent could not continue, or take part at all; empty otherwise."""
-        self.plant_seen = self.session_broken = False
+        self.session_broken = False
         self._config, self._instance = config, instance
         self._plant, self._plant_epoch = FollowedPlant(post, self._follow), 0
         self._agent = Agent(config if realtime else config.by_own_clock(), law)
@@ -168,7 +168,6 @@ class AgentNode:
     def appeared(self, key: str, now: float) -> None:
         match self.post.token(key, now, appeared=True):
             case ("alive", "plant", epoch) if self._plant.appeared(epoch):
-                self.plant_seen = True
                 self.policy.plant_came(now)
                 if self.phases.now == "seeking":
                     self.phases.on("plant appeared")

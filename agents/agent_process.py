@@ -57,7 +57,8 @@ def run_agents(process: AgentProcess, make_links: MakeLinks = no_links) -> str:
         if not node.failed:
             log.info("%s: %s", config.name, node.stopped)
             continue
-        asks = "" if node.plant_seen else f"; is the plant of run {config.run} running at {', '.join(config.connect)}?"
+        seen, places = node.policy.plant_seen, ", ".join(config.connect)
+        asks = "" if seen else f"; is the plant of run {config.run} running at {places}?"
         failures.append(f"{node.failed}{asks}")
     if failures and wall:
         raise ConfigurationError("\n".join(failures))

@@ -50,7 +50,7 @@ class AgentBarrier:
         """Whether the next state may make the tick due: its measurement is here, or the agent leaves."""
         self.reports = False
         """Whether the tick just decided is one after which the links' accounts are due."""
-        self._plant_seen = self._leaving = False
+        self.plant_seen = self._leaving = False
         self._tick: int | None = None
         """The next tick; None before the first measurement."""
         self._grant: Measurement | None = None
@@ -81,7 +81,7 @@ class AgentBarrier:
 
     def plant_came(self, now: float) -> None:
         # The plant may compile, or wait for agents yet to start. If it dies, its token vanishes and ends this wait.
-        self._plant_seen = True
+        self.plant_seen = True
         self._waits.rest()
 
     def plant_waits(self, message: Waiting | Prepare, now: float) -> None:
@@ -140,7 +140,7 @@ class AgentBarrier:
 
     def missing(self) -> tuple[Awaited, ...]:
         meeting = self._meeting
-        if not self._plant_seen:
+        if not self.plant_seen:
             return (Awaited("sign of life", PLANT),)
         if meeting.roster is None:
             return (Awaited("Prepare", PLANT),)

@@ -111,7 +111,7 @@ class AgentTimer:
         self.at = 0.0
         """Time of the last tick on the own clock (s of run time)."""
         self._give_up: float | None = None
-        self._plant_seen = self._leaving = False
+        self.plant_seen = self._leaving = False
         self._left = self._skipped = 0
         self.forget()
 
@@ -136,11 +136,11 @@ class AgentTimer:
 
     def start(self, now: float) -> None:
         self._ticks.start(now)
-        if self.config.deadline > 0.0 and not self._plant_seen:
+        if self.config.deadline > 0.0 and not self.plant_seen:
             self._give_up = now + self.config.deadline
 
     def plant_came(self, now: float) -> None:
-        self._plant_seen, self._give_up = True, None
+        self.plant_seen, self._give_up = True, None
         self.health.plant_seen(now)
 
     def plant_waits(self, message: Waiting | Prepare, now: float) -> None:
