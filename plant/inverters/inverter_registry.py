@@ -16,6 +16,7 @@ from gridpeers.plant.inverters.gfm_droop import GfmDroop
 from gridpeers.plant.inverters.inverter_model import InverterModel, Kind, UnitRating
 from gridpeers.plant.inverters.regfm_a1 import REGFM_A1, REGFM_A1_VFLAG0
 from gridpeers.plant.inverters.vsm import Vsm
+from gridpeers.wire.plugins.plugin import parameter_objection
 from gridpeers.wire.plugins.registry import ANYTHING, Registry, line_of, named
 from gridpeers.wire.schema.table_schema import Field, fields_of
 from gridpeers.wire.wording import suggestion
@@ -55,12 +56,9 @@ def _objection(it: Any) -> str:
         return f'its kind must be "GFM" or "GFL", got {it.kind!r}'
     try:
         it()
-        wrong = [
-            f"{field.name}: its default {text}" for field in fields_of(it) if (text := field.objection(field.default))
-        ]
     except ANYTHING as error:
         return f"give every parameter a default: {named(error)}"
-    return "; ".join(wrong) or _trial(it)
+    return parameter_objection(it) or _trial(it)
 
 
 INVERTERS: Registry[type[InverterModel]] = Registry(

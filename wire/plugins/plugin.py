@@ -103,7 +103,7 @@ def class_objection(it: Any, base: type, method: str, arguments: tuple[str, ...]
     if getattr(it, method) is getattr(base, method):
         return f"it has no method {call}"
     wrong = _call_objection(getattr(it, method), 1 + len(arguments))
-    return f"write its method {call}: {wrong}" if wrong else _parameter_objection(it, keys)
+    return f"write its method {call}: {wrong}" if wrong else parameter_objection(it, keys)
 
 
 def callable_objection(it: Any, argument: str, keys: tuple[str, ...] = KEYS) -> str:
@@ -113,7 +113,7 @@ def callable_objection(it: Any, argument: str, keys: tuple[str, ...] = KEYS) -> 
         if method is None:
             return f"the class needs a method __call__(self, {argument})"
         wrong = _call_objection(method, 2)
-        return f"write its method __call__(self, {argument}): {wrong}" if wrong else _parameter_objection(it, keys)
+        return f"write its method __call__(self, {argument}): {wrong}" if wrong else parameter_objection(it, keys)
     if not callable(it):
         return f"write a function of the {argument}, or a class with a method __call__(self, {argument})"
     wrong = _call_objection(it, 1)
@@ -130,7 +130,7 @@ def _call_objection(function: Any, arguments: int) -> str:
     return ""
 
 
-def _parameter_objection(cls: type, taken: tuple[str, ...]) -> str:
+def parameter_objection(cls: type, taken: tuple[str, ...] = ()) -> str:
     """Return why a class cannot have its parameters, "" if it can; `taken` are names that mean something else."""
     try:
         fields = fields_of(cls)
