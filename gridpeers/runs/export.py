@@ -35,7 +35,7 @@ def export(record: RunRecord, to: Format, folder: Path) -> list[Path]:
     emulated = any(counts.sent for counts in record.link_counts().values())
     if to == "csv":
         files = write_tables(folder, record.physics(), record.events(), record.links() if emulated else None)
-        if len(shared := _shared(record)):
+        if len(shared := shared_table(record)):
             files.append(folder / "shared.csv")
             write_whole(files[-1], shared.to_csv(index=False).encode())
         return files
@@ -59,13 +59,8 @@ def _tables(record: RunRecord, *, emulated: bool) -> Iterator[tuple[str, pd.Data
         rows = (row for trace in record.links() for row in link_rows(trace))
         links = pd.DataFrame(rows, columns=list(LINKS)).replace({"delay_s": {"": nan}}).astype({"delay_s": float})
         yield "links", links.sort_values(["src", "dst"], kind="stable", ignore_index=True)
-    if len(shared := _shared(record)):
+    if len(shared := shared_table(record)):
         yield "shared", shared
-
-
-def _shared(record: RunRecord) -> pd.DataFrame:
-    declares = record.info.level != "physics" and any(agent.control.law.shared for agent in record.info.agents[:1])
-    return shared_table(record) if declares else pd.DataFrame()  # else a pass over all messages, for nothing
 
 
 def _arrow(table: pd.DataFrame, to: Literal["parquet", "feather"]) -> bytes:

@@ -72,10 +72,14 @@ def shared_frame(record: RunRecord, name: str) -> pd.DataFrame:
 
 
 def shared_table(record: RunRecord) -> pd.DataFrame:
-    """Return all that laws shared as a table for other programs: a column t_s, and e.g. inv1_Omega_pu."""
+    """Return what laws shared as a table for other programs: a column t_s, and e.g. inv1_Omega_pu.
+
+    It is empty if the law declares nothing, or the record has no states: no message is read then.
+    """
     import pandas as pd
 
-    units = _units(record)
+    if not (units := _units(record)) or record.info.level == "physics":
+        return pd.DataFrame()
     frames = [
         _frame(series).add_suffix(f"_{name}_{units[name]}" if units.get(name) else f"_{name}")
         for name, series in read_shared(record).items()
