@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from itertools import chain
 from pathlib import Path
 from tempfile import SpooledTemporaryFile
 from typing import TYPE_CHECKING
+
+import msgspec
 
 from gridpeers.netem.ledger import LinkTrace, copies_of
 from gridpeers.scenarios.results.run_files import csv_text, write_whole
@@ -23,6 +26,7 @@ EVENTS = ("t_s", "kind", "subject", "text")
 LINKS = ("src", "dst", "seq", "t_s", "delay_s", "fate")
 """Columns of links.csv: one row for each copy of a message, or for a message that was dropped."""
 
+_OTHER = re.compile(rb"[en]|[\[,-]0\.0000")  # Exponents, infinite and missing numbers, and those below 1e-4
 _ROWS = 1000  # Rows of a history that are text at once
 _SPOOL = 4_000_000  # Bytes of links.csv that are sorted in memory
 
@@ -47,8 +51,18 @@ def write_tables(
 def _history_csv(history: History) -> Iterator[str]:
     yield ",".join(header(history.inverters)) + "\n"
     table = history.table
-    for first in range(0, len(table), _ROWS):  # `repr` reads back to the same bits
-        yield "".join([",".join(map(repr, row)) + "\n" for row in table[first : first + _ROWS].tolist()])
+    for first in range(0, len(table), _ROWS):
+        yield "".join([_line(row) + "\n" for row in table[first : first + _ROWS].tolist()])
+
+
+def _line(row: list[float]) -> str:
+    """Return numbers as `repr` writes them: as JSON does, in a tenth of the time, but for the rare ones in `_OTHER`.
+
+    >>> _line([0.1, -0.0, 2.5e-07, 1e22, float("nan")]), _line([60.00001, 0.0])
+    ('0.1,-0.0,2.5e-07,1e+22,nan', '60.00001,0.0')
+    """
+    text = msgspec.json.encode(row)
+    return ",".join(map(repr, row)) if _OTHER.search(text) else text[1:-1].decode()
 
 
 def event_rows(events: Iterable[PlantEvent]) -> Iterator[tuple[float, str, str, str]]:
