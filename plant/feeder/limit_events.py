@@ -1,16 +1,11 @@
-"""Events of limits, once per spell: of set-points, of phase currents, of voltages at which a load's law jumps."""
+"""Events of limits, once per spell: of set-points, and of phase currents."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Real
-from gridpeers.plant.dynamics.kernel.solve import COLUMNS, limited_admittance
-from gridpeers.plant.network import Network
+from gridpeers.plant.dynamics.kernel.compiled import Flags
 from gridpeers.wire.messages import PlantEvent
-from gridpeers.wire.wording import first_of
 
 SPELL = 1.0  # time (s) without a limited set-point after which a spell is over
 
@@ -66,75 +61,3 @@ class CurrentLimits:
                 text = f"{name} {LIMITS} to {self._I_max[i]:g} pu"
                 events.append(PlantEvent(t=t, kind="limit", subject=name, text=text))
         return events
-
-
-CROSSING_PAUSE = 0.5  # time (s) without a crossing after which a load's next crossing is reported
-SHOWN = 3  # loads that an event names
-BESIDE = 1e-9  # distance from a limit, in proportion, at which the law beside it is taken; a jump is larger by far
-
-LAW_LIMITS = {"V_min": -1, "V_max": 1}  # limits of a load's law, and the side on which a load is beyond them
-
-
-class _Jump(NamedTuple):
-    name: str  # name of its load
-    branch: int
-    V: float
-    limit: str  # its name, of `LAW_LIMITS`
-    S: tuple[float, float]  # apparent power (VA) just within the limit and just beyond it
-
-
-class LoadLimits:
-    """Loads of an imported feeder whose law jumps at V_min or V_max, as that of OpenDSS's models 3, 4 and 6 does.
-
-    `V`: voltages across its load branches at the start (V).
-    """
-
-    def __init__(self, network: Network, V: Complex) -> None:
-        self._jumps = _jumps(network)
-        self.any = bool(self._jumps)  # whether a load has such a limit
-        self._branches = np.array([jump.branch for jump in self._jumps], np.int64)
-        self._V = np.array([jump.V for jump in self._jumps])
-        self._side = np.array([LAW_LIMITS[jump.limit] for jump in self._jumps])
-        self._beyond = self._are_beyond(np.abs(V[self._branches]))
-        self._last: dict[str, float] = {}
-
-    def report(self, t: float, V: Complex) -> list[PlantEvent]:
-        """Return an event for each limit and direction of crossings since the last call, at these voltages (V)."""
-        magnitude = np.abs(V[self._branches])
-        now = np.where(magnitude > 0.0, self._are_beyond(magnitude), self._beyond)
-        groups: dict[tuple[str, bool], list[_Jump]] = {}
-        for k in np.flatnonzero(now != self._beyond).tolist():
-            groups.setdefault((self._jumps[k].limit, bool(now[k])), []).append(self._jumps[k])
-        self._beyond = now
-        events = []
-        for (limit, beyond), jumps in groups.items():
-            crossed = dict.fromkeys(jump.name for jump in jumps)
-            names = [name for name in crossed if t - self._last.get(name, -np.inf) > CROSSING_PAUSE]
-            self._last.update(dict.fromkeys(crossed, t))
-            if not names:
-                continue
-            within, outside = (sum(jump.S[k] for jump in jumps if jump.name in names) for k in (0, 1))
-            change = (outside - within if beyond else within - outside) / (within if beyond else outside)
-            way = "rises above" if (LAW_LIMITS[limit] > 0) == beyond else "falls below"
-            text = (
-                f"voltage of {first_of(names, SHOWN)} {way} {limit}, where the law of such a load jumps: "
-                f"{abs(change):.0%} {'more' if change > 0.0 else 'less'} apparent power at once"
-            )
-            events.append(PlantEvent(t=t, kind="limit", subject=names[0], text=text))
-        return events
-
-    def _are_beyond(self, magnitude: Real) -> Flags:
-        return np.asarray(self._side * (magnitude - self._V) > 0.0)
-
-
-def _jumps(network: Network) -> list[_Jump]:
-    law = network.loads().law
-    names = [part.name for part in network.feeder.load_parts if not part.is_impedance]
-    found = []
-    for name, branch, row in zip(names, law.limited_at.tolist(), law.law, strict=True):
-        for limit, side in LAW_LIMITS.items():
-            if V := float(row[COLUMNS.index(limit)]):
-                within, beyond = (abs(limited_admittance(row, V * (1.0 + k * BESIDE))[0]) * V**2 for k in (-side, side))
-                if abs(beyond - within) > 1e3 * BESIDE * within:
-                    found.append(_Jump(name, branch, V, limit, (within, beyond)))
-    return found

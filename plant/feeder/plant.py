@@ -15,7 +15,7 @@ from gridpeers.plant.dynamics.equilibrium import require_within_limits
 from gridpeers.plant.dynamics.live_network import KEPT
 from gridpeers.plant.feeder.circuits import Circuits
 from gridpeers.plant.feeder.islands import Islands, NeutralEvents, trip_event
-from gridpeers.plant.feeder.limit_events import CurrentLimits, LoadLimits, SetPointLimits
+from gridpeers.plant.feeder.limit_events import CurrentLimits, SetPointLimits
 from gridpeers.plant.feeder.protection import InService
 from gridpeers.plant.feeder.switchboard import LoadBoard, Switchboard
 from gridpeers.plant.feeder.synchronism import Closings, Difference
@@ -105,7 +105,6 @@ class Plant(RecordedPlant):
         except NoPowerFlowError as error:
             raise PlantError(f"{error}; {network.weak_loads(error.weak)}; or try another P_set0") from None
         require_within_limits(self._dynamics.inverters, self._dynamics.network.reduction.online)
-        self._load_limits = LoadLimits(network, self._dynamics.network.V_branch)
         self._now = self._dynamics.readings()
         self._rows: list[tuple[float, ...]] = [self._as_row(0, self._now)]
         self._events = self._islands.report_dead(0.0, self._switches.closed, self._dynamics.network.reduction)
@@ -211,8 +210,6 @@ class Plant(RecordedPlant):
             self._now = out[-1, :, :4].copy()
             self._in_service.watch(stop, out)
             step = stop
-        if self._load_limits.any:
-            self._events += self._load_limits.report(self._time(last), self._dynamics.network.V_branch)
         self.tick += 1
         self._t = time_of(self.tick, self._T_c)
 
@@ -250,13 +247,10 @@ class Plant(RecordedPlant):
             self._circuits.change_loads(self.network)
             self._islands.change_loads(self.network)
         switched = step in self._switches.steps and self._operate(step)
-        if not loads_change:
-            return
-        if not switched:
+        if loads_change and not switched:
             self._dynamics.connect(self._circuits.of(self._switches.closed))
             if self._tell_trips(step):
                 self._tell_islands(self._time(step))
-        self._load_limits = LoadLimits(self.network, self._dynamics.network.V_branch)
 
     def _operate(self, step: int) -> bool:
         """Operate the switches of this step, all at once, and find the islands again; return whether any moved."""

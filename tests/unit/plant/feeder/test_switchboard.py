@@ -11,9 +11,8 @@ from msgspec.structs import replace
 from gridpeers.bridges.opendss import read_opendss
 from gridpeers.plant.dynamics import PlantError
 from gridpeers.plant.equipment import InverterRow, Tables
-from gridpeers.plant.equipment.imported_equipment import LoadPart, bus_behind
+from gridpeers.plant.equipment.imported_equipment import bus_behind
 from gridpeers.plant.feeder import Plant
-from gridpeers.plant.feeder.limit_events import PAUSE, LoadLimits
 from gridpeers.plant.feeder.switchboard import Switchboard
 from gridpeers.plant.inverters.gfl import Gfl
 from gridpeers.plant.inverters.gfm_droop import GfmDroop
@@ -21,7 +20,6 @@ from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings, SwitchEvent
 from gridpeers.plant.tables import read_feeder
 from tests.unit.plant.feeder.test_feeder import opened, plant, run
-from tests.unit.plant.networks import feeder, three_phase_bus
 
 H = 0.002
 
@@ -65,51 +63,6 @@ def test_an_unknown_switch_is_refused_when_it_is_put_down(network: Network) -> N
     """A misspelled switch is an error at the start of a run, not at its time."""
     with pytest.raises(ValueError, match=r'switch "13-125": no such switch'):
         Switchboard(network, (event(1.0, "13-125", "open"),), H)
-
-
-V_NOM = 2400.0
-
-
-def limits(exponents: tuple[float, float], edge: float = 0.0) -> LoadLimits:
-    """Return the limits of a feeder with one load of this law, 3 kW and 4 kvar, at nominal voltage."""
-    part = LoadPart(
-        name="load.l",
-        bus="b",
-        ends=("A", ""),
-        S=3e3 + 4e3j,
-        V_nom=V_NOM,
-        exponents=exponents,
-        V_low=0.5,
-        V_min=0.95,
-        V_max=1.05,
-        edge=edge,
-    )
-    network = Network(feeder(buses=(three_phase_bus("b", V_NOM),), load_parts=(part,)))
-    return LoadLimits(network, np.array([V_NOM + 0j]))
-
-
-def texts(watch: LoadLimits, *voltages: float, period: float = 1.0) -> list[str]:
-    """Return the texts of the events at these voltages (pu), one after another at this distance (s)."""
-    V = [np.array([pu * V_NOM * 1j]) for pu in voltages]
-    return [event.text for k, now in enumerate(V) for event in watch.report(k * period, now)]
-
-
-def test_both_limits_are_reported_in_both_directions() -> None:
-    """A load of model 4 takes more below V_min than above it, and less above V_max than below it."""
-    found = texts(limits((1.0, 2.0)), 0.96, 0.94, 0.96, 1.06, 1.04)
-
-    assert found == [
-        "voltage of load.l falls below V_min, where the law of such a load jumps: 9% more apparent power at once",
-        "voltage of load.l rises above V_min, where the law of such a load jumps: 8% less apparent power at once",
-        "voltage of load.l rises above V_max, where the law of such a load jumps: 8% less apparent power at once",
-        "voltage of load.l falls below V_max, where the law of such a load jumps: 8% more apparent power at once",
-    ]
-
-
-def test_an_oscillation_across_a_limit_is_one_event() -> None:
-    """Crossings that follow each other within the pause are one spell; a dead load stays where it was."""
-    assert len(texts(limits((1.0, 2.0)), *(0.94, 0.96) * 20, period=0.9 * PAUSE)) == 1
-    assert texts(limits((1.0, 2.0)), 1.0, 0.0, 1.0) == []
 
 
 pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")
