@@ -11,7 +11,9 @@ import importlib.util
 import json
 import os
 import pickle
+import shutil
 import sys
+import tempfile
 import threading
 import traceback
 from collections.abc import Callable
@@ -19,7 +21,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any, NoReturn
 
-from gridpeers.plant.request_process import ProcessEndedError, RequestProcess, TransientFolder, no_room, program
+from gridpeers.plant.request_process import ProcessEndedError, RequestProcess, no_room, program
 from gridpeers.plant.tables.read import FeederError
 
 RESULT, PLACE = "result.pickle", "place"
@@ -50,7 +52,7 @@ class EngineProcess:
         self._module, self._package, self._name = module, package, name
         self._missing = f"reading {files} files needs {name}; install it: pip install 'gridpeers[{extra}]'"
         self._lock = threading.Lock()  # it reads one file at a time
-        self._running: dict[int, tuple[RequestProcess, TransientFolder]] = {}
+        self._running: dict[int, tuple[RequestProcess, Path]] = {}
         """By the process that started it: a fork has not inherited the right to ask it."""
         self.printed = ""  # output of the process until its last answer
 
@@ -60,7 +62,7 @@ class EngineProcess:
             raise FeederError(path.name, (self._missing,))
         with self._lock:
             if os.getpid() not in self._running:
-                folder = TransientFolder(f"gridpeers-{self._package}-")
+                folder = Path(tempfile.mkdtemp(prefix=f"gridpeers-{self._package}-"))
                 self._running[os.getpid()] = RequestProcess(program(self._module), folder), folder
             process, folder = self._running[os.getpid()]
             try:
@@ -74,7 +76,7 @@ class EngineProcess:
                     problem = f"{path.name}: {self._name} did not end within {LONGEST:g} s; simplify the file"
                     raise FeederError(path.name, (problem,))
             except ProcessEndedError as how:
-                place = folder.path / PLACE
+                place = folder / PLACE
                 at = place.read_text(errors="replace").strip() if place.exists() else ""
                 self.printed = process.printed()
                 self.close()
@@ -86,7 +88,7 @@ class EngineProcess:
                 raise FeederError(path.name, tuple(answer["problems"]))
             if "error" in answer:
                 raise EngineError(answer["error"])
-            result = folder.path / RESULT
+            result = folder / RESULT
             found = pickle.loads(result.read_bytes())
             result.unlink()
         return found
@@ -94,17 +96,22 @@ class EngineProcess:
     def close(self) -> None:
         """End the process, if there is one."""
         if running := self._running.pop(os.getpid(), None):
-            for each in running:
-                each.close()
+            process, folder = running
+            process.close()
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 def serve(name: str, read: Callable[[dict[str, Any], Tell], Any]) -> NoReturn:
-    """Answer requests until standard input ends; `read` returns the result for one, or raises FeederError."""
+    """Answer requests until standard input ends, then remove the folder of this process.
+
+    `read` returns the result for a request, or raises FeederError.
+    """
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)  # the other program may print
     folder = Path.cwd()
     for line in sys.stdin:
         print(json.dumps(_answer(name, read, json.loads(line), folder)), file=answers, flush=True)
+    shutil.rmtree(folder, ignore_errors=True)
     sys.stdout.flush()
     os._exit(0)  # the end of another program may be slow, and may fail
 

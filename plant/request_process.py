@@ -1,4 +1,4 @@
-"""A program in a process of its own that answers requests, one JSON object a line, and its temporary folder."""
+"""A program in a process of its own that answers requests, one JSON object a line."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import contextlib
 import json
 import os
 import selectors
-import shutil
 import signal
 import subprocess
 import sys
@@ -17,35 +16,11 @@ from time import monotonic
 from types import MappingProxyType
 from typing import Any
 
-REMOVER = 'read _; rm -rf -- "$0"'  # program of the shell that waits for the end of its standard input
 
-
-class TransientFolder:
-    """A temporary folder that is removed when it is closed, or when all its users have ended, also by kill -9.
-
-    A shell waits at a pipe until nobody holds its other end any more.
-    """
-
-    def __init__(self, prefix: str) -> None:
-        self.path = Path(tempfile.mkdtemp(prefix=prefix))
-        end, self.user = os.pipe()  # file descriptor; the folder stays while a process has inherited it and runs
-        command = ["sh", "-c", REMOVER, str(self.path)]
-        self._remover = subprocess.Popen(command, stdin=end, cwd="/", start_new_session=True)
-        os.close(end)
-
-    def close(self) -> None:
-        """Remove the folder; all other users must have ended."""
-        if self._remover.returncode is None:
-            self._remover.kill()
-            self._remover.wait()
-            os.close(self.user)
-            shutil.rmtree(self.path, ignore_errors=True)
-
-
-def no_room(what: str, reason: str, folder: Path | None = None) -> str:
-    """Return words for something that a process cannot write into a temporary folder, the system's by default."""
+def no_room(what: str, reason: str) -> str:
+    """Return words for something that a process cannot write into the system's temporary folder."""
     remedy = "make room there, raise the limit of file sizes (ulimit -f), or set TMPDIR to another folder"
-    return f"{what} cannot be written in {folder or tempfile.gettempdir()} ({reason}); {remedy}"
+    return f"{what} cannot be written in {tempfile.gettempdir()} ({reason}); {remedy}"
 
 
 ROOT = str(Path(__file__).parents[2])  # folder of our packages
@@ -68,14 +43,13 @@ class ProcessEndedError(RuntimeError):
 class RequestProcess:
     """A program that is asked on standard input and answers on standard output; its standard error is kept.
 
-    `folder`: where it stands, and which stays as long as it does; None: where this process stands; `environment`:
-    variables beside those of this process.
+    `folder`: where it stands; None: where this process stands; `environment`: variables beside those of this process.
     """
 
     def __init__(
         self,
         command: Sequence[str],
-        folder: TransientFolder | None = None,
+        folder: Path | None = None,
         environment: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
         self._unread = b""
@@ -86,9 +60,8 @@ class RequestProcess:
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=self._log,
-                cwd=folder.path if folder else None,
+                cwd=folder,
                 env=os.environ | environment,
-                pass_fds=(folder.user,) if folder else (),
                 start_new_session=True,  # Ctrl-C is for the run, which then ends this process in order
             )
         except OSError:

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from time import monotonic
 from typing import Any
 
@@ -25,7 +26,7 @@ from gridpeers.plant.feeder.switchboard import Switchboard
 from gridpeers.plant.inverters.gfl import Gfl
 from gridpeers.plant.plant_config import PlantSettings, PowerLimit
 from gridpeers.plant.plant_interface import Reading, RecordedPlant, SimulatedPlant
-from gridpeers.plant.request_process import ProcessEndedError, RequestProcess, TransientFolder
+from gridpeers.plant.request_process import ProcessEndedError, RequestProcess
 from gridpeers.plant.tables.read import DATA
 from gridpeers.wire.messages import PlantEvent
 from gridpeers.wire.timing import time_of
@@ -230,9 +231,9 @@ class DeltaModeProcess:
 
     def __init__(self, deadline: float) -> None:
         self._deadline = deadline
-        self._folder = TransientFolder("gridpeers-gridlabd-")  # GridLAB-D writes files of its own where it stands
+        self._folder = TemporaryDirectory(prefix="gridpeers-gridlabd-")  # GridLAB-D writes files where it stands
         command = [sys.executable, "-P", str(Path(__file__).with_name("delta_mode.py")), str(os.getpid())]
-        self._process = RequestProcess(command, self._folder, KEPT_MEMORY)
+        self._process = RequestProcess(command, Path(self._folder.name), KEPT_MEMORY)
 
     @property
     def pid(self) -> int:
@@ -243,7 +244,7 @@ class DeltaModeProcess:
 
         `inverters` has the name, node, kind and phases of each inverter to read.
         """
-        path = self._folder.path / "feeder.glm"
+        path = Path(self._folder.name) / "feeder.glm"
         path.write_text(model, encoding="utf-8")
         self._answer({"load": str(path), "inverters": inverters}, LONGEST)
 
@@ -253,7 +254,7 @@ class DeltaModeProcess:
 
     def close(self) -> None:
         self._process.close()
-        self._folder.close()
+        self._folder.cleanup()
 
     def _answer(self, request: dict[str, Any], deadline: float) -> dict[str, Any]:
         self._process.send(request)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from contextlib import closing
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from msgspec.structs import replace
 
@@ -31,15 +32,14 @@ class GridlabdSimulator(Simulator):
         from gridpeers.bridges.gridlabd.gridlabd_plant import GridlabdPlant  # scenarios are checked without it
         from gridpeers.plant.feeder import Plant
         from gridpeers.plant.network import Network
-        from gridpeers.plant.request_process import TransientFolder
 
         assert config.end is not None, "a scenario in simulated time has an end"
         settings = config.settings
         ours = Plant(Network(feeder), settings, config.T_c, config.record_step)
-        with closing(TransientFolder("gridpeers-tables-")) as folder:
+        with TemporaryDirectory(prefix="gridpeers-tables-") as folder:
             if settings.changes != FeederChanges():  # else GridLAB-D's model is written from the tables as they stand
-                write_tables(feeder, folder.path)
-                settings = replace(settings, feeder=str(folder.path))
+                write_tables(feeder, Path(folder))
+                settings = replace(settings, feeder=folder)
             return GridlabdPlant(
                 ours,
                 settings,

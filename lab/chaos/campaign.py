@@ -13,6 +13,7 @@ from contextlib import AbstractContextManager, closing, suppress
 from dataclasses import dataclass, field
 from io import StringIO
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import msgspec
@@ -28,7 +29,6 @@ from gridpeers.lab.chaos.chaos_run import (
 )
 from gridpeers.lab.chaos.disturbed_scenario import KINDS, ChaosBase, Schedule, base_of, in_order
 from gridpeers.lab.chaos.schedules import BATCH, drawn, shrunk
-from gridpeers.plant.request_process import TransientFolder
 from gridpeers.scenarios.checks.check_registry import RETURNS, chosen_checks
 from gridpeers.scenarios.results.run_files import (
     JOURNAL,
@@ -88,10 +88,10 @@ class Campaign:
         MachineError if the machine lacks what a run needs: that is no failure of the scenario, and nothing is shrunk.
         """
         try:
-            with closing(TransientFolder("gridpeers-chaos-")) as temporary:  # workers that are ended leave theirs in it
-                self._do_runs(stage, temporary.path)
+            with TemporaryDirectory(prefix="gridpeers-chaos-", ignore_cleanup_errors=True) as temporary:
+                self._do_runs(stage, Path(temporary))
                 self._add_failures()
-                self._shrink_all(stage, temporary.path)
+                self._shrink_all(stage, Path(temporary))
             self._conclude()
             set_complete(self._file())
         except BaseException as error:

@@ -52,12 +52,6 @@ def in_one_process(**changes: object) -> Outcome:
     return run_inprocess(*run_of(**changes), lambda telemetry: None)
 
 
-def gridlabd_of(pid: int) -> int:
-    """Process id of GridLAB-D that a process has started."""
-    (found,) = all_of(pid)
-    return found
-
-
 def all_of(pid: int) -> list[int]:
     """Process ids of GridLAB-D whose argument is the process that started it."""
     return [int(path.parent.name) for path in Path("/proc").glob("[0-9]*/cmdline") if is_of(path, pid)]
@@ -95,14 +89,12 @@ def test_a_run_names_the_signal_that_killed_gridlabd() -> None:
 
 
 def test_gridlabd_ends_with_a_killed_plant(tmp_path: Path) -> None:
-    """A plant that is killed by -9 cannot end GridLAB-D; the kernel does, and its temporary folder goes, too."""
+    """A plant that is killed by -9 cannot end GridLAB-D; the kernel does."""
     run = ProcessRun(*run_of(), tmp_path)
     watched: list[int] = []
-    folders: list[Path] = []
 
     def kill() -> None:
         plant = run.child("plant").pid
-        folders.append(Path(f"/proc/{gridlabd_of(plant)}/cwd").readlink())
         for task in Path(f"/proc/{plant}/task").iterdir():
             watched.extend(os.pidfd_open(int(child)) for child in (task / "children").read_text().split())
         os.kill(plant, signal.SIGKILL)
@@ -111,11 +103,10 @@ def test_gridlabd_ends_with_a_killed_plant(tmp_path: Path) -> None:
     outcome = run(plant_command=())
 
     assert "plant was killed by SIGKILL" in outcome.broke
-    assert len(watched) == 2  # GridLAB-D, and the shell that removes the folder
+    assert len(watched) == 1
     for each in watched:
         assert select.select([each], [], [], 60.0)[0] == [each]
         os.close(each)
-    assert not folders[0].exists()
 
 
 def test_a_network_without_solution_ends_the_run_with_gridlabds_words() -> None:
@@ -187,10 +178,10 @@ def test_gridlabd_keeps_no_real_time(tmp_path: Path) -> None:
 
 WAITING = """import os, signal
 with open(os.environ["TOLD"], "w") as told:
-    told.write(f"{os.getpid()} {os.getcwd()}")
+    told.write(f"{os.getpid()}")
 signal.pause()
 """
-"""A package gridlabd that tells its process and folder, and then loads for ever."""
+"""A package gridlabd that tells its process, and then loads for ever."""
 
 READ = "import sys; from gridpeers.bridges.gridlabd.read_glm import read_glm; read_glm(sys.argv[1])"
 
@@ -205,22 +196,18 @@ def model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return path
 
 
-def test_a_killed_import_leaves_no_process_and_no_folder(model: Path) -> None:
-    """After kill -9 of an import GridLAB-D's process ends, and the temporary folder goes with it."""
+def test_a_killed_import_leaves_no_process(model: Path) -> None:
+    """After kill -9 of an import GridLAB-D's process ends."""
     folder = model.parent
     (folder / "gridlabd.py").write_text(WAITING)
     told = folder / "told"
     os.mkfifo(told)
-    with subprocess.Popen([sys.executable, "-c", READ, str(model)], env=os.environ | {"TOLD": str(told)}) as reading:
-        pid, _, scratch = told.read_text().partition(" ")
-        assert Path(scratch).is_dir()
-        children = Path(f"/proc/{reading.pid}/task/{reading.pid}/children").read_text().split()
-        assert pid in children
-        watched = [os.pidfd_open(int(child)) for child in children]  # and the shell that removes the folder
+    with subprocess.Popen(
+        [sys.executable, "-c", READ, str(model)], env=os.environ | {"TOLD": str(told), "TMPDIR": str(folder)}
+    ) as reading:
+        watched = os.pidfd_open(int(told.read_text()))
         reading.kill()
 
     assert reading.returncode == -signal.SIGKILL
-    for each in watched:
-        assert select.select([each], [], [], 60.0)[0] == [each]
-        os.close(each)
-    assert not Path(scratch).exists()
+    assert select.select([watched], [], [], 60.0)[0] == [watched]
+    os.close(watched)
