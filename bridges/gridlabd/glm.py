@@ -1,9 +1,8 @@
-"""A feeder as a model for GridLAB-D (GLM): with inverters that it steps in delta mode, or a power flow alone."""
+"""A feeder as a model for GridLAB-D (GLM), with inverters that it steps in delta mode."""
 
 from __future__ import annotations
 
 import csv
-import tempfile
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from math import pi, sqrt
@@ -11,12 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from gridpeers.bridges.gridlabd.glm_network import F_NOM, TableRow, block, network_blocks
-from gridpeers.bridges.gridlabd.gridlabd_simulator import unrepresentable
 from gridpeers.plant.equipment import Tables
-from gridpeers.plant.feeder import Plant
-from gridpeers.plant.network import Network
-from gridpeers.plant.plant_config import PlantSettings
-from gridpeers.plant.tables import FeederError
 from gridpeers.plant.tables.write import TAP_STEP, write_feeder
 
 
@@ -183,48 +177,6 @@ object recorder {{
 	interval 1;
 	file "/dev/null";
 }}"""
-
-
-POWER_FLOW_HEADER = f"""clock {{
-	timezone UTC0;
-	starttime '{START}';
-	stoptime '{START[:-1]}1';
-}}
-module powerflow {{
-	solver_method NR;
-	line_capacitance true;
-	line_limits false;
-	default_maximum_voltage_error 1e-11;
-}}"""
-"""Head of the model of a feeder without inverters, whose power flow is solved once."""
-
-
-def export_glm(feeder: Tables, settings: PlantSettings, seconds: int, voltages: str) -> str:
-    """Return a feeder as a GridLAB-D model: with inverters in delta mode, without any as a power flow.
-
-    Each inverter begins with the power of our operating point; GridLAB-D finds the set-points that belong to it. The
-    run lasts 1 to 50 `seconds`, and GridLAB-D writes the voltages of its start to the CSV file `voltages`. FeederError
-    has all that the model cannot represent; without an operating point it is a RuntimeError.
-    """
-    problems = unrepresentable(feeder)
-    parameters = {row.name: feeder.parameters_of(row, settings.gfm, settings.gfl) for row in feeder.inverters}
-    for row in feeder.inverters:
-        for key, value in parameters[row.name].beyond_gridlabd().items():
-            problems.append(f"{row.name} has {key} = {value}, which no {row.kind} of GridLAB-D has; leave it out")
-    if problems:
-        raise FeederError(feeder.name, tuple(problems))
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        write_tables(feeder, folder)
-        if feeder.inverters:
-            plant = Plant(Network(feeder), settings, settings.h, settings.h)
-            start = {name: complex(reading.P, reading.Q) for name, reading in plant.measure().items()}
-            text = write_glm(folder, feeder.load_set, start, parameters, settings.h, seconds)
-        else:
-            V_nom = {bus.name: bus.V_nom for bus in feeder.buses}
-            text = "\n".join((POWER_FLOW_HEADER, *network_blocks(read_tables(folder), feeder.load_set, V_nom, ())))
-    head = f"// {feeder.name}, load set {feeder.load_set}, by gridpeers. Bus 13 is node n13.\n"
-    return f'{head}{text}\nobject voltdump {{\n\tfilename "{voltages}";\n\tmode RECT;\n}}\n'
 
 
 def write_tables(feeder: Tables, folder: Path) -> None:

@@ -46,7 +46,7 @@ _OWN = (
     ("load", "live_commands:load", "Set a load of a running plant."),
     ("link", "link:link", "Hurt and heal links while a run goes on."),
     ("keys", "keys_command:app", "Make, issue and revoke the certificates of a site."),
-    ("feeder", "feeder_commands:app", "Import, check, solve and export feeders."),
+    ("feeder", "feeder_commands:app", "Import, check and solve feeders."),
     ("trace", "", "Write a run's messages as a Perfetto trace."),
     ("why", "", "Explain why an agent decided as it did."),
     ("view", "", "Show a run in the browser: feeder, links, strips and agents."),

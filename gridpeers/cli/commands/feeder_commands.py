@@ -1,4 +1,4 @@
-"""The commands `gridpeers feeder ...`: import a feeder, check it, solve it, export it."""
+"""The commands `gridpeers feeder ...`: import a feeder, check it, solve it."""
 
 from __future__ import annotations
 
@@ -6,12 +6,11 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from tempfile import gettempdir
 from typing import Annotated
 
 import typer
 
-from gridpeers.cli.usage import BAD_INPUT, argument, check_choice, fail, load, option, refuse
+from gridpeers.cli.usage import BAD_INPUT, argument, fail, option, refuse
 from gridpeers.feeder import Feeder, reader_of
 from gridpeers.output_folders import FolderError, refusal, shown, whole_folder, write_whole
 from gridpeers.plant.equipment.connectivity import Connectivity
@@ -21,7 +20,7 @@ from gridpeers.plant.tables import FeederError, feeders
 from gridpeers.rooms import ROOMS
 from gridpeers.wire.wording import counted
 
-app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Import, check, solve and export feeders.")
+app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Import, check and solve feeders.")
 
 FeederName = Annotated[
     str, argument("FEEDER", "A feeder that comes with gridpeers, a folder of tables, or a .dss or .glm file.")
@@ -136,49 +135,6 @@ def solve(
         typer.echo(f"neutral  {worst['V']:.2f} V to earth at most, bus {worst['bus']}, node {worst['phase']}")
     if csv is not None:
         typer.echo(f"Voltages: {shown(csv)}")
-
-
-@app.command()
-def glm(
-    feeder: Annotated[str, argument("FEEDER", "A feeder that comes with gridpeers, or a folder of tables.")],
-    out: Annotated[Path | None, typer.Option(help="File of the model; else FEEDER.glm here.")] = None,
-    load_set: Annotated[str | None, typer.Option(help="Load table; else main, or the scenario's.")] = None,
-    scenario: Annotated[
-        str | None, typer.Option(help="Inverters' parameters, set-points and changes of this scenario.")
-    ] = None,
-    case: Annotated[str | None, typer.Option(help="Case of the scenario; else its first.")] = None,
-    seconds: Annotated[int, typer.Option(min=1, max=50, help="Length of the run (s).")] = 5,
-) -> None:
-    """Write a feeder as a model that GridLAB-D runs by itself: in delta mode if it has inverters.
-
-    Example:  gridpeers feeder glm microgrid123 --scenario islanding --out islanding.glm
-    """
-    from gridpeers.plant.dynamics import PlantError
-    from gridpeers.plant.plant_config import PlantSettings
-    from gridpeers.scenarios.schema.configs import configs
-
-    if reader_of(feeder):
-        fail([f"{feeder}: no feeder of our own tables; only those can be written for GridLAB-D"], BAD_INPUT)
-    if scenario:
-        spec, tables = load(scenario, {"plant.load_set": load_set} if load_set else {})
-        if feeder != spec.plant.feeder and Path(feeder).resolve() != Path(spec.plant.feeder).resolve():
-            fail([f'--scenario: "{scenario}" is on feeder "{spec.plant.feeder}", not on "{feeder}"'], BAD_INPUT)
-        if case is not None:
-            check_choice("--case: ", "case", case, tuple(spec.cases))
-        settings = configs(spec, tables, case or next(iter(spec.cases)))[0].settings
-    elif case is not None:
-        fail(["--case: is a case of a scenario; name it with --scenario"], BAD_INPUT)
-    else:
-        tables, settings = _read(feeder, load_set, None, None), PlantSettings(feeder=feeder)
-    file = out or Path(f"{tables.name}.glm")
-    try:
-        with _problems_told(feeder, gettempdir()):  # the tables from which it is made are written there
-            text = ROOMS.resolve("export_glm")(tables, settings, seconds, f"{file.stem}_voltages.csv")
-    except PlantError as error:
-        fail([f"{feeder}: {error}"], BAD_INPUT)
-    with _problems_told(feeder, file):
-        write_whole(file, text)
-    typer.echo(f"Model: {shown(file)}; GridLAB-D writes the voltages of its start to {file.stem}_voltages.csv")
 
 
 def read_script(name: str, switches: list[str], leave_out: list[str]) -> Feeder:

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from gridpeers.bridges.gridlabd.glm import read_tables, write_tables
 from gridpeers.bridges.gridlabd.glm_elements import voltages_of
+from gridpeers.bridges.gridlabd.glm_network import network_blocks
 from gridpeers.bridges.gridlabd.glm_text import GlmText
 from gridpeers.bridges.gridlabd.read_glm import read_glm, solved_model
+from gridpeers.plant.equipment import Tables
 from gridpeers.plant.network import Network, solve_power_flow
 
 TOLERANCE = 1e-6  # largest difference that the tests allow (pu of nominal voltage)
+CLOCK = """clock { timezone UTC0; starttime '2000-01-01 00:00:00'; stoptime '2000-01-01 00:00:01'; }
+module powerflow { solver_method NR; line_capacitance true; line_limits false; default_maximum_voltage_error 1e-11; }
+"""
 HEAD = """clock { timezone UTC0; starttime '2000-01-01 00:00:00'; stoptime '2000-01-02 00:00:00'; }
 module powerflow { solver_method NR; line_capacitance true; }
 object node { name sub; phases ABCN; bustype SWING; nominal_voltage 7200;
@@ -131,6 +137,13 @@ def write(folder: Path, text: str, name: str = "feeder.glm") -> Path:
     path = folder / name
     path.write_text(text)
     return path
+
+
+def network_model(feeder: Tables, folder: Path) -> str:
+    """Return the network of a feeder of our own tables as a model that is solved once."""
+    write_tables(feeder, folder)
+    V_nom = {bus.name: bus.V_nom for bus in feeder.buses}
+    return CLOCK + "\n".join(network_blocks(read_tables(folder), feeder.load_set, V_nom, ()))
 
 
 def gridlabd_voltages(path: Path) -> dict[tuple[str, str], complex]:

@@ -1,4 +1,4 @@
-"""A feeder as a model that GridLAB-D runs without us."""
+"""A feeder as a model for GridLAB-D."""
 
 import csv
 import subprocess
@@ -11,19 +11,20 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from gridpeers.bridges.gridlabd.glm import export_glm, inverter_blocks
+from gridpeers.bridges.gridlabd.glm import inverter_blocks
+from gridpeers.bridges.gridlabd.gridlabd_simulator import unrepresentable
+from gridpeers.bridges.gridlabd.read_glm import read_glm
 from gridpeers.plant.equipment import Load, Tables
-from gridpeers.plant.feeder import Plant
 from gridpeers.plant.inverters.gfl import Gfl
 from gridpeers.plant.inverters.gfm_droop import GfmDroop
 from gridpeers.plant.inverters.inverter_model import InverterModel
 from gridpeers.plant.inverters.inverter_registry import BOUNDS_OF_SET_POINTS
-from gridpeers.plant.inverters.regfm_a1 import REGFM_A1
 from gridpeers.plant.network import Network, solve_power_flow
-from gridpeers.plant.plant_config import PlantSettings
-from gridpeers.plant.tables import FeederError, read_feeder
+from gridpeers.plant.tables import read_feeder
 from gridpeers.wire.schema.table_schema import Field, fields_of
+from tests.unit.bridges.gridlabd.glm_models import LOADS, network_model, write
 
+DUMP = '\nobject voltdump { filename "voltages.csv"; mode RECT; }'
 TOLERANCE = 1e-8  # largest difference (pu); GridLAB-D writes 1e-6 V, which is 4e-10 pu
 RUN = """import gridlabd
 model = gridlabd.DirectGridLabD()
@@ -68,49 +69,25 @@ def test_transformers_and_regulators_of_any_ratio_are_exported(tmp_path: Path) -
         loads=(*feeder.loads, Load(bus="610", connection="Y", model="P", S=(40e3 + 1e4j, 2e4 + 0j, 3e4 + 2e4j))),
     )
 
-    theirs = voltages(export_glm(feeder, PlantSettings(), 1, "voltages.csv"), tmp_path)
+    theirs = voltages(network_model(feeder, tmp_path) + DUMP, tmp_path)
 
     assert largest_difference(feeder, theirs) < TOLERANCE
 
 
-def test_exported_inverters_start_at_our_operating_point(tmp_path: Path) -> None:
-    """GridLAB-D begins with the terminal voltages that our plant has with the same parameters and set-points."""
-    feeder = read_feeder("microgrid123", "event2")
-    roof, lateral = (replace(feeder.inverters[i], P_rated=5e4) for i in (1, 0))
-    added = (replace(roof, name="roof", bus="47", phases="C"), replace(lateral, name="lateral", bus="96", phases="B"))
-    feeder = replace(feeder, inverters=(*feeder.inverters, *added))
-    settings = PlantSettings(P_set0=0.5, gfm=GfmDroop(X_f=0.2))
-
-    text = export_glm(feeder, settings, 1, "voltages.csv")
-    theirs = voltages(text, tmp_path)
-
-    assert text.count("Xfilter 0.2;") == 4
-    ours = Plant(Network(feeder), settings, settings.h, settings.h).measure()
-    for row in feeder.inverters:
-        V = np.mean([abs(theirs[f"n{row.bus}"]["ABC".index(phase)]) for phase in row.phases])
-        assert abs(V - ours[row.name].V) / row.V_nom < TOLERANCE, row.name
-
-
-def test_everything_that_cannot_be_exported_is_named_at_once() -> None:
-    """No substation, another frequency, names that it does not take; and a GFM that it does not have."""
+def test_everything_that_gridlabd_cannot_represent_is_named_at_once(tmp_path: Path) -> None:
+    """No substation, another frequency, names that it does not take, two inverters at a bus; an imported feeder."""
     feeder = read_feeder("microgrid123")
     first, second, *others = feeder.inverters
-    inverters = (replace(first, name="1.st"), second, *others)
-    feeder = replace(feeder, source=None, f_nom=50.0, inverters=inverters)
+    inverters = (replace(first, name="1.st"), second, *others, replace(others[2], name="leg", bus="80", phases="B"))
 
-    with pytest.raises(FeederError) as error:
-        export_glm(feeder, PlantSettings(), 1, "voltages.csv")
-    crowded = replace(feeder, inverters=(*inverters, replace(others[2], name="leg", bus="80", phases="B")))
-    with pytest.raises(FeederError, match='bus "80" has inv4, leg; GridLAB-D takes one inverter a bus'):
-        export_glm(crowded, PlantSettings(), 1, "voltages.csv")
-    with pytest.raises(FeederError, match='inv1 has model = "regfm_a1", which no GFM of GridLAB-D has'):
-        export_glm(read_feeder("microgrid123"), PlantSettings(gfm=REGFM_A1), 1, "voltages.csv")
-
-    assert error.value.problems == (
+    assert unrepresentable(replace(feeder, source=None, f_nom=50.0, inverters=inverters)) == [
         "microgrid123 has no source.csv; GridLAB-D needs a substation as its swing bus",
         "microgrid123 has 50 Hz; the model is written for 60 Hz",
+        'bus "80" has inv4, leg; GridLAB-D takes one inverter a bus: give each a bus behind a line',
         'inverter "1.st": GridLAB-D takes letters, digits, _ and - for a name; rename it',
-    )
+    ]
+    (imported,) = unrepresentable(read_glm(write(tmp_path, LOADS)))
+    assert "was imported: its elements are admittance matrices" in imported
 
 
 DEFAULT: dict[str, type[InverterModel]] = {"GFM": GfmDroop, "GFL": Gfl}
