@@ -13,11 +13,13 @@ import typer
 from gridpeers.cli.commands.options import LiveRun, of_live_run, usage_errors
 from gridpeers.cli.usage import BAD_INPUT, INTERRUPTED, TERMINATED, fail, require
 from gridpeers.scenarios.live.run_address import RUN
-from gridpeers.viewer.page_beside import HERE, PORT, require_page
 from gridpeers.wire.driver.ending import watch_readers
 
 if TYPE_CHECKING:
     from gridpeers.viewer.page_server import Pages
+
+HERE, PORT = "127.0.0.1", 8123
+"""Address and port of a page by default: on this host alone."""
 
 Line = Callable[[str], str]
 """Makes the line that a command prints, from the address of its page."""
@@ -53,7 +55,8 @@ def view(
 
     Example:  gridpeers view --control
     """
-    require_page()
+    modules = dict.fromkeys(("starlette", "uvicorn", "websockets"), "the page")
+    require(modules, "install it: pip install 'gridpeers[view]'")
     if record is None:
         if case:
             fail(["--case: goes with a RECORD; a live run has one case"], BAD_INPUT)

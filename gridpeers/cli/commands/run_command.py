@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import socket
-from contextlib import nullcontext
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, NoReturn
@@ -28,7 +26,6 @@ from gridpeers.cli.usage import (
     require_loadable,
     terminal,
 )
-from gridpeers.rooms import ROOMS
 
 if TYPE_CHECKING:
     from gridpeers.plant.equipment import Tables
@@ -63,21 +60,14 @@ def run(
     out: Annotated[
         Path | None, option("DIR", "Folder for the results, new or empty; runs/SCENARIO/TIME when left out.")
     ] = None,
-    view: Annotated[
-        bool, flag("Follow the run in the browser; the page stays until Ctrl-C (extra view).", "--view")
-    ] = False,
-    port: Annotated[int | None, option("N", "With --view: port of the page, 8123 if left out; 0 takes any.")] = None,
 ) -> None:
     """Run a scenario and show its results, beside published ones.
 
     Example:  gridpeers run islanding --case IV --driver inprocess
     """
     spec, feeder = load(scenario, {} if plant is None else {"plant.simulator": plant})
-    if port is not None and not view:
-        fail(["--port: goes with a page; add --view"], BAD_INPUT)
     pace: Pace = {"clock": clock, "speed": speed, "strict": strict, "processes": processes, "keys": keys}
-    page = ROOMS.resolve("page_socket")(port) if view else None
-    _carry_out(chosen(spec, case, seed), feeder, driver, out, pace, require_checks=require_checks, page=page)
+    _carry_out(chosen(spec, case, seed), feeder, driver, out, pace, require_checks=require_checks)
 
 
 def _carry_out(
@@ -87,13 +77,9 @@ def _carry_out(
     out: Path | None,
     pace: Pace,
     *,
-    require_checks: bool = False,
-    page: socket.socket | None = None,
+    require_checks: bool,
 ) -> NoReturn:
-    """Run a checked scenario into a folder, show its report, and end with its exit code.
-
-    A `page` is opened at its socket, and follows the run.
-    """
+    """Run a checked scenario into a folder, show its report, and end with its exit code."""
     from gridpeers.plant.simulators import SIMULATORS
     from gridpeers.runs.choices import check_how
     from gridpeers.scenarios.drivers.free_endpoint import free_endpoint, local_endpoint
@@ -122,19 +108,18 @@ def _carry_out(
         typer.echo(f"{spec.name}: {sizes.sentence}")
     request = Request(scenario=spec, feeder=feeder, driver=driver, folder=folder, **pace)
     console, left = terminal(), f"what came until then is in {shown(folder)}/"
-    with ROOMS.resolve("page_beside")(folder, page, spec.name) if page else nullcontext():
-        try:
-            said = simulator.starting(spec.plant.simulators.get(spec.plant.simulator)) or COMPILING
-            with ended_by_signals(left), progress(console, tuple(spec.cases), said) as tell:
-                report = run_scenario(request, tell)
-        except BrokenRunError as error:
-            by_law = isinstance(error, LawStopError)
-            why = f"FAILED  {error}" if by_law else f"the run broke: {error}"
-            fail([why, *([left] if folder.is_dir() else [])], CLAIM_FAILED if by_law else BROKEN)
-        from gridpeers.scenarios.checks.check_registry import LAW_FAILED
-        from gridpeers.scenarios.results.report import show  # imports numpy, which the run does without
+    try:
+        said = simulator.starting(spec.plant.simulators.get(spec.plant.simulator)) or COMPILING
+        with ended_by_signals(left), progress(console, tuple(spec.cases), said) as tell:
+            report = run_scenario(request, tell)
+    except BrokenRunError as error:
+        by_law = isinstance(error, LawStopError)
+        why = f"FAILED  {error}" if by_law else f"the run broke: {error}"
+        fail([why, *([left] if folder.is_dir() else [])], CLAIM_FAILED if by_law else BROKEN)
+    from gridpeers.scenarios.checks.check_registry import LAW_FAILED
+    from gridpeers.scenarios.results.report import show  # imports numpy, which the run does without
 
-        show(report, console)
+    show(report, console)
     failed = any(verdict.status == "FAIL" for verdict in report.verdicts) or report.fails(LAW_FAILED)
     failed |= require_checks and report.fails()
     raise typer.Exit(CLAIM_FAILED if failed else PASSED)

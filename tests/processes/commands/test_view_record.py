@@ -1,4 +1,4 @@
-"""`gridpeers view RECORD` and `gridpeers run --view` in a real browser: a record at any time, by slider and by key."""
+"""`gridpeers view RECORD` in a real browser: a record at any time, by slider and by key."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 from gridpeers.lab.explanation.explanation import explain
 from gridpeers.scenarios.record.record_reader import RunRecord
 from tests.command_line import invoke
-from tests.processes.terminals import Desk
+from tests.processes.terminals import Desk, wait_for
 from tests.record.recorded_runs import recorded_run
 
 if TYPE_CHECKING:
@@ -148,16 +148,18 @@ def test_a_record_is_seen_at_any_time(desk: Desk, browser: Browser, records: Pat
 
 
 def test_a_run_that_has_ended_is_offered_as_a_record(desk: Desk, browser: Browser) -> None:
-    """Its page, opened before its begin, has its slider after its end; Ctrl-C ends the page, and the run ended well."""
+    """Its page, opened at its begin, follows it, and has its slider after its end."""
     few = 'graph = "full"\nwithout_agent = ["inv3", "inv5", "inv6", "inv7", "inv8", "inv9"]\n'
     text = ISLANDED.format(end=2.0).replace('graph = "full"\n', few)
     (desk.folder / "it.toml").write_text(text, encoding="utf-8")
-    run = desk.open_bare("run", "it.toml", "--clock", "wall", "--view", "--port", "0", "--out", "out")
-    url = run.expect(r"open (http://\S+) in a browser; the page follows the run")[1]
+    run = desk.open_bare("run", "it.toml", "--clock", "wall", "--out", "out")
+    wait_for(desk.folder / "out" / "status.txt", "running")
+    view = desk.open_bare("view", "out", "--port", "0")
+    url = view.expect(r"open (http://\S+) in a browser; Ctrl-C ends the page")[1]
     page = browser.new_page(viewport={"width": 1500, "height": 1200})
     page.set_default_timeout(WAIT)
     page.goto(url)
-    run.expect(r"the run has ended; http://\S+ shows its record until Ctrl-C")
+    assert run.end() == 0
     page.wait_for_selector('body[data-live="record"]')
     shows(page, 2.0)
     assert page.locator("#run").inner_text() == "islanded, case one"
@@ -167,8 +169,8 @@ def test_a_run_that_has_ended_is_offered_as_a_record(desk: Desk, browser: Browse
     shows(page, 0.0)
     page.get_by_label("Show how inv4 decided").click()
     page.locator("#decision-text", has_text="inv4").wait_for()
-    run.signal(signal.SIGINT)
-    assert run.end() == 0
+    view.signal(signal.SIGINT)
+    assert view.end() == 130
     page.wait_for_selector('body[data-live="lost"]')
     assert RunRecord.open(desk.folder / "out" / "one").complete
 
@@ -182,8 +184,7 @@ def test_bad_input_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         (("view", "gone"), "gone: cannot be read: No such file or directory"),
         (("view", "run.mcap", "--control"), "--control: goes with a live run; nothing can be done to a record"),
         (("view", "--case", "IV"), "--case: goes with a RECORD; a live run has one case"),
-        (("run", "islanding", "--port", "0"), "--port: goes with a page; add --view"),
-        (("run", "islanding", "--view", "--port", "70000"), "--port: a port is a number from 0 to 65535, got 70000"),
+        (("view", "--port", "70000"), "--port: a port is a number from 0 to 65535, got 70000"),
     ):
         assert invoke(*words) == (2, f"gridpeers: {complaint}\n")
     assert not (tmp_path / "runs").exists()
