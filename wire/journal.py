@@ -170,8 +170,6 @@ AnyEntry = (
     | Decision
 )
 
-ENTRIES: tuple[type[Entry], ...] = AnyEntry.__args__
-
 _encode_into = msgspec.msgpack.Encoder().encode_into
 
 

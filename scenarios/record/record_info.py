@@ -1,18 +1,17 @@
-"""What a record says about its run: version of the format, scenario, configurations, versions; and its channels."""
+"""What a record says about its run: version of the format, scenario, configurations, versions; and its topics."""
 
 from __future__ import annotations
 
 from contextlib import suppress
-from functools import lru_cache
-from typing import Any, Literal, NamedTuple
+from typing import Literal
 
 import msgspec
 
 from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
-from gridpeers.wire.journal import ENTRIES, RecordLevel
-from gridpeers.wire.messages import AnyMessage, Journal, LinkReport, LinkRequest, Measurement, State, Telemetry
+from gridpeers.wire.journal import RecordLevel
+from gridpeers.wire.messages import Journal, LinkReport, LinkRequest, Measurement, State, Telemetry
 
 FILE = "run.mcap"
 
@@ -97,16 +96,7 @@ class RecordInfo(msgspec.Struct, frozen=True, kw_only=True):
         }
 
 
-Topic = Literal["telemetry", "journal", "link_reports", "link_requests", "physics", "events"]
-
-
-class RecordChannel(NamedTuple):
-    topic: Topic
-    encoding: Literal["msgpack", "json"]
-    """Encoding of its messages: those of the wire are msgpack with their CRC-32, those for viewers JSON."""
-    schema_name: str
-    schema: bytes
-
+Topic = Literal["telemetry", "journal", "link_reports", "link_requests"]
 
 TOPICS: dict[type[Telemetry] | type[Journal] | type[LinkReport] | type[LinkRequest], Topic] = {
     Telemetry: "telemetry",
@@ -115,53 +105,3 @@ TOPICS: dict[type[Telemetry] | type[Journal] | type[LinkReport] | type[LinkReque
     LinkRequest: "link_requests",
 }
 """Topic of each message that the plant publishes for recorders. Their payloads are in the record as they were sent."""
-
-_INTEGER, _TEXT = {"type": "integer"}, {"type": "string"}
-_EVENTS = {
-    "type": "object",
-    "title": "foxglove.Log",
-    "description": "An event of the plant, of the roster or of links; a row of events.csv.",
-    "properties": {
-        "timestamp": {"type": "object", "properties": dict.fromkeys(("sec", "nsec"), _INTEGER)},
-        "level": _INTEGER | {"description": "2: information, 3: warning."},
-        "message": _TEXT,
-        "name": _TEXT | {"description": "Kind of the event."},
-        "file": _TEXT | {"description": "The switch, island or agent concerned."},
-        "line": _INTEGER,
-    },
-}
-
-
-@lru_cache(maxsize=4)
-def channels(inverters: tuple[str, ...], quantities: tuple[str, ...]) -> tuple[RecordChannel, ...]:
-    numbers = {"type": "object", "properties": {name: {"type": ["number", "null"]} for name in quantities}}
-    physics = {
-        "type": "object",
-        "title": "gridpeers.Physics",
-        "description": "Terminal quantities of every inverter; null stands for a number that is not finite.",
-        "properties": {"t_s": {"type": "number"}} | dict.fromkeys(inverters, numbers),
-    }
-    wire = tuple(
-        RecordChannel(topic, "msgpack", f"gridpeers.{kind.__name__}", _json(_schema(kind)))
-        for kind, topic in TOPICS.items()
-    )
-    return (
-        *wire,
-        RecordChannel("physics", "json", "gridpeers.Physics", _json(physics)),
-        RecordChannel("events", "json", "foxglove.Log", _json(_EVENTS)),
-    )
-
-
-_json = msgspec.json.encode
-
-
-def _schema(kind: type[AnyMessage]) -> dict[str, Any]:
-    schema = msgspec.json.schema(kind)
-    if kind is Journal:
-        entries = [msgspec.json.schema(entry) for entry in ENTRIES]
-        schema["$defs"] |= {name: definition for entry in entries for name, definition in entry["$defs"].items()}
-        schema["description"] = (
-            "A part of a node's journal: msgpack arrays, one after the other, each with the kind of the entry first; "
-            "their schemas are among the definitions."
-        )
-    return schema

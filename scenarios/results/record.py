@@ -21,7 +21,7 @@ from gridpeers.wire.messages import Journal, LinkReport, LinkRequest, PlantEvent
 if TYPE_CHECKING:
     from gridpeers.scenarios.record.record_info import RecordInfo
     from gridpeers.scenarios.record.record_reader import RunRecord
-    from gridpeers.scenarios.record.record_writer import Recording
+    from gridpeers.scenarios.record.record_writer import RecordWriter
     from gridpeers.scenarios.results.history import History
 
 
@@ -80,13 +80,15 @@ class Recorder:
     def __init__(self, folder: Path | None = None, *, gaps: bool = False, record: RecordInfo | None = None) -> None:
         self._gaps, self._folder = gaps, folder
         self._hash = hashlib.sha256()
-        self._file: Recording | None = None
+        self._file: RecordWriter | None = None
         if folder is not None:
             folder.mkdir(parents=True)
             if record is not None:
-                from gridpeers.scenarios.record.record_writer import Recording  # imports mcap, which sweeps do without
+                from gridpeers.scenarios.record.record_writer import (
+                    RecordWriter,  # imports mcap, which sweeps do without
+                )
 
-                self._file = Recording(folder, record)
+                self._file = RecordWriter(folder, record)
         self.case = Recorded(table=bytearray(), links=LinkRecord(keep=self._file is None))
         """The case so far."""
         self.count = 0
@@ -160,7 +162,7 @@ class Recorder:
             self._file.close()
 
 
-def _require(file: Recording) -> None:
+def _require(file: RecordWriter) -> None:
     if file.error is not None:
         raise file.error
 

@@ -55,7 +55,7 @@ def recorded_run(
     return RunRecord.open(folder)
 
 
-def recorded_in_chunks(text: str, folder: Path, case: str = "case", *, chunk: int = 20_000) -> RunRecord:
+def recorded_in_chunks(text: str, folder: Path, case: str = "case", *, chunk: int = 5_000) -> RunRecord:
     """Run a case of a scenario file with this text in one process; a chunk of its record has about so many bytes."""
     file = folder / "scenario.toml"
     file.write_text(text, encoding="utf-8")

@@ -15,7 +15,7 @@ from gridpeers.lab.chaos import chaos_run
 from gridpeers.lab.chaos.campaign import Campaign, shrink_number
 from gridpeers.lab.chaos.chaos_run import MachineError
 from gridpeers.scenarios.record import record_writer
-from gridpeers.scenarios.record.record_writer import Recording
+from gridpeers.scenarios.record.record_writer import RecordWriter
 from gridpeers.scenarios.run import run_case
 from tests.command_line import invoke
 from tests.unit.lab.chaos.bases import base_in, run_scenario
@@ -123,13 +123,13 @@ def test_a_run_whose_record_ends_early_is_not_judged(elsewhere: Path, monkeypatc
     def no_room(*_: object) -> int:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    begun = Recording.__call__
+    begun = RecordWriter.__call__
 
-    def then_full(recording: Recording, message: Any) -> None:
+    def then_full(recording: RecordWriter, message: Any) -> None:
         begun(recording, message)
-        monkeypatch.setattr(record_writer.os, "write", no_room)
+        monkeypatch.setattr(record_writer.Writer, "flush", no_room)
 
-    monkeypatch.setattr(Recording, "__call__", then_full)
+    monkeypatch.setattr(RecordWriter, "__call__", then_full)
 
     with pytest.raises(MachineError, match=r"No space left on device: .*run\.mcap"):
         run_scenario(base)

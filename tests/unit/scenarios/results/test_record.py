@@ -102,7 +102,7 @@ def test_a_disk_that_takes_no_more_is_an_error_at_once_and_again_at_the_end(
     with Recorder(tmp_path / "I", record=info_of("inv1")) as recorder:
         recorder(telemetry((row(0.0),)))
         monkeypatch.setattr(record_writer, "PERIOD", -1.0)
-        monkeypatch.setattr(record_writer.os, "write", no_room)
+        monkeypatch.setattr(record_writer.Writer, "flush", no_room)
         for act in (lambda: recorder(telemetry((row(0.5),))), lambda: recorder.finish(0.5, 0.5)):
             with pytest.raises(OSError, match="No space left") as caught:
                 act()
