@@ -106,9 +106,6 @@ def _run(configs: Sequence[AgentConfig], laws: Sequence[Law], make_links: MakeLi
             for node in nodes:
                 if node.upkeep is not None:
                     node.upkeep.host_moved = partial(getattr, session, "moved")
-            if credentials is not None:
-                for node in nodes:
-                    node.post.vouches = session.vouches
             take_part(core, nodes, session, logging.getLogger(first.name))
         finally:
             session.close()
