@@ -63,7 +63,7 @@ class AgentNode:
         post = self.post = Post(name, config.run, config.epoch, None if realtime else known.members)
         keys = self.keys = post.keys
         self.admission, self.rejects, self.routes = post.admission, post.rejects, post.routes
-        self.received, self.is_known, self.lost = post.received, post.is_known, post.lost
+        self.received, self.lost = post.received, post.lost
         self.take_actions, self.take_rejects = post.take_actions, post.take_rejects
         self.name, self.watched, self.token = name, keys.any_alive, keys.alive_agent(name, instance)
         self.tokens = (self.token,)

@@ -70,8 +70,8 @@ class PlantNode:
         self.name, self.members, self.rejects, self.routes = PLANT, post.members, post.rejects, post.routes
         self.token, self.watched = keys.alive_plant(config.epoch), keys.any_alive
         self.tokens = (self.token,)
-        self.take_actions, self.take_rejects, self.received = post.take_actions, post.take_rejects, post.received
-        self.is_known, self.lost = post.is_known, post.lost
+        self.received, self.lost = post.received, post.lost
+        self.take_actions, self.take_rejects = post.take_actions, post.take_rejects
         post.on_nameplate = self._on_nameplate
         wall = config.clock == "wall"
         stepper = self.stepper = PlantStepper(config, plant)

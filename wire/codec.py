@@ -12,7 +12,6 @@ import re
 import traceback
 from collections import Counter
 from collections.abc import Callable
-from functools import lru_cache
 from typing import TypeVar
 from zlib import crc32
 
@@ -83,20 +82,6 @@ def decode(payload: bytes) -> AnyMessage:
         raise RejectedError("garbled", str(error)) from None
     _latest = payload, message
     return message
-
-
-_HEAD = 160
-"""Bytes in which type, name and epoch stand."""
-
-
-@lru_cache(maxsize=4096)
-def _mark(sender: str, epoch: int) -> bytes:
-    return b"\xa6sender" + _encoder.encode(sender) + b"\xa5epoch" + _encoder.encode(epoch)
-
-
-def is_marked(payload: bytes, sender: str, epoch: int) -> bool:
-    """Whether a payload begins as a message of this sender in this epoch does."""
-    return _mark(sender, epoch) in payload[:_HEAD]
 
 
 def sound(payload: bytes) -> AnyMessage | None:

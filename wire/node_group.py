@@ -151,9 +151,6 @@ class NodeGroup:
         for node in tuple(self._listeners.get(key, ())) if query is None else query.askers:
             node.received(key, payload, now)
 
-    def is_known(self, key: str, payload: bytes) -> bool:
-        return any(node.is_known(key, payload) for node in tuple(self._listeners.get(key, ())))
-
     def lost(self, loss: Loss, now: float) -> None:
         """As `Post.lost`; who waits for a lost answer asks again."""
         query = self._open.pop(loss.key, None)

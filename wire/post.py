@@ -11,7 +11,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
 
-from gridpeers.wire.codec import RejectedError, RejectedMessages, decode, encode, is_marked
+from gridpeers.wire.codec import RejectedError, RejectedMessages, decode, encode
 from gridpeers.wire.journal import JournalBuffer, Traffic
 from gridpeers.wire.keys import Keys, epoch_of
 from gridpeers.wire.links import Links
@@ -102,17 +102,6 @@ class Post:
             self.rejects.failed(key, error)
         if self.traffic is not None:
             self.traffic.received(key, payload, now, rejected_as)
-
-    def is_known(self, key: str, payload: bytes) -> bool:
-        """Whether a message looks like one of the sender of its key, in its epoch; any thread may ask."""
-        route = self.routes.get(key)
-        if route is None:
-            return False
-        epoch = self.admission.epochs.get(route.sender)
-        if epoch is not None and is_marked(payload, route.sender, epoch):
-            return True
-        plants = () if self.plant is None or route.sender != PLANT else tuple(self.plant.present)
-        return any(is_marked(payload, PLANT, epoch) for epoch in plants)
 
     def lost(self, loss: Loss, now: float) -> None:
         """Count messages that the driver has dropped unread; the journal has their number."""

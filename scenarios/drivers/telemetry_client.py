@@ -59,7 +59,6 @@ class TelemetryClient:
         self._closed = False
         self.rejects = self._core.rejects
         self.inbox = Inbox(lossless=clock == "simulated")
-        self.inbox.is_known = self._core.is_known
         self._session = self._open()
 
     @property

@@ -108,9 +108,8 @@ class TelemetryEndpoint:
         self._plant, self._stream = FollowedPlant(post), stream
         self._questions = 0
         self._recordable: list[Recordable] = []
-        self._telemetry = post.keys.telemetry
         recordable = Telemetry, LinkReport, Journal, LinkRequest
-        post.routes[self._telemetry] = Route(PLANT, recordable, self._on_recordable, relayed=(LinkReport, Journal))
+        post.routes[post.keys.telemetry] = Route(PLANT, recordable, self._on_recordable, relayed=(LinkReport, Journal))
         post.routes[post.keys.answer(name)] = Route(PLANT, (Answer,), self._on_answer)
         self.keys, self.rejects, self.subscriptions = post.keys, post.rejects, tuple(post.routes)
         self.received, self.lost, self.take_rejects = post.received, post.lost, post.take_rejects
@@ -125,10 +124,6 @@ class TelemetryEndpoint:
         match self.keys.parts(key):
             case ("alive", "plant", part) if epoch_of(part) != self.post.admission.epochs.get(PLANT):
                 self._plant.vanished(part)
-
-    def is_known(self, key: str, payload: bytes) -> bool:
-        """Return True for what looks like a message of the plant; in simulated time that is all for recorders."""
-        return (self._stream.acknowledges and key == self._telemetry) or self.post.is_known(key, payload)
 
     def take(self) -> list[Recordable]:
         messages, self._recordable = self._recordable, []

@@ -57,11 +57,9 @@ def perform(actions: Sequence[Action | Log], session: Session, log: logging.Logg
 def drive(core: Core, session: Session, log: logging.Logger) -> None:
     """Start a core, declare its keys and serve it until it has finished, as `serve` does.
 
-    The inbox learns of the core before any key is declared: a newcomer gets its history of tokens at once, strangers'
-    included. The token is declared last: whoever sees it may rely on the rest.
+    The token is declared last: whoever sees it may rely on the rest.
     """
     core.start(monotonic())
-    session.inbox.is_known = core.is_known
     for key in core.subscriptions:
         session.subscribe(key)
     session.watch(core.watched)
@@ -72,7 +70,6 @@ def drive(core: Core, session: Session, log: logging.Logger) -> None:
 
 def serve(core: Core, session: Session, log: logging.Logger) -> None:
     """Serve a started core until it has finished; raise StoppedError if another thread asks the process to stop."""
-    session.inbox.is_known = core.is_known
     take = session.take
     limit = limit_log(log)
     now = monotonic()

@@ -2,20 +2,16 @@
 
 Should the owner fall behind, or somebody send faster than it reads, then
 
-- up to `ROOM` short messages wait, whoever sent them. Beyond that a message waits only if it is of a known sender, up
-  to `MOST_OF_ONE` on each key: a flood by others never displaces a state, a measurement or a stop request;
-- messages above `SMALL` bytes have `BYTES` together, a quarter of it for strangers;
+- up to `ROOM` messages wait, and beyond that `MOST_OF_ONE` on each key: a flood on one key never displaces a state, a
+  measurement or a stop request on another. Who may send on a key is the business of access rules;
+- messages above `SMALL` bytes have `BYTES` together;
 - tokens always wait: Zenoh keeps each in every process anyway.
-
-A known sender is recognised by its name and epoch in the first bytes; whoever copies these has the room of that one
-sender, and no more. All checks of `gridpeers.wire.post` follow.
 """
 
 from __future__ import annotations
 
 from _thread import allocate_lock
 from collections import Counter, deque
-from collections.abc import Callable
 from contextlib import suppress
 from time import monotonic
 from typing import Literal
@@ -33,16 +29,19 @@ Stamped = tuple[Kind, str, bytes, float]
 """The same, and its time of arrival (s, monotonic): it may wait for its owner."""
 
 ROOM = 4_000
-"""Short messages that may wait, of anybody: four for each of the most inverters in a run."""
+"""Messages that may wait, on any keys: four for each of the most inverters in a run."""
 
 SMALL = 4_096
 """Bytes of a short message; the longer ones are reports, journals and telemetry."""
 
 MOST_OF_ONE = 64
-"""Messages of one known sender that may wait beyond `ROOM` on one key: more than a second of its states."""
+"""Messages that may wait beyond `ROOM` on one key: more than a second of a sender's states."""
 
 BYTES = 64_000_000
 """Bytes of long messages that may wait."""
+
+LOSSLESS = 8
+"""Factor on all these in simulated time: more than honest senders send before they have an answer."""
 
 
 class Inbox:
@@ -51,14 +50,11 @@ class Inbox:
     The owner states how many messages it needs to continue, and wakes only then: in a full mesh of nine this is one
     wake a tick instead of nine, and half of the time of a tick. Any other event wakes it at once.
 
-    `lossless` is for simulated time, where none may be lost: messages of known senders always wait. Each of them sends
-    only so much before it has an answer.
+    `lossless` is for simulated time, where none may be lost.
     """
 
     def __init__(self, *, lossless: bool = False) -> None:
-        self.is_known: Callable[[str, bytes], bool] = lambda key, payload: False
-        """Says whether a message on a key is of a known sender; called from Zenoh's threads, when many wait."""
-        self._lossless = lossless
+        self._factor = LOSSLESS if lossless else 1
         self._events: deque[Stamped] = deque()
         self._needed = 1
         self._urgent = False
@@ -77,7 +73,7 @@ class Inbox:
     def put(self, event: Event, *, asked: bool = False) -> None:
         """Put an event in, from any thread; drop and count a message for which there is no room.
 
-        An answer to an own question (`asked`) has room as a known sender's message has.
+        An answer to an own question (`asked`) may have any length.
         """
         kind, _, payload = event
         if kind == "message" and len(self._events) < ROOM and len(payload) <= SMALL:
@@ -93,20 +89,20 @@ class Inbox:
 
     def _put_if_admitted(self, event: Event, *, asked: bool) -> None:
         _, key, payload = event
-        size, known = len(payload), asked or self.is_known(key, payload)
+        size = len(payload)
         long = size if size > SMALL else 0
         with self._guard:
             waiting = len(self._events)
             if size > LONGEST_MESSAGE and not asked:
                 self._lose(key, "oversized", f"{size} bytes, at most {LONGEST_MESSAGE} are allowed")
                 return
-            room = not long or self._bytes + long <= (BYTES if known else BYTES // 4)
-            room = room and (waiting < ROOM or (known and self._beyond[key] < MOST_OF_ONE))
-            if not (room or (known and self._lossless)):
+            beyond = waiting >= ROOM * self._factor
+            full = beyond and self._beyond[key] >= MOST_OF_ONE * self._factor
+            if full or (long and self._bytes + long > BYTES * self._factor):
                 self._lose(key, "excess", f"{waiting} messages were waiting, {self._bytes} bytes of them in long ones")
                 return
             self._counted = True  # before it is put in: `take` looks for it afterwards
-            self._beyond[key] += waiting >= ROOM
+            self._beyond[key] += beyond
             self._bytes += long
             self._events.append((*event, monotonic()))
 
