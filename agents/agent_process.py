@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from contextlib import ExitStack, closing
-from functools import partial
 from time import monotonic, sleep
 
 from msgspec.structs import replace
@@ -19,7 +18,6 @@ from gridpeers.wire.driver.drive import StoppedError, drive, serve
 from gridpeers.wire.driver.machine import schedule_as_batch
 from gridpeers.wire.driver.process import ConfigurationError, MakeLinks, new_epoch, no_links
 from gridpeers.wire.driver.session import Session, SessionError
-from gridpeers.wire.driver.sockets import end_left_links
 from gridpeers.wire.keys import check_name
 from gridpeers.wire.node_group import NodeGroup
 from gridpeers.wire.trust.credentials import Credentials
@@ -103,14 +101,9 @@ def _run(configs: Sequence[AgentConfig], laws: Sequence[Law], make_links: MakeLi
                     _node(config, session.id, make_links, law, known) for config, law in zip(configs, laws, strict=True)
                 )
                 core = nodes[0] if len(nodes) == 1 else NodeGroup(nodes)
-            for node in nodes:
-                if node.upkeep is not None:
-                    node.upkeep.host_moved = partial(getattr, session, "moved")
             take_part(core, nodes, session, logging.getLogger(first.name))
         finally:
             session.close()
-        if core.session_broken:
-            end_left_links()
     return nodes
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import inf
 from typing import Literal, cast
 
@@ -68,8 +67,6 @@ class Upkeep:
         self._timer, self._health, self._heard, self._meeting = timer, timer.health, timer.heard, timer.meeting
         post = self._post = timer.post
         self._link_commands = LinkCommandReceiver(post.name, post.epoch, links)
-        self.host_moved: Callable[[], bool] = lambda: False
-        """Whether the own host has another address than the session knows; the driver sets it."""
         self.start(0.0)
 
     def start(self, now: float) -> None:
@@ -131,8 +128,6 @@ class Upkeep:
 
     def _session_problem(self, failed: bool, now: float) -> str:
         """Return why a new session is needed, "" if it is not: this one did not bring, or take, what it should."""
-        if self.host_moved():
-            return "this host has another address"
         measured = self._heard.measurement if self._timer.phases.now == "running" else None
         roster = None if measured is None else measured.roster
         if roster is not None and failed:

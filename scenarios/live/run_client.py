@@ -49,10 +49,6 @@ class RunClient:
         self._session.watch(self.keys.any_alive)
         self._session.watch(ANY_ALIVE_PLANT)
 
-    @property
-    def moved(self) -> bool:
-        return self._session.moved
-
     def renew(self) -> None:
         """Open a new session, as the old one does not bring the messages that it should."""
         self.close()

@@ -197,7 +197,7 @@ class RunSubscriber:
         there.update(*(self._used.get(name, ()) for name in heard))
         silent = dict.fromkeys(sorted(there - heard), 0.0)
         self._patience.whole |= PLANT in heard and not silent
-        if self._patience.lost(silent, now) or self._client.moved:
+        if self._patience.lost(silent, now):
             self._patience = self._patience.next()
             self._client.renew()
 

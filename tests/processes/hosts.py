@@ -60,11 +60,6 @@ class Hosts:
         """Bring a host back."""
         self._ip("-n", self._switch, "link", "set", self._port(host), "master", "br0")
 
-    def readdress(self, host: int, address: str) -> None:
-        """Give a host another address in place of its own, as a DHCP server does."""
-        self._ip("-n", self._name(host), "address", "flush", "dev", "eth0")
-        self._ip("-n", self._name(host), "address", "add", f"{address}/24", "dev", "eth0")
-
     @property
     def _all(self) -> range:
         return range(1, self._count + 1)

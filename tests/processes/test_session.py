@@ -1,14 +1,14 @@
 from __future__ import annotations
 
-import subprocess
+import socket
+import struct
 import sys
 from time import monotonic
 
 import pytest
 
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
-from gridpeers.wire.driver.session import Session, SessionError
-from gridpeers.wire.driver.sockets import end_left_links, tcp_sockets
+from gridpeers.wire.driver.session import Session, SessionError, do_not_linger
 
 
 def test_a_port_in_use_is_explained() -> None:
@@ -76,32 +76,20 @@ def test_only_in_wall_clock_time_a_link_may_be_given_up_early_and_newest_values_
     assert found == {"simulated": (5_000_000, [False, False]), "wall": (200_000, [True, False])}
 
 
-CROWD = """
-import sys
-from gridpeers.wire.driver.session import Session
-plant = Session("plant", listen=(sys.argv[1],), clock="wall", rendezvous=True)
-others = [Session(name, listen=("tcp/127.0.0.1:0",), connect=(sys.argv[1],), clock="wall") for name in "abcd"]
-print("ready", flush=True)
-sys.stdin.read()
-for session in (*others, plant):
-    session.close()
-"""
+def lingers(connection: socket.socket) -> bool:
+    return struct.unpack("ii", connection.getsockopt(socket.SOL_SOCKET, socket.SO_LINGER, 8))[0] != 0
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="/dev/fd names every file of a process")
-def test_a_session_that_is_replaced_while_its_links_are_made_leaves_none() -> None:
-    """Zenoh alone leaves links of some in sixty such sessions, each until its other end closes too."""
-    endpoint = free_endpoint()
-    words = [sys.executable, "-c", CROWD, endpoint]
-    with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as crowd:
-        assert crowd.stdout is not None
-        assert crowd.stdout.readline() == "ready\n"
-        for step in range(60):
-            session = Session("e", listen=("tcp/127.0.0.1:0",), connect=(endpoint,), clock="wall")
-            session.take(1, 0.001 * (step % 20))
-            session.close()
-            end_left_links()
-        left = [socket.getpeername() for socket in tcp_sockets()]
-        crowd.communicate()
+def test_links_close_at_once_and_stay_open_until_then() -> None:
+    """SO_LINGER goes from a connection that has it; what is sent over it still arrives."""
+    with socket.create_server(("127.0.0.1", 0)) as server, socket.create_connection(server.getsockname()) as link:
+        accepted, _ = server.accept()
+        with accepted:
+            link.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 10))
+            assert lingers(link)
 
-    assert left == []
+            do_not_linger()
+            assert not lingers(link)
+
+            link.sendall(b"state")
+            assert accepted.recv(5) == b"state"

@@ -5,19 +5,21 @@ Zenoh's threads only enqueue into `Session.inbox`, and one thread, the owner's, 
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
 import json
 import os
 import re
+import socket
+import stat
+import struct
 import threading
 from collections.abc import Callable
-from time import monotonic
+from contextlib import suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gridpeers.wire.driver.inbox import Inbox, Stamped
 from gridpeers.wire.driver.machine import limit
-from gridpeers.wire.driver.sockets import LinkAddresses, address_in, do_not_linger, host_addresses
 from gridpeers.wire.driver.zenoh_settings import (
     ONE_THREAD,
     PROFILES,
@@ -38,9 +40,6 @@ FIRST_LINK = 0.5
 _REFUSED_LINKS = "zenoh_link_tls::unicast=warn"
 """Part of Zenoh's log: each TLS handshake that has failed, with its reason; ten a second at the most."""
 
-ADDRESSES_EVERY = 0.5
-"""Time (s) between two looks at the host's addresses."""
-
 _QUERY_TIMEOUT = 600.0
 """Time (s) after which Zenoh forgets a query; the asking node keeps its own deadline."""
 
@@ -53,6 +52,22 @@ def load_zenoh(*, one_thread: bool = False) -> None:
     if os.environ.get("ZENOH_RUNTIME") in (None, RUNTIME, ONE_THREAD):  # a parent's choice is not this process's
         os.environ["ZENOH_RUNTIME"] = ONE_THREAD if one_thread else RUNTIME
     import zenoh  # noqa: F401
+
+
+def do_not_linger() -> None:
+    """Switch SO_LINGER off on this process's TCP sockets; where a process cannot list its open files, do nothing.
+
+    Zenoh sets it to 10 s on every one, and no setting turns it off. Closing a socket with a dead path then blocks its
+    thread, which serves all other links too, for that time. Without it the kernel closes in the background, and still
+    delivers the sent data.
+    """
+    files = [int(entry.name) for entry in Path("/dev/fd").iterdir()] if Path("/dev/fd").exists() else []
+    for file in files:
+        with suppress(OSError):  # closed in the meantime
+            if stat.S_ISSOCK(os.fstat(file).st_mode):
+                with socket.socket(fileno=os.dup(file)) as same:
+                    if same.family in (socket.AF_INET, socket.AF_INET6):
+                        same.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 0, 0))
 
 
 class SessionError(ValueError):
@@ -106,10 +121,8 @@ class Session:
         self._declared: list[Any] = []
         self._tokens: dict[str, zenoh.LivelinessToken] = {}
         self._certificates = None if credentials is None else LinkCertificates(credentials)
-        self._addresses = LinkAddresses(listen, host_addresses())
-        self._next_look = monotonic() + ADDRESSES_EVERY
-        listening = () if in_star else self._addresses.endpoints
-        config = zenoh_settings(listening, connect, gossip=gossip and not in_star, clock=clock, meets_all=meets_all)
+        listening, gossips = () if in_star else listen, gossip and not in_star
+        config = zenoh_settings(listening, connect, gossip=gossips, clock=clock, meets_all=meets_all)
         if star and rendezvous:
             config["mode"] = "router"
             config["scouting"]["delay"] = 0  # else it waits 0.5 s for others
@@ -173,15 +186,6 @@ class Session:
     def misplaced(self) -> bool:
         """Whether a router has answered too late for this session to be its client: open another one."""
         return self._changeable and bool(self._session.info.routers_zid())
-
-    @property
-    def moved(self) -> bool:
-        """Whether this host has lost the address of a link, or has got another: others need a new session's."""
-        if (now := monotonic()) < self._next_look:
-            return False
-        self._next_look = now + ADDRESSES_EVERY
-        sources = {address_in(str(link.src)) for link in self._session.info.links()}
-        return self._addresses.moved(sources, host_addresses())
 
     def take(self, needed: int, timeout: float | None) -> list[Stamped]:
         """Take the events out of the inbox, as `Inbox.take` does, and set up new links."""
@@ -278,7 +282,7 @@ class Session:
     def close(self) -> None:
         """Undeclare the tokens and close."""
         # close() may raise when a peer has just gone; nothing can be done about it
-        with contextlib.suppress(self._zenoh.ZError):
+        with suppress(self._zenoh.ZError):
             self._session.close()  # type: ignore[no-untyped-call]  # as zenoh declares it
 
     def _direct(self, callback: Callable[[Any], None]) -> Any:

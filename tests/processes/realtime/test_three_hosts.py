@@ -31,10 +31,8 @@ def hosts() -> Iterator[Hosts]:
         pytest.skip(f"network namespaces cannot be made here: {error}")
 
 
-def test_a_host_cut_off_or_moved_is_welcome_again(hosts: Hosts, tmp_path: Path) -> None:
+def test_a_host_cut_off_is_welcome_again(hosts: Hosts, tmp_path: Path) -> None:
     """All nine share; without the third host six go on at 60 Hz; healed, nine again, without anybody's help.
-
-    With another address it is back at once, and takes nobody along.
 
     On the plant's own host agents and `watch` reach it over the loopback, and the other hosts all the same.
     """
@@ -70,17 +68,9 @@ def test_a_host_cut_off_or_moved_is_welcome_again(hosts: Hosts, tmp_path: Path) 
         watch.expect(r"inv1 .* inv2-9 ")
         watch.expect(r"inv9 .* inv1-8 ")
 
-        before = near.text, far.text
-        hosts.readdress(3, "10.77.0.99")
-        cut_off.expect("this host has another address; opens a new session", 3.0)
-        cut_off.expect("goes on at t = ", AT_ONCE)
-        for name, all_others in (("inv1", "inv2-9"), ("inv9", "inv1-8")):
-            watch.expect(rf"{name} .* {all_others} ", AT_ONCE)
         status = desk.open("status", prefix=hosts.at(2))
         assert status.end() == 0
         assert re.search(r"inv[1-9] .*no agent", status.text) is None, status.text
-        for agent, then in zip((near, far), before, strict=True):
-            assert "new session" not in agent.text[len(then) :]
         down = desk.open("down", prefix=hosts.at(2))
 
         assert down.end() == 0, down.text

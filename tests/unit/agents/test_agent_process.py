@@ -32,7 +32,6 @@ class Played:
     def __init__(self, *events: Stamped | BaseException) -> None:
         self._events = list(events)
         self.inbox = Inbox()
-        self.moved = False
         self.left = 0
         """How often the plant was told that the agent leaves."""
         self._plant_is_there = True

@@ -26,16 +26,6 @@ def test_an_agent_whose_plant_is_there_but_mute_begins_again_with_a_new_session(
     assert lab.side.failed == ""
 
 
-def test_an_agent_whose_host_has_another_address_opens_a_new_session_at_once() -> None:
-    """The others know only the old address; to wait until nothing comes from them would cost seconds."""
-    lab = running("inv2")
-    lab.side.upkeep.host_moved = lambda: True
-    lab.go(T_C)
-
-    assert lab.side.session_broken
-    assert lab.said[-1] == "inv1: this host has another address; opens a new session"
-
-
 @pytest.mark.parametrize(
     ("roster", "heard", "why"),
     [

@@ -146,7 +146,7 @@ def waiting(monkeypatch: pytest.MonkeyPatch) -> Waiting:
         class Session:
             """Stands for Zenoh."""
 
-            id, misplaced, moved, inbox = "1", False, False, Inbox()
+            id, misplaced, inbox = "1", False, Inbox()
             subscribe = watch = close = staticmethod(lambda *_, **__: None)
             peers = staticmethod(lambda: links)
             take = staticmethod(clock.take)

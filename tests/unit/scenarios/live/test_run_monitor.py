@@ -37,7 +37,7 @@ Event = tuple[str, str, bytes, float]
 class Line:
     """Stands for Zenoh: what the test puts on it comes in."""
 
-    id, misplaced, moved = "1", False, False
+    id, misplaced = "1", False
 
     def __init__(self) -> None:
         self.events: list[Event] = []
