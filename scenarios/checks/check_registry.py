@@ -29,8 +29,8 @@ RETURNS = "returns"  # Judges a run whose scenario asks for it: many end before 
 LAW_FAILED = "law_failed"  # Fails a run also without `--require-checks`: its numbers are not those of its law
 
 ALWAYS = (
-    "frequency", "voltage", "power_sharing", "var_sharing", "rating", "oscillation", "steady", "power_balance",
-    "message_account", LAW_FAILED, "heal", "stale_values", "last_words",
+    "frequency", "voltage", "power_sharing", "var_sharing", "rating", "oscillation", "steady", "message_account",
+    LAW_FAILED, "heal", "stale_values", "last_words",
 )  # fmt: skip
 """Checks that judge every run, unless its scenario switches one off, in the order of the verdict."""
 
@@ -48,7 +48,6 @@ CHECKS: Registry[Any] = Registry(
             "rating": "run_checks:Rating",
             "oscillation": "run_checks:Oscillation",
             "steady": "window_checks:SteadyEnd",
-            "power_balance": "balance_check:PowerBalance",
             "returns": "run_checks:Returned",
             "law_failed": "run_checks:LawFailed",
         }.items()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +22,6 @@ from gridpeers.scenarios.schema.configs import configs
 from tests.command_line import invoke
 from tests.scenario_files import written
 from tests.unit.plant.feeder.test_single_phase_inverters import small, unit
-from tests.unit.scenarios.checks.cases import verdict
 
 ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8").replace('paper = "islanding"', "")
 
@@ -165,17 +163,6 @@ def test_the_events_of_a_run_have_its_loads(run: Result) -> None:
     assert loads["text"].iloc[0] == SAID
     P = run.history.xs("P", axis=1, level="quantity").sum(axis=1)
     assert P.loc[1.2] - P.loc[0.59] == pytest.approx(420e3 - 245e3, rel=0.2)
-
-
-def test_the_balance_goes_on_with_the_loads_that_were_set(run: Result) -> None:
-    """Its rows after the change have generation that the tables' loads would not take."""
-    case = run.checked_case
-    untold = replace(case, events=tuple(event for event in case.events if event.kind != "load"))
-
-    assert verdict(case, "power_balance").status == "passed"
-    found = verdict(untold, "power_balance")
-    assert found.status == "failed"
-    assert {violation.t > 0.6 for violation in found.violations} == {True}
 
 
 def test_an_explanation_and_a_counterfactual_have_the_change(run: Result, elsewhere: Path) -> None:

@@ -14,9 +14,7 @@ from gridpeers.scenarios.results.recorded_events import law_failures
 from gridpeers.wire.messages import PlantEvent
 from tests.unit.scenarios.checks.cases import changed, ran, ran_with, verdict
 
-PLANT_CHECKS = (
-    *("frequency", "voltage", "power_sharing", "var_sharing", "rating", "oscillation", "steady", "power_balance"),
-)
+PLANT_CHECKS = ("frequency", "voltage", "power_sharing", "var_sharing", "rating", "oscillation", "steady")
 
 Arrays = dict[str, np.ndarray[Any, Any]]
 
@@ -147,31 +145,7 @@ def test_a_value_that_still_moves_is_caught(sound: CheckedCase) -> None:
     assert found.violations[0].value == pytest.approx(0.1, abs=0.01)
 
 
-@pytest.mark.parametrize("column", [0, 8])
-def test_power_from_nowhere_is_caught(sound: CheckedCase, column: int) -> None:
-    """An inverter whose recorded power is 3 % more than the network takes, whichever it is."""
-
-    def fault(of: Arrays) -> None:
-        of["P"][:, column] *= 1.06
-
-    found = verdict(changed(sound, fault), "power_balance")
-
-    assert found.status == "failed"
-    assert "real power" in found.violations[0].text
-    assert (found.violations[0].value or 0.0) > 0.5
-
-
-def test_with_the_substation_the_balance_is_not_judged(sound: CheckedCase) -> None:
-    """The record does not have what the substation delivers."""
-    connected = replace(sound, events=tuple(event for event in sound.events if event.kind != "switch"))
-    found = verdict(connected, "power_balance")
-
-    assert (found.status, found.reason) == ("not judged", "no recorded row has an island without the substation")
-
-
-@pytest.mark.parametrize(
-    "check", [name for name in PLANT_CHECKS if name not in ("rating", "oscillation", "power_balance")]
-)
+@pytest.mark.parametrize("check", [name for name in PLANT_CHECKS if name not in ("rating", "oscillation")])
 def test_without_an_event_nothing_is_judged(sound: CheckedCase, check: str) -> None:
     """A verdict on nothing is not "passed"."""
     found = verdict(replace(sound, windows=()), check)
