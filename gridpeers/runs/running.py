@@ -12,7 +12,6 @@ from gridpeers.plant.tables import read_feeder
 from gridpeers.runs.choices import Pace, check_how, with_cases
 from gridpeers.runs.result import Result, Results
 from gridpeers.runs.run_folder import RunFolder, as_folder, new_home
-from gridpeers.scenarios.results.file_sizes import file_sizes, require_room
 from gridpeers.scenarios.results.recorded_events import first_of
 from gridpeers.scenarios.results.run_files import FolderError, is_complete
 from gridpeers.scenarios.run import run as run_request
@@ -48,8 +47,6 @@ def run(
     check_how(driver, pace, spec)
     if driver == "processes" and (wrong := check_portable(spec)):
         raise ScenarioError(wrong)
-    sizes = file_sizes(spec, scenario.feeder, clock=pace.get("clock", "simulated"))
-    require_room(Path(tempfile.gettempdir()) if folder is None else as_folder(folder), sizes)
     if folder is not None:
         home = RunFolder(new_home(folder))
     else:

@@ -83,8 +83,7 @@ def _carry_out(
     from gridpeers.plant.simulators import SIMULATORS
     from gridpeers.runs.choices import check_how
     from gridpeers.scenarios.drivers.free_endpoint import free_endpoint, local_endpoint
-    from gridpeers.scenarios.results.file_sizes import file_sizes, require_room
-    from gridpeers.scenarios.results.run_files import RUNS, new_folder, shown
+    from gridpeers.scenarios.results.run_files import new_folder, shown
     from gridpeers.scenarios.run import run as run_scenario
     from gridpeers.scenarios.run_request import BrokenRunError, LawStopError, Request
     from gridpeers.scenarios.schema import ScenarioError
@@ -101,11 +100,7 @@ def _carry_out(
     with usage_errors():
         if driver == "processes":
             free_endpoint(local_endpoint(spec.processes.port), option="processes.port")
-        sizes = file_sizes(spec, feeder, clock=pace.get("clock", "simulated"))
-        require_room(out or RUNS, sizes, "--out")
         folder = new_folder(out, spec.name, datetime.now().astimezone())
-    if sizes.sentence:
-        typer.echo(f"{spec.name}: {sizes.sentence}")
     request = Request(scenario=spec, feeder=feeder, driver=driver, folder=folder, **pace)
     console, left = terminal(), f"what came until then is in {shown(folder)}/"
     try:

@@ -43,7 +43,6 @@ def check(
 
     from gridpeers.cli.progress import TRYING, explained
     from gridpeers.rooms import ROOMS
-    from gridpeers.scenarios.results.file_sizes import file_sizes
     from gridpeers.scenarios.schema.check_notes import start_problem
     from gridpeers.scenarios.schema.supply import supply_notes
 
@@ -58,7 +57,6 @@ def check(
         f"{file}: can be run: {counted(len(spec.cases), 'case')} {', '.join(spec.cases)}; "
         f"{counted(len(spec.events), 'event')}; {spec.time.end_s:g} s; "
         f"{counted(len(feeder.inverters), 'inverter')} on {counted(len(feeder.buses), 'bus', 'buses')}"
-        + (f"; {sentence}" if (sentence := file_sizes(spec, feeder).sentence) else "")
     )
 
 

@@ -76,7 +76,6 @@ def _start(start: Start, *, agents: bool) -> None:
     from gridpeers.scenarios.live.live_processes import all_here, plant_here, say
     from gridpeers.scenarios.live.live_report import conclude
     from gridpeers.scenarios.record.record_info import LIVE
-    from gridpeers.scenarios.results.file_sizes import HOUR, file_sizes, require_room
     from gridpeers.scenarios.results.metrics_file import RunMetrics
     from gridpeers.scenarios.results.recorded_events import ended_by_a_law, first_of, law_failures
     from gridpeers.scenarios.schema.configs import secured
@@ -105,13 +104,8 @@ def _start(start: Start, *, agents: bool) -> None:
         for note in notes:
             say(f"NOTE  {note}")
     watch_readers(quits=False)
-    sizes = file_sizes(spec, feeder, HOUR if start.duration is None else start.duration, "wall")
-    if start.out is not None and start.duration is not None:
-        require_room(start.out, sizes, "--out")
     with folders(start.out, spec) as kept:
         say(f"run {run}: {spec.name}, case {', '.join(spec.cases)}; the plant listens on {endpoint}")
-        if kept.whole is not None and sizes.sentence:
-            say(f"run {run}: {'an hour' if start.duration is None else f'{start.duration:g} s'} {sizes.sentence}")
         info = live_record(spec, config, everyone, inverters)
         if agents:
             found_by = RunAddress(run=run, connect=(endpoint,), access=access).words
