@@ -23,7 +23,6 @@ from gridpeers.plant.simulators import SIMULATORS
 from gridpeers.scenarios.checks.check_registry import ALWAYS, CHECKS
 from gridpeers.scenarios.drivers.free_endpoint import local_endpoint
 from gridpeers.scenarios.record.record_info import RecordInfo
-from gridpeers.scenarios.results.figure_processes import drawn_on_all_cores, prepare_figures
 from gridpeers.scenarios.results.metrics_file import case_facts
 from gridpeers.scenarios.results.record import Recorded, Recorder, RecordError
 from gridpeers.scenarios.results.recorded_events import ended_by_a_law
@@ -43,7 +42,7 @@ if TYPE_CHECKING:
     from gridpeers.scenarios.live.departures import Departures
     from gridpeers.scenarios.results.report import RunReport
 
-_AFTER_RUN = ("record.record_reader", "measured_run", "results.plots.drawing")
+_AFTER_RUN = ("record.record_reader", "measured_run", "results.plots.run_figures")
 """Modules that are used after a run, and imported while it goes on: this process has little to do then."""
 
 
@@ -135,10 +134,10 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
     if request.lasting:
         from gridpeers.scenarios.results.history import as_they_came
         from gridpeers.scenarios.results.plots.drawing import drawing_of
+        from gridpeers.scenarios.results.plots.run_figures import draw_all
 
         last = recorded[list(recorded)[-1]]  # in real time each case has its own events
-        with drawn_on_all_cores(drawing_of(scenario, cases, as_they_came(scenario, last.events)), folder / "plots"):
-            pass
+        draw_all(drawing_of(scenario, cases, as_they_came(scenario, last.events)), folder / "plots")
     set_complete(folder)
     return report
 
@@ -177,7 +176,6 @@ def run_case(
             nonlocal ahead
             if ahead:  # from the first row on: before, every core is busy with the start
                 ahead = False
-                prepare_figures()
                 for module in _AFTER_RUN:
                     import_module(f"gridpeers.scenarios.{module}")
                 for check in ALWAYS:

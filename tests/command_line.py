@@ -8,7 +8,6 @@ from unittest.mock import patch
 from typer.testing import CliRunner
 
 from gridpeers.cli import root as cli
-from gridpeers.scenarios import run
 
 
 def invoke(*words: str, figures: bool = False) -> tuple[int, str]:
@@ -21,7 +20,7 @@ def invoke(*words: str, figures: bool = False) -> tuple[int, str]:
     figures : bool, optional
         Whether a run draws its figures too.
     """
-    drawn = nullcontext() if figures else patch.object(run, "drawn_on_all_cores", lambda *_: nullcontext())
+    drawn = nullcontext() if figures else patch("gridpeers.scenarios.results.plots.run_figures.draw_all", lambda *_: ())
     with drawn if words[:1] == ("run",) else nullcontext():
         result = CliRunner().invoke(cli.app, list(words), catch_exceptions=False, env={"COLUMNS": "160"})
     return result.exit_code, result.output

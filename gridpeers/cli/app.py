@@ -61,12 +61,9 @@ def _start_ahead(words: list[str]) -> None:
     """
     if words[:1] != ["run"] or len(words) == 1 or not {"-h", "--help"}.isdisjoint(words):
         return
+    if any(word.endswith("inprocess") for word in words):
+        return
     with suppress(OSError):
-        if any(word.endswith("inprocess") for word in words):
-            from gridpeers.scenarios.results.figure_processes import prepare_figures
+        from gridpeers.scenarios.drivers.forking import prepare
 
-            prepare_figures()
-        else:
-            from gridpeers.scenarios.drivers.forking import prepare
-
-            prepare()
+        prepare()

@@ -137,8 +137,6 @@ _OF_PLANTS = (
 )
 """Agents have another server, because they do not load numpy."""
 
-_OF_FIGURES = ("gridpeers.scenarios.results.plots.run_figures", "gridpeers.scenarios.results.figure_processes")
-
 _SET_BY_US = {"ZENOH_RUNTIME", "KMP_DUPLICATE_LIB_OK"}
 """Variables that loading Zenoh, and threadpoolctl, sets here as it does there."""
 
@@ -152,10 +150,6 @@ def agent_server(module: str = "gridpeers.agents", *, start: bool = True) -> For
 
 def plant_server() -> ForkServer | None:
     return _server(_OF_PLANTS, start=True)
-
-
-def figure_server(*, start: bool = True) -> ForkServer | None:
-    return _server(_OF_FIGURES, start=start)
 
 
 def prepare() -> None:

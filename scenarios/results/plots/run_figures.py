@@ -365,10 +365,7 @@ def draw(drawing: Drawing, name: str) -> Figure:
         return drawn(figures[name](), drawing)
 
 
-def draw_all(drawing: Drawing, folder: Path, number: int = 0, of: int = 1) -> tuple[Path, ...]:
-    """Draw every figure of a run into a folder, or one of so many shares of them that take about the same time."""
-    folder.mkdir(parents=True, exist_ok=True)
-    names = [*figures_of(drawing)]
-    names.insert(0, names.pop(names.index("overview")))
-    names.insert(of, "")  # the overview takes as long as two others, so that its share has one less
-    return tuple(file for name in names[number::of] if name for file in save(draw(drawing, name), folder, name))
+def draw_all(drawing: Drawing, folder: Path) -> tuple[Path, ...]:
+    """Draw the figures of a run into a folder, but those of a single measure: the overview has them, or `draw` does."""
+    names = (name for name in figures_of(drawing) if name not in MEASURES)
+    return tuple(file for name in names for file in save(draw(drawing, name), folder, name))

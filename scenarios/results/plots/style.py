@@ -192,6 +192,9 @@ def save(
 ) -> tuple[Path, ...]:
     """Write a figure into a folder, which is made where there is none."""
     folder.mkdir(parents=True, exist_ok=True)
+    if (layout := figure.get_layout_engine()) is not None:
+        layout.execute(figure)  # once, as no file changes it
+        figure.set_layout_engine("none")
     files = []
     for kind in formats:
         unfinished, file = folder / f".{name}.{kind}", folder / f"{name}.{kind}"
