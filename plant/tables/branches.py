@@ -84,14 +84,13 @@ def require_phases(row: CsvRow[Any], bus: Bus, phases: Iterable[str]) -> bool:
     return not missing
 
 
-def require_ground(row: CsvRow[Any], bus: Bus, what: str, floating: Container[str]) -> bool:
-    """Note a problem if something connected to ground is behind a delta winding; return whether it is not."""
+def require_ground(row: CsvRow[Any], bus: Bus, what: str, floating: Container[str]) -> None:
+    """Note a problem if something connected to ground is behind a delta winding."""
     if bus.name in floating:
         row.problem(
             f'bus "{bus.name}" stands behind a delta winding without ground, and {what} needs ground; use delta loads '
             "there, or a Yg-Yg transformer"
         )
-    return bus.name not in floating
 
 
 def read_line_configs(buses: BusTable) -> dict[str, LineConfig] | None:
@@ -180,14 +179,9 @@ def read_regulators(buses: BusTable) -> tuple[Regulator, ...]:
     for row in buses.table("regulators.csv", columns.RegulatorColumns):
         it, name, phases = row.columns, row.columns.regulator, row.columns.phases
         ends = buses.find_ends(row, phases, "regulator")
-        ratio, allowed = 1.0 + it.tap * it.tap_step_pu, columns.RATIO
-        if ratio <= 0.0:
-            row.problem(f"tap and tap_step_pu give a ratio of {ratio:g}; it must be positive")
-        elif not math.isnan(ratio) and not allowed.low <= ratio <= allowed.high:
-            row.problem(
-                f"tap and tap_step_pu give a ratio of {ratio:g}; {allowed.low:g} to {allowed.high:g} makes sense "
-                "(tap is a number of steps, as in 5 or -3, each of 0.00625 pu as a rule)"
-            )
+        ratio = 1.0 + it.tap * it.tap_step_pu
+        if not math.isnan(ratio) and (text := columns.RATIO.objection(ratio)):
+            row.problem(f"tap, tap_step_pu: {text}")
         for phase in [phase for phase in phases if (name, phase) in seen]:
             row.problem(f'regulator "{name}" phase {phase}: given already; give each phase once')
         seen |= {(name, phase) for phase in phases}

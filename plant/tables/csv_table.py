@@ -46,9 +46,10 @@ class CsvRow(Generic[C]):
         return name not in known
 
     def require(self, column: str, plausible: Plausible) -> None:
-        """Note a number that its column allows, but that is not plausible here."""
+        """Note a number that its column allows, but that is not plausible here; NaN has a problem of its own."""
         value = getattr(self.columns, column)
-        if not math.isnan(value) and (text := plausible.objection(value, named(self._table, column).unit)):
+        known = not math.isnan(value + plausible.high)
+        if known and (text := plausible.objection(value, named(self._table, column).unit)):
             self.wrong.add(column)
             self.problem(f"{column}: {text}")
 

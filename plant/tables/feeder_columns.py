@@ -8,7 +8,6 @@ A range is wide: it holds every value that a distribution feeder may have, and n
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, Literal
 
 import msgspec
@@ -22,7 +21,9 @@ SELF_X = Plausible("the reactance of a line", 1e-3, 20.0, above_zero=True)
 SELF_B = Plausible("the susceptance of a line", 0.0, 2000.0)
 MUTUAL = Plausible("a mutual impedance", -10.0, 10.0)
 MUTUAL_B = Plausible("the susceptance of a line", -2000.0, 2000.0)
-RATIO = Plausible("the ratio of a regulator", 0.8, 1.25)
+RATIO = Plausible(
+    "the ratio of a regulator", 0.8, 1.25, hint="; tap is a number of steps, as 5 or -3, each of 0.00625 pu as a rule"
+)
 BRANCH_CURRENT = 2000.0  # largest current of a load or capacitor bank (A per phase): conductors carry less
 PART_CURRENT = 50e3  # the same of a load that another program has: it may stand for a town
 RATED_CURRENT = 5000.0  # largest rated current of an inverter or transformer (A per phase)
@@ -240,8 +241,6 @@ LOAD_SETS: dict[str, type[msgspec.Struct]] = {"loads_": LoadColumns, "load_parts
 
 def power_of(what: str, V_nom: float, current: float, phases: int) -> Plausible:
     """Return the range of a power (kW, kvar, kVA) whose current (A per phase) stays below a bound."""
-    if math.isnan(V_nom):  # the bus has its own problem
-        return Plausible(what, -math.inf, math.inf)
     high = phases * V_nom * current / 1e3
     where = f"{what} {'on a phase of' if phases == 1 else 'at'} {V_nom * 3.0**0.5 / 1e3:.3g} kV"
     return Plausible(where, -high, high)

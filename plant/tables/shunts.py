@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
-import re
 from collections.abc import Container, Mapping
 from math import radians
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from gridpeers.plant.equipment import Bus, Capacitor, InverterRow, Load, Source, Tables
 from gridpeers.plant.equipment.connectivity import buses_without_ground
@@ -99,28 +97,12 @@ def read_capacitors(buses: BusTable) -> tuple[Capacitor, ...]:
         for column in ("Q_a_kvar", "Q_b_kvar", "Q_c_kvar"):
             row.require(column, columns.power_of("a capacitor bank", bus.V_nom, columns.BRANCH_CURRENT, 1))
         require_phases(row, bus, [phase for phase, q in zip("ABC", Q, strict=True) if q])
-        V_rated = it.V_rated_kV_LN * 1000.0
-        if require_ground(row, bus, "a capacitor bank", buses.floating):
-            _require_bank_voltage(row, V_rated, bus)
-        capacitors.append(Capacitor(bus=bus.name, Q=Q, V_rated=V_rated))
+        require_ground(row, bus, "a capacitor bank", buses.floating)
+        kV = bus.V_nom / 1000.0
+        what, hint = f"a capacitor bank at a bus of {kV:.4g} kV", "; both are line-to-neutral"
+        row.require("V_rated_kV_LN", Plausible(what, 0.9 * kV, 1.5 * kV, hint=hint))
+        capacitors.append(Capacitor(bus=bus.name, Q=Q, V_rated=it.V_rated_kV_LN * 1000.0))
     return tuple(capacitors)
-
-
-def _require_bank_voltage(row: CsvRow[Any], V_rated: float, bus: Bus) -> None:
-    """Note a problem if a bank's rated voltage (V) is not near its bus's nominal one, as 4.16 kV L-L is not at 2.40."""
-    nominal, given = bus.V_nom / 1e3, V_rated / 1e3
-
-    def near(factor: float) -> bool:
-        return 0.9 <= given / factor / nominal <= 1.5
-
-    if math.isnan(given / nominal) or near(1.0):
-        return
-    meant = f"; did you mean {given / 3**0.5:g} ({given:g} kV line-to-line)?" if near(3**0.5) else ""
-    meant = f"; did you mean {given / 1e3:g} ({given:g} V)?" if near(1e3) else meant
-    row.problem(
-        f"V_rated_kV_LN: {given:g} kV is not plausible for a capacitor bank at a bus of {nominal:.4g} kV "
-        f"line-to-neutral (0.9 to 1.5 times that){meant}"
-    )
 
 
 class InverterPlaces(NamedTuple):
@@ -199,10 +181,15 @@ def _check_place(row: CsvRow[columns.InverterColumns], bus: Bus | None, neutral:
     """
     it = row.columns
     phases = "" if "phases" in row.wrong else it.phases
-    if bus is not None and not math.isnan(bus.V_nom):
+    if bus is not None:
         row.require("P_rated_kW", _rating(bus, it.phases, places.load / 1e3))
-    if it.name:
-        _require_name(row, it.name)
+    if it.name in TAKEN:
+        row.problem(f'name "{it.name}" is taken: {TAKEN[it.name]}; name the inverter otherwise')
+    elif it.name and it.name.isprintable():
+        try:
+            check_name("name", it.name)
+        except ValueError as error:
+            row.problem(str(error))
     if bus is None:
         return ""
     require_phases(row, bus, phases)
@@ -226,19 +213,6 @@ def _rating(bus: Bus, phases: str, load: float) -> Plausible:
     if 0.0 < high < most.high:
         return Plausible(f"{most.what} beside {load:.4g} kW of load", 1.0, high)
     return Plausible(most.what, 1.0, most.high)
-
-
-def _require_name(row: CsvRow[Any], name: str) -> None:
-    try:
-        check_name("name", name)
-    except ValueError:
-        if name.isprintable():
-            row.problem(
-                f'name "{name}" cannot be part of a Zenoh key; use 1 to 64 letters, digits, "_", "-" or ".", '
-                f'as in "{re.sub(r"[^A-Za-z0-9_.-]", "", name)[:64] or "inv1"}"'
-            )
-    if name in TAKEN:
-        row.problem(f'name "{name}" is taken: {TAKEN[name]}; name the inverter otherwise')
 
 
 def read_source(buses: BusTable) -> Source | None:
