@@ -20,63 +20,61 @@ from time import perf_counter, process_time
 from typing import Any
 from unittest.mock import patch
 
+from msgspec.structs import replace
+
 import bench.harness  # noqa: F401  # one thread, before numpy is imported
-from gridpeers.feeder import Feeder
+import gridpeers as gp
 from gridpeers.plant.build import build_plant
-from gridpeers.plant.equipment.derived_feeders import copy_name, joined_copies
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.results.record import Recorder
-from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.schema.configs import configs
 
-ISLAND, JOINT = 9, "450"
-"""Inverters of the feeder `microgrid123`, and its bus at which copies are joined."""
+ISLAND, SUBSTATION, JOINT = 9, "150", "450"
+"""Inverters of the feeder `microgrid123`, its substation, and its bus at which copies are joined."""
 
-SCENARIO = """\
-name = "scale"
-[plant]
-feeder = "grown"
-[time]
-T_c_s = {T_c}
-end_s = {end}
-[[event]]
-label = "islanding"
-t_s = 1.0
-open = {switches}
-[case.ring]
-secondary = "all"
-graph = "ring"
-"""
+TABLES = ("buses", "lines", "switches", "loads", "capacitors", "regulators", "transformers", "inverters")
+NAMES = ("name", "alias", "microgrid", "zone", "bus", "from_bus", "to_bus")
 
 
-def write_scenario(folder: Path, agents: int, T_c: float, end: float) -> Path:
-    """Write a feeder of joined copies and its scenario; return the scenario's path."""
-    copies = agents // ISLAND
-    joined_copies(Feeder.read("microgrid123"), copies, JOINT).save(folder / "grown")
-    switches = [f"{copy_name('13', k)}-{copy_name('152', k)}" for k in range(1, copies + 1)]
-    path = folder / "scale.toml"
-    path.write_text(SCENARIO.format(T_c=T_c, end=end, switches=json.dumps(switches)), encoding="utf-8")
-    return path
+def of_copy(row: Any, k: int) -> Any:
+    """Return a row of the feeder in copy k, with names of its own; the substation is the same for all."""
+    names = {name: getattr(row, name) for name in NAMES if getattr(row, name, "") not in ("", SUBSTATION)}
+    return replace(row, **{name: f"{text}_{k}" for name, text in names.items()})
+
+
+def joined_copies(feeder: gp.Feeder, copies: int) -> gp.Feeder:
+    """Return copies of a feeder, each joined to the one before by a line between their buses `JOINT`."""
+    tables = {name: [of_copy(row, k) for k in range(1, copies + 1) for row in getattr(feeder, name)] for name in TABLES}
+    tables["buses"] = list({bus.name: bus for bus in tables["buses"]}.values())
+    of_three = next(line for line in tables["lines"] if line.phases == "ABC")
+    for k in range(2, copies + 1):
+        ends = {"from_bus": f"{JOINT}_{k - 1}", "to_bus": f"{JOINT}_{k}"}
+        tables["lines"].append(replace(of_three, name=f"tie_{k}", **ends))
+    return replace(feeder, spares=(), **{name: tuple(rows) for name, rows in tables.items()})
 
 
 def measure(agents: int, T_c: float, end: float) -> dict[str, float]:
     """Return the costs; the plant's code is compiled, or loaded, before anything is timed."""
     with tempfile.TemporaryDirectory() as text:
-        folder = Path(text)
-        path = write_scenario(folder, agents, T_c, end)
+        folder, copies = Path(text), agents // ISLAND
+        feeder = joined_copies(gp.Feeder.read("microgrid123"), copies).save(folder / "grown")
         began = process_time()
-        scenario, feeder = load_scenario(str(path))
+        scenario = gp.Scenario(
+            plant={"feeder": str(feeder)},
+            time={"T_c_s": T_c, "end_s": end},
+            event=[{"label": "islanding", "t_s": 1.0, "open": [f"13_{k}-152_{k}" for k in range(1, copies + 1)]}],
+            case={"ring": {"secondary": "all", "graph": "ring"}},
+        )
         read = process_time() - began
-        plant, configured = configs(scenario, feeder, "ring")
+        plant, configured = configs(scenario.spec, scenario.feeder, "ring")
         built = build_plant(plant)
         timed_run(plant, configured, built, folder / "first")  # the first run of a process is slower
         began = process_time()
         built = build_plant(plant)
         build = process_time() - began
         plant_s, agents_s, clock_s = timed_run(plant, configured, built, folder / "run")
-    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)
     return {
         "read_s": read,
         "build_s": build,
@@ -85,7 +83,7 @@ def measure(agents: int, T_c: float, end: float) -> dict[str, float]:
         "of_real_time": (agents_s + plant_s) / end,
         "by_the_clock": clock_s / end,
         "us_per_message": 1e6 * agents_s / (4 * agents) / (end / T_c),
-        "memory_MB": memory,
+        "memory_MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3,
     }
 
 

@@ -1,20 +1,15 @@
-"""Feeders as equipment: what is connected, copies, and loads by name."""
+"""Feeders as equipment: what is connected, and loads by name."""
 
 from __future__ import annotations
-
-from pathlib import Path
 
 import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from gridpeers.feeder import Feeder
 from gridpeers.plant.equipment import Load
 from gridpeers.plant.equipment.connectivity import Connectivity
-from gridpeers.plant.equipment.derived_feeders import joined_copies
 from gridpeers.plant.equipment.imported_equipment import LoadPart
 from gridpeers.plant.equipment.named_loads import load_name, named_loads, with_powers
-from gridpeers.plant.network import Network, solve_power_flow
 from gridpeers.plant.tables import read_feeder
 from tests.unit.plant.networks import feeder, three_phase_bus
 
@@ -65,35 +60,6 @@ def test_the_tables_are_the_import_of_the_published_feeder_with_our_modification
     ]
     assert sum(part.S for part in kept.load_parts) == pytest.approx(1769e3 + 1044e3j)
     assert {bus.zone for bus in kept.buses} == {"rest", "MG1", "MG2", "MG3"}
-
-
-def test_copies_have_the_voltages_of_the_one(tmp_path: Path) -> None:
-    """With the ties open each copy is the feeder, but for the charging of the tie that hangs on the later ones."""
-    one = Feeder.read("microgrid123")
-    three = Feeder.read(joined_copies(one, 3, "450").save(tmp_path / "three"))
-    network, joined = Network(one), Network(three)
-    V = solve_power_flow(network, network.closed0, tolerance=1e-12).V
-    apart = joined.closed0 - {joined.switch_name(name) for name in ("tie_2", "tie_3")}
-    W = dict(zip(joined.nodes, solve_power_flow(joined, apart, tolerance=1e-12).V, strict=True))
-
-    for k, rtol in (("", 1e-12), ("_2", 3e-6), ("_3", 3e-6)):
-        np.testing.assert_allclose([W[bus + k, phase] for bus, phase in network.nodes], V, rtol=rtol)
-    assert len(three.inverters) == 27
-
-
-@pytest.mark.parametrize(
-    ("copies", "joint", "text"),
-    [
-        (0, "450", "from 1 to 111, .*got 0"),
-        (112, "450", "at most 1000 inverters"),
-        (2, "nope", "needs a bus"),
-        (2, "32", "A, B"),
-    ],
-)
-def test_what_cannot_be_joined_is_told(copies: int, joint: str, text: str) -> None:
-    """Numbers below one and buses without three phases."""
-    with pytest.raises(ValueError, match=text):
-        joined_copies(Feeder.read("microgrid123"), copies, joint)
 
 
 def part(name: str, bus: str, S: complex) -> LoadPart:

@@ -10,7 +10,6 @@ import pytest
 from msgspec.structs import replace
 
 from gridpeers.plant.equipment import Tables
-from gridpeers.plant.equipment.derived_feeders import joined_copies
 from gridpeers.plant.tables import read_feeder
 from gridpeers.scenarios.results.plots.feeder_diagram import feeder_diagram
 from gridpeers.scenarios.results.plots.places import PlacedLabel, label_sides
@@ -46,7 +45,10 @@ def test_a_feeder_without_coordinates_says_that_it_is_a_tree() -> None:
 
 def test_a_legend_of_many_microgrids_leaves_room_for_the_feeder() -> None:
     """Beyond ten zones the legend counts the rest, and says that colours repeat."""
-    said = legend(joined_copies(read_feeder("microgrid123"), 4, "450"))
+    feeder = read_feeder("microgrid123")
+    zones = {load.bus: f"zone {k % 20:02}" for k, load in enumerate(feeder.loads)}
+    buses = tuple(replace(bus, zone=zones.get(bus.name, "zone 00")) for bus in feeder.buses)
+    said = legend(replace(feeder, buses=buses, inverters=(), spares=()))
 
     assert sum(" kW of load" in text for text in said) == 10
     assert "and 10 more zones; the colours repeat" in said
