@@ -15,8 +15,8 @@ from collections.abc import Callable
 from gridpeers.agents.agent import Agent
 from gridpeers.agents.agent_config import AgentConfig, check_nameplate
 from gridpeers.agents.decision_journal import DecisionJournal
+from gridpeers.agents.hearing import Hearing, OpenMeeting
 from gridpeers.agents.laws.law import Law
-from gridpeers.agents.neighbours import Hearing, OpenMeeting
 from gridpeers.agents.roster_meeting import KnownAgents, RosterMeeting
 from gridpeers.agents.tick_barrier import AgentBarrier
 from gridpeers.agents.tick_timer import AgentTimer

@@ -17,7 +17,7 @@ from msgspec.structs import replace
 from gridpeers.agents.agent import Agent
 from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.agents.decision_journal import DecisionJournal
-from gridpeers.agents.neighbours import Hearing
+from gridpeers.agents.hearing import Hearing
 from gridpeers.agents.roster_meeting import RosterMeeting
 from gridpeers.wire.codec import RejectedError, payload_of
 from gridpeers.wire.links import REPORT_TICKS

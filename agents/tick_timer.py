@@ -26,7 +26,7 @@ from msgspec.structs import replace
 from gridpeers.agents.agent import Agent
 from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.agents.decision_journal import DecisionJournal
-from gridpeers.agents.neighbours import Hearing, OpenMeeting
+from gridpeers.agents.hearing import Hearing, OpenMeeting
 from gridpeers.agents.session_health import SessionHealth
 from gridpeers.wire.journal import TimedTraffic
 from gridpeers.wire.links import REPORT_TICKS
