@@ -10,23 +10,24 @@ way or the plant takes its inverter off the network; *over*.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from typing import Protocol
 
 from gridpeers.agents.agent import Agent
 from gridpeers.agents.agent_config import AgentConfig, check_nameplate
+from gridpeers.agents.agent_reports import AgentReports
 from gridpeers.agents.decision_journal import DecisionJournal
 from gridpeers.agents.hearing import Hearing, OpenMeeting
 from gridpeers.agents.laws.law import Law
 from gridpeers.agents.roster_meeting import KnownAgents, RosterMeeting
 from gridpeers.agents.tick_barrier import AgentBarrier
 from gridpeers.agents.tick_timer import AgentTimer
-from gridpeers.agents.upkeep import JOURNAL_PERIOD, Upkeep
 from gridpeers.wire.codec import RejectedError, encode
 from gridpeers.wire.journal import JournalBuffer, TimedTraffic
 from gridpeers.wire.links import Links
-from gridpeers.wire.messages import PLANT, LinkRequest, Measurement, Prepare, State, Stop, Waiting
+from gridpeers.wire.messages import PLANT, Measurement, Prepare, State, Stop, Waiting
 from gridpeers.wire.phases import Phases, PhaseTable
 from gridpeers.wire.post import FollowedPlant, Post, Route
+from gridpeers.wire.tick_policy import TickPolicy, TickVerdict
 
 _ENDS = {"leave": "leaving", "end": "over"}
 
@@ -38,6 +39,69 @@ AGENT_PHASES: PhaseTable = {
     "leaving": {"end": "over"},
     "over": {},
 }
+
+
+class AgentTickPolicy(TickPolicy, Protocol):
+    """What the node asks beside; each kind of time does in its own way what follows from these events."""
+
+    at: float
+    """Time of the last measurement or tick (s of run time)."""
+    plant_seen: bool
+
+    @property
+    def t(self) -> float:
+        """Run time (s) that the agent has come to."""
+
+    @property
+    def awaits_states(self) -> bool:
+        """Whether the next state may make the tick due."""
+
+    @property
+    def meeting(self) -> RosterMeeting | OpenMeeting: ...
+    @property
+    def control_messages(self) -> tuple[type[Prepare | Waiting | Stop], ...]: ...
+
+    @property
+    def publications(self) -> tuple[str, ...]:
+        """Keys beside those of states, journal and report."""
+
+    @property
+    def quiet_key(self) -> str:
+        """Key of a state that the law does not send to the neighbours."""
+
+    def plant_came(self, now: float) -> None: ...
+    def plant_waits(self, message: Waiting | Prepare, now: float) -> None: ...
+
+    def new_plant(self) -> None:
+        """Begin anew with another plant."""
+
+    def new_session(self) -> None: ...
+
+    def changed(self) -> None:
+        """Take the agent's new rule of control."""
+
+    def gone(self, name: str) -> TickVerdict:
+        """Note that a process is gone; of the plant, say what follows."""
+
+    def granted(self, message: Measurement, now: float) -> bool:
+        """Take a measurement off the wire; return whether its tick is due. RejectedError if it is unexpected."""
+
+    def hold(self, why: str) -> None:
+        """Note that the agent has no measurement to go by."""
+
+    def joined(self, measurement: Measurement) -> None:
+        """Note that the agent ticks from this measurement on."""
+
+    def decide(
+        self, agent: Agent, measurement: Measurement | None, decisions: DecisionJournal | None, now: float
+    ) -> State | None:
+        """Compute the tick that is due; None if nothing is to be sent."""
+
+    def ticked(self, now: float) -> bool:
+        """Do what is due after a tick; return whether a new session is needed."""
+
+    def leave(self, now: float) -> bool:
+        """Begin to leave; return whether there is anything to wait for."""
 
 
 class AgentNode:
@@ -59,7 +123,6 @@ class AgentNode:
         check_nameplate(config)
         name, realtime = config.name, config.clock == "wall"
         known = KnownAgents(config.control) if known is None else known
-        own: tuple[Callable[[str], str], ...]
         post = self.post = Post(name, config.run, config.epoch, None if realtime else known.members)
         keys = self.keys = post.keys
         self.admission, self.rejects, self.routes = post.admission, post.rejects, post.routes
@@ -70,56 +133,45 @@ class AgentNode:
         self.siblings: set[str] = set()
         """Agents of the same process, whose messages do not come from outside."""
 
-        self.phases = Phases(AGENT_PHASES)
+        phases = self.phases = Phases(AGENT_PHASES)
         self.stopped = ""
         self.failed = ""
         """Why the agent could not continue, or take part at all; empty otherwise."""
         self.session_broken = False
         self._config, self._instance = config, instance
         self._plant, self._plant_epoch = FollowedPlant(post, self._follow), 0
-        self._agent = Agent(config if realtime else config.by_own_clock(), law)
-        self._agent.rejects = self.rejects
-        self.nameplate = keys.nameplate(name, instance), encode(self._agent.nameplate)
+        agent = self._agent = Agent(config if realtime else config.by_own_clock(), law)
+        agent.rejects = self.rejects
+        self.nameplate = keys.nameplate(name, instance), encode(agent.nameplate)
         """Key of the own queryable, and its answer."""
-        self.heard = Hearing(self._agent, links)
+        heard = self.heard = Hearing(agent, links)
+        reports = self._reports = AgentReports(post, heard, instance, empty=links is not None and not realtime)
         self._reason = ""
         """Why it leaves."""
-        self._ran = self._reported = False
-        self._journal_at = 0.0
         self._timed: TimedTraffic | None = None
         self._decisions: DecisionJournal | None = None
         if config.record != "physics":
             post.journal = JournalBuffer()
-            self._decisions = DecisionJournal(self._agent, post.journal)
+            self._decisions = DecisionJournal(agent, post.journal)
             if realtime:
                 self._timed = post.traffic = TimedTraffic(keys, post.journal, arrivals=config.record == "all")
 
+        self.policy: AgentTickPolicy
+        if realtime:
+            open_meeting = OpenMeeting(post, heard, self._on_state)
+            self.policy = AgentTimer(config, post, phases, heard, open_meeting, reports, self._timed)
+        else:
+            known.add(agent.nameplate)
+            roster = RosterMeeting(post, phases, known, agent, instance)
+            roster.on_state = self._on_state
+            self.policy = AgentBarrier(config, post, phases, heard, roster, reports, self.siblings)
+        post.on_nameplate = self.policy.meeting.on_nameplate
         self.routes[keys.stop_request(name, instance)] = Route(PLANT, (Stop,), self._on_stop)
         self.routes[keys.measurement(name)] = Route(PLANT, (Measurement,), self._on_measurement)
-        self.policy: AgentBarrier | AgentTimer
-        self._meeting: RosterMeeting | OpenMeeting
-        self._prepare: Callable[[Prepare, float], None] | None = None
-        self.upkeep: Upkeep | None = None
-        """What is to be done in real time beside the ticks."""
-        if realtime:
-            self._meeting = meeting = OpenMeeting(post, self._agent, self._on_state)
-            self.policy = timer = AgentTimer(config, post, self.phases, self.heard, meeting, self._timed)
-            self.upkeep = Upkeep(timer, links)
-            self.routes[keys.control] = Route(PLANT, (Waiting, Stop), self._on_control)
-            self.routes[keys.link_request(name)] = Route(PLANT, (LinkRequest,), self.upkeep.on_link_command)
-            own = keys.set_points, keys.leave, keys.status, keys.link_acknowledgement
-        else:
-            known.add(self._agent.nameplate)
-            roster = self._meeting = RosterMeeting(post, self.phases, known, self._agent, instance)
-            roster.on_state, self._prepare = self._on_state, roster.on_prepare
-            self.policy = AgentBarrier(config, post, self.heard, roster, self.siblings)
-            self.routes[keys.control] = Route(PLANT, (Prepare, Waiting, Stop), self._on_control)
-            own = (keys.ready,)
-        post.on_nameplate = self._meeting.on_nameplate
-        self.publications = tuple(key(name) for key in (keys.state, keys.report, keys.journal, *own))
+        self.routes[keys.control] = Route(PLANT, self.policy.control_messages, self._on_control)
         self._first_routes = dict(self.routes)
         self._state_key = keys.state(name)
-        self._quiet_key = keys.set_points(name) if realtime else self._state_key
+        self.publications = self._state_key, keys.report(name), keys.journal(name), *self.policy.publications
 
     # ---------------------------------------------------------------- what the driver needs
 
@@ -142,9 +194,6 @@ class AgentNode:
     def start(self, now: float) -> None:
         """Begin, or begin again after a broken session; there is nothing to do yet."""
         self.policy.start(now)
-        if self.upkeep is None:
-            return
-        self.upkeep.start(now)
         if self._timed is not None:
             self._timed.process("session" if self.session_broken else "start", f"instance {self._instance}", now)
         if not self.session_broken:
@@ -160,7 +209,7 @@ class AgentNode:
         self.routes.update(self._first_routes)
         self._plant.present.clear()
         self.admission.release(PLANT)
-        self.upkeep.new_session()
+        self.policy.new_session()
 
     def work(self, now: float) -> bool:
         return False
@@ -171,8 +220,6 @@ class AgentNode:
                 self.policy.plant_came(now)
                 if self.phases.now == "seeking":
                     self.phases.on("plant appeared")
-                    if self.upkeep is not None:
-                        self.post.say("the plant is there; waits for its measurement")
             case ("alive", "agent", name, instance) if name != self.name:
                 self.post.process_came(name, instance)
 
@@ -185,10 +232,10 @@ class AgentNode:
                 elif verdict.kind == "break":
                     self._end(failed=verdict.reason)
                 else:
-                    self._hold(verdict.reason)
+                    self.policy.hold(verdict.reason)
                     if not self._plant.present and self.phases.allows("plant gone"):
                         self.phases.on("plant gone")
-            case ("alive", "agent", name, instance) if self._meeting.gone(name, instance):
+            case ("alive", "agent", name, instance) if self.policy.meeting.gone(name, instance):
                 self.policy.gone(name)
                 if self.policy.due(now) is not None and not self.finished:
                     self._tick(now)
@@ -201,33 +248,26 @@ class AgentNode:
             self._timed.woken(now)
         verdict = self.policy.passed(now)
         if verdict.kind == "over":
-            self._report_the_last()
+            self._reports.last(self.policy.t)
             self._end(stopped=self._reason)
         elif verdict.kind == "break":
             self._end(failed=verdict.reason)
-        elif verdict.kind == "tick" and self.upkeep is not None:
-            if verdict.reason:
-                self._hold(verdict.reason)
-            shown = self.upkeep.shown
+        elif verdict.kind == "tick":
             self._tick(now)
-            self.session_broken = self.post.closed = self.upkeep.ticked(shown, bool(self._agent.fault), now)
 
     # ---------------------------------------------------------------- messages
 
     def _follow(self, epoch: int) -> None:
         """Begin anew with another plant; one whose token was gone for a while goes on where it was."""
-        if self._plant_epoch not in (0, epoch) and self.upkeep is not None:
-            self._hold("the plant restarted; starts from its measurement")
-            self._ran = False
-            self.upkeep.new_plant()
+        if self._plant_epoch not in (0, epoch):
+            self.policy.hold("the plant restarted; starts from its measurement")
+            self.policy.new_plant()
         self._plant_epoch = epoch
 
     def _on_control(self, message: Prepare | Waiting | Stop, payload: bytes, now: float) -> None:
         if isinstance(message, Stop):
             self._on_stop(message, payload, now)
         else:
-            if isinstance(message, Prepare) and self._prepare is not None:
-                self._prepare(message, now)
             self.policy.plant_waits(message, now)
 
     def _on_stop(self, message: Stop, payload: bytes, now: float) -> None:
@@ -242,16 +282,17 @@ class AgentNode:
         if message.to != self.name:
             raise RejectedError("unexpected", f"the measurement of {message.to}")
         is_due = self.policy.granted(message, now)
-        at = message.t if self.upkeep is None else now * self._config.speed
+        at = self.policy.at
         if self.admission.is_usable(self.heard.links, message, payload, at):
             self.heard.keep(message, at)
         if is_due:
             self._tick(now)
 
     def _on_state(self, state: State, payload: bytes, now: float) -> None:
-        at = state.t if self.upkeep is None else now * self._config.speed
-        if self.policy.counts(state, now) and self.admission.is_usable(self.heard.links, state, payload, at):
-            self.heard.keep(state, at)
+        if self.policy.counts(state, now):
+            at = self.policy.run_time(state.t, now)
+            if self.admission.is_usable(self.heard.links, state, payload, at):
+                self.heard.keep(state, at)
         if self.policy.awaits_states and self.policy.due(now) is not None:
             self._tick(now)
 
@@ -259,52 +300,25 @@ class AgentNode:
 
     def _tick(self, now: float) -> None:
         """Decide the tick that is due and send it; without a measurement the agent is on hold. Leaving, report."""
+        policy, heard = self.policy, self.heard
         if self.phases.now == "leaving":
-            self._report_the_last()
+            self._reports.last(policy.t)
             return
-        post, policy, heard = self.post, self.policy, self.heard
         at = policy.at
         for message in () if heard.links is None else self.admission.arrived(heard.links, at, self.rejects):
             heard.keep(message, at)
-        if PLANT not in self.admission.epochs:
-            return  # the last measurement of a plant that is gone would still look fresh
-        measured = heard.measurement if round(at - heard.measured_at, 9) <= self._config.max_age else None
-        if measured is not None:
-            if self.phases.now == "waiting":
+        if PLANT in self.admission.epochs:  # else the last measurement of a plant that is gone would still look fresh
+            measured = heard.measurement if round(at - heard.measured_at, 9) <= self._config.max_age else None
+            if measured is None:
+                policy.hold("no recent measurement; holds")
+            elif self.phases.now == "waiting":
                 self.phases.on("measured")
-                if self.upkeep is not None:
-                    joins, P_set, V_set = "goes on" if self._ran else "joins", measured.P_set, measured.V_set
-                    post.say(f"{joins} at t = {measured.t:.2f} s, from {P_set:.0f} W and {V_set:.1f} V")
-                self._ran = True
-        elif self.upkeep is not None:
-            self._hold("no recent measurement; holds")
-        elif self.phases.now == "running":
-            self.phases.on("held")
-        state = policy.decide(self._agent, measured, self._decisions, now)
-        if state is None:
-            return
-        journal, linked = post.journal, heard.links is not None
-        # Without links entries are rare, and none may wait: once the plant has the last state, the run is over.
-        due = (policy.reports or now - self._journal_at >= JOURNAL_PERIOD) if linked else journal
-        if due and journal is not None and self.upkeep is None:
-            self._journal_at = now
-            post.send(self.keys.journal(self.name), *post.take_journal(at, empty=linked))
-        post.publish(self._quiet_key if state.quiet else self._state_key, encode(state))
-        if policy.reports:
-            post.send(self.keys.report(self.name), *post.take_link_reports(heard.links, instance=self._instance))
-        if isinstance(policy, AgentBarrier):
-            for early, payload in policy.take_early():
-                if self.admission.is_usable(heard.links, early, payload, early.t):
-                    heard.keep(early, early.t)
-
-    def _hold(self, why: str) -> None:
-        """Drop in real time what was heard; the next measurement shows the set-points to start from."""
-        if self.phases.now == "running":
-            self.phases.on("held")
-            self.post.say(why)
-        if self.upkeep is not None:
-            self.upkeep.hold()
-        self._agent.restart()
+                policy.joined(measured)
+            state = policy.decide(self._agent, measured, self._decisions, now)
+            if state is not None:
+                self.post.publish(policy.quiet_key if state.quiet else self._state_key, encode(state))
+        if policy.ticked(now):
+            self.session_broken = self.post.closed = True
 
     # ---------------------------------------------------------------- the end
 
@@ -324,25 +338,10 @@ class AgentNode:
             return
         self._reason = reason
         self.phases.on("leave")
-        waits = self.heard.links is not None
-        if self.upkeep is not None:
-            self._report_the_last()
-            self.upkeep.leave()
-            waits = bool(self._plant.present)
-        if not waits:
+        if not self.policy.leave(now):
             self._end(stopped=reason)
-            return
-        self.policy.leave(now)
-        if self.policy.due(now) is not None:
+        elif self.policy.due(now) is not None:
             self._tick(now)
-
-    def _report_the_last(self) -> None:
-        post, links = self.post, self.heard.links
-        if not self._reported:
-            self._reported = True
-            empty = links is not None and self.upkeep is None
-            post.send(self.keys.journal(self.name), *post.take_journal(self.policy.t, empty=empty))
-            post.send(self.keys.report(self.name), *post.take_link_reports(links, instance=self._instance, last=True))
 
     def _end(self, *, stopped: str = "", failed: str = "") -> None:
         if not self.finished:
@@ -353,8 +352,7 @@ class AgentNode:
     def change(self, config: AgentConfig, law: Law | None = None) -> None:
         """Go on under another rule of control, in a replay that asks what would have been; see `Agent.taken_over`."""
         self._config, self._agent = config, self._agent.taken_over(config, law)
-        self._agent.rejects = self.rejects
+        self._agent.rejects, self.heard.agent = self.rejects, self._agent
         if self._decisions is not None:
             self._decisions = DecisionJournal(self._agent, self._decisions.journal)
-        if self.upkeep is not None:
-            self.upkeep.change(config, self._agent)
+        self.policy.changed()

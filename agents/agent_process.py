@@ -146,9 +146,8 @@ def take_part(core: AgentNode | NodeGroup, nodes: Sequence[AgentNode], session: 
     try:
         drive(core, session, log)
     except (StoppedError, KeyboardInterrupt) as stop:
-        leaving = [node for node in nodes if node.upkeep is not None]
-        for node in leaving:
-            node.leave(f"asked to leave: {stop}")
-        if leaving:
+        if not nodes[0].policy.grants:
+            for node in nodes:
+                node.leave(f"asked to leave: {stop}")
             serve(core, session, log)  # until the plant has acknowledged
         raise

@@ -55,34 +55,34 @@ class Hearing:
 class OpenMeeting:
     """The agents of a run without a roster: each that has a token and answers takes part. States go to `on_state`."""
 
-    def __init__(self, post: Post, agent: Agent, on_state: Handler) -> None:
-        self._post, self.agent, self._on_state = post, agent, on_state
+    def __init__(self, post: Post, heard: Hearing, on_state: Handler) -> None:
+        self._post, self._heard, self._on_state = post, heard, on_state
         self.neighbours: tuple[str, ...] = ()
         """In-neighbours by the run's graph among the agents that are met."""
 
     def on_nameplate(self, instance: str, nameplate: Nameplate, first: bool, now: float) -> None:
         if first:
-            self.agent.meet(nameplate)
+            self._heard.agent.meet(nameplate)
             self.listen()
 
     def gone(self, name: str, instance: str) -> bool:
         """Note that a process is gone; return whether it counted."""
         if not self._post.process_gone(name, instance):
             return False
-        self.agent.forget(name)
+        self._heard.agent.forget(name)
         if (nameplate := self._post.members.nameplates.get(name)) is not None:  # another process counts from now on
-            self.agent.meet(nameplate)
+            self._heard.agent.meet(nameplate)
         self.listen()
         return True
 
     def listen(self) -> None:
         post = self._post
-        self.neighbours = self.agent.in_neighbours((post.name, *sorted(post.members.nameplates)))
+        self.neighbours = self._heard.agent.in_neighbours((post.name, *sorted(post.members.nameplates)))
         for name in self.neighbours:
             post.listen(post.keys.state(name), Route(name, (State,), self._on_state))
 
     def clear(self) -> None:
         for name in self._post.members.nameplates:
-            self.agent.forget(name)
+            self._heard.agent.forget(name)
         self._post.members.clear()
         self.neighbours = ()

@@ -16,12 +16,14 @@ from msgspec.structs import replace
 
 from gridpeers.agents.agent import Agent
 from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.agents.agent_reports import JOURNAL_PERIOD, AgentReports
 from gridpeers.agents.decision_journal import DecisionJournal
 from gridpeers.agents.hearing import Hearing
 from gridpeers.agents.roster_meeting import RosterMeeting
 from gridpeers.wire.codec import RejectedError, payload_of
 from gridpeers.wire.links import REPORT_TICKS
-from gridpeers.wire.messages import PLANT, Measurement, Prepare, Ready, State, Waiting
+from gridpeers.wire.messages import PLANT, Measurement, Prepare, Ready, State, Stop, Waiting
+from gridpeers.wire.phases import Phases
 from gridpeers.wire.post import Post
 from gridpeers.wire.tick_policy import WAIT, TickVerdict
 from gridpeers.wire.timing import Awaited, TickBarrier, time_of
@@ -36,20 +38,32 @@ DEADLINES = 2.0
 class AgentBarrier:
     """A tick policy (`gridpeers.wire.tick_policy`): a barrier before each tick."""
 
+    grants = True
+    control_messages = Prepare, Waiting, Stop
+
     def __init__(
-        self, config: AgentConfig, post: Post, heard: Hearing, meeting: RosterMeeting, siblings: set[str]
+        self,
+        config: AgentConfig,
+        post: Post,
+        phases: Phases,
+        heard: Hearing,
+        meeting: RosterMeeting,
+        reports: AgentReports,
+        siblings: set[str],
     ) -> None:
         self._T_c, self._plant_wait = config.T_c, config.plant_wait
-        self._post, self._heard, self._meeting = post, heard, meeting
+        self._post, self._phases, self._heard, self.meeting, self._reports = post, phases, heard, meeting, reports
         meeting.on_ready = self._on_ready
+        self.publications = (post.keys.ready(post.name),)
+        self.quiet_key = post.keys.state(post.name)
         self._waits = TickBarrier(config.name, DEADLINES * config.deadline)
         self._waits.last_heard, self._waits.siblings = post.last_heard, siblings
         self.at = 0.0
         """Time t_k of the tick that is due (s of run time)."""
         self.awaits_states = False
         """Whether the next state may make the tick due: its measurement is here, or the agent leaves."""
-        self.reports = False
-        """Whether the tick just decided is one after which the links' accounts are due."""
+        self._journal_at = 0.0
+        self._accounts_due = False
         self.plant_seen = self._leaving = False
         self._tick: int | None = None
         """The next tick; None before the first measurement."""
@@ -85,7 +99,18 @@ class AgentBarrier:
         self._waits.rest()
 
     def plant_waits(self, message: Waiting | Prepare, now: float) -> None:
+        if isinstance(message, Prepare):
+            self.meeting.on_prepare(message, now)
         self._waits.renew(now)
+
+    def new_plant(self) -> None:
+        """Do nothing: a run ends with its plant."""
+
+    def new_session(self) -> None:
+        """Do nothing: a run ends with a session."""
+
+    def changed(self) -> None:
+        """Do nothing: neighbours change with the roster."""
 
     def gone(self, name: str) -> TickVerdict:
         """Note that a process is gone: nothing of it is waited for."""
@@ -95,9 +120,23 @@ class AgentBarrier:
         self._waits.awaited.pop(name, None)
         return WAIT
 
-    def leave(self, now: float) -> None:
+    def hold(self, why: str) -> None:
+        if self._phases.now == "running":
+            self._phases.on("held")
+
+    def joined(self, measurement: Measurement) -> None:
+        """Do nothing: the plant says who is on the roster."""
+
+    def leave(self, now: float) -> bool:
+        """Return whether there is something to wait for: an account of links needs the neighbours' last states."""
+        if self._heard.links is None:
+            return False
         self._leaving = self.awaits_states = True
         self._waits.deadline = now + CLOSING
+        return True
+
+    def run_time(self, t: float, now: float) -> float:
+        return t
 
     def due(self, now: float) -> int | None:
         """Return the tick to do now; the next one also if the agent leaves and has the neighbours' last states."""
@@ -107,7 +146,7 @@ class AgentBarrier:
 
     def granted(self, message: Measurement, now: float) -> bool:
         """Take a measurement as the grant of its tick, return whether it is due; RejectedError if not the next."""
-        if not self._meeting.ready:
+        if not self.meeting.ready:
             raise RejectedError("unexpected", "no roster has this process on it")
         if self._tick is None:
             if abs(message.t - time_of(message.seq, self._T_c)) > self._T_c / 2:
@@ -119,8 +158,8 @@ class AgentBarrier:
             raise RejectedError(kind, f"tick {message.seq}, but {self._tick} is next")
         self._grant, self.at, self.awaits_states, waits = message, message.t, True, self._waits
         waits.awaited.pop(PLANT, None)
-        if self._neighbours_of is not self._meeting.processes:
-            for name in set(self._neighbours).difference(self._meeting.processes):
+        if self._neighbours_of is not self.meeting.processes:
+            for name in set(self._neighbours).difference(self.meeting.processes):
                 waits.awaited.pop(name, None)
         waits.deadline = now + waits.timeout
         return self.due(now) is not None if self._leaving else not waits.awaited
@@ -139,7 +178,7 @@ class AgentBarrier:
         return not state.quiet  # no link carries what its law did not send
 
     def missing(self) -> tuple[Awaited, ...]:
-        meeting = self._meeting
+        meeting = self.meeting
         if not self.plant_seen:
             return (Awaited("sign of life", PLANT),)
         if meeting.roster is None:
@@ -166,19 +205,24 @@ class AgentBarrier:
             state = agent.idle_state(grant)
         else:
             neighbours, seq = self._neighbours, measurement.seq
-            if self._neighbours_of is not self._meeting.processes:
-                neighbours = tuple(name for name in neighbours if name in self._meeting.processes)
+            if self._neighbours_of is not self.meeting.processes:
+                neighbours = tuple(name for name in neighbours if name in self.meeting.processes)
             if measurement is not grant:  # it was long on an emulated link
                 measurement = replace(measurement, seq=grant.seq, t=grant.t)
             state = agent.tick(measurement, neighbours)
             if decisions is not None:
                 decisions.tick(grant.seq, grant.seq - seq, neighbours)
-        self.reports = (grant.seq + 1) % REPORT_TICKS == 0
+        self._accounts_due = (grant.seq + 1) % REPORT_TICKS == 0
+        # Without links entries are rare, and none may wait: once the plant has the last state, the run is over.
+        journal, period_over = self._post.journal, self._accounts_due or now - self._journal_at >= JOURNAL_PERIOD
+        if journal is not None and (journal if links is None else period_over):
+            self._journal_at = now
+            self._reports.journal(grant.t)
         # The next tick needs the states of this one.
         changes = self._post.members.changes
-        if self._present[0] != changes or self._neighbours_of is not self._meeting.processes:
-            self._neighbours_of, self._neighbours = self._meeting.processes, self._meeting.neighbours
-            self._present = changes, self._meeting.present()
+        if self._present[0] != changes or self._neighbours_of is not self.meeting.processes:
+            self._neighbours_of, self._neighbours = self.meeting.processes, self.meeting.neighbours
+            self._present = changes, self.meeting.present()
         self._grant, self._tick, self.awaits_states, waits = None, grant.seq + 1, self._leaving, self._waits
         waits.awaited = {PLANT: f"Measurement({self._tick})"} | dict.fromkeys(self._present[1], f"State({grant.seq})")
         waits.deadline = now + waits.timeout
@@ -186,10 +230,16 @@ class AgentBarrier:
             waits.awaited.pop(name, None)
         return state
 
-    def take_early(self) -> list[tuple[State, bytes]]:
-        """Take out the states of the tick just done that came before it, which the next tick needs."""
+    def ticked(self, now: float) -> bool:
+        """Report on links when that is due, and take the states of this tick that came before it was done."""
+        heard, links = self._heard, self._heard.links
+        if self._accounts_due:
+            self._reports.links()
         early, self._early = self._early, {}
-        return [(state, payload) for state, payload in early.values() if not state.quiet]
+        for state, payload in early.values():
+            if not state.quiet and self._post.admission.is_usable(links, state, payload, state.t):
+                heard.keep(state, state.t)
+        return False
 
     def _on_ready(self, number: int, now: float) -> None:
         """Tell the plant that this agent is ready for a roster, by its number, and wait for the next measurement."""

@@ -25,12 +25,13 @@ from msgspec.structs import replace
 
 from gridpeers.agents.agent import Agent
 from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.agents.agent_reports import AgentReports
 from gridpeers.agents.decision_journal import DecisionJournal
 from gridpeers.agents.hearing import Hearing, OpenMeeting
-from gridpeers.agents.session_health import SessionHealth
+from gridpeers.agents.upkeep import Upkeep
 from gridpeers.wire.journal import TimedTraffic
 from gridpeers.wire.links import REPORT_TICKS
-from gridpeers.wire.messages import PLANT, Measurement, Prepare, State, Waiting
+from gridpeers.wire.messages import PLANT, Leave, Measurement, Prepare, State, Stop, Waiting
 from gridpeers.wire.node import CLOCK_ALONE
 from gridpeers.wire.phases import Phases
 from gridpeers.wire.post import Post
@@ -84,7 +85,8 @@ take what was sent last with it."""
 class AgentTimer:
     """A tick policy (`gridpeers.wire.tick_policy`): a timer of the agent's own."""
 
-    messages_needed, awaits_states = CLOCK_ALONE, False
+    grants, awaits_states, messages_needed = False, False, CLOCK_ALONE
+    control_messages = Waiting, Stop
 
     def __init__(
         self,
@@ -93,37 +95,27 @@ class AgentTimer:
         phases: Phases,
         heard: Hearing,
         meeting: OpenMeeting,
+        reports: AgentReports,
         timed: TimedTraffic | None,
     ) -> None:
         if config.speed <= 0.0:
             raise ValueError(f"speed: must be positive, got {config.speed:g} s/s; 1 is real time")
-        self.config, self.post, self.phases, self.heard = config, post, phases, heard
-        self.meeting, self.health, self._timed = meeting, SessionHealth(config.name), timed
+        self._config, self._post, self._phases, self._heard = config, post, phases, heard
+        self.meeting, self._reports, self._timed = meeting, reports, timed
+        self.upkeep = Upkeep(config.run, post, phases, heard, meeting, reports)
+        keys, name = post.keys, post.name
+        self.publications = keys.set_points(name), keys.leave(name), keys.status(name), keys.link_acknowledgement(name)
+        self.quiet_key = keys.set_points(name)
         # a clock that is to drift must drift
         self._ticks = TickTimer(config.T_c / config.speed / config.clock_rate, keeps_clear=config.clock_rate == 1.0)
         self._report_ticks = REPORT_TICKS if timed is None else max(1, round(LINKS_PERIOD / self._ticks.period))
-        self.ticks = self.missed = self.sent = 0
-        """Ticks done and left out; states sent, which is the number of the next."""
-        self.lost = 0
-        """Messages that did not come off the wire, as the numbers of those that did show."""
-        self.lateness = 0.0
-        """Longest delay of a tick behind its time since the last status (s of wall time)."""
         self.at = 0.0
-        """Time of the last tick on the own clock (s of run time)."""
+        """Time of the last measurement or tick on the own clock (s of run time)."""
         self._give_up: float | None = None
         self.plant_seen = self._leaving = False
+        self._accounts_due = self._ran = False
         self._left = self._skipped = 0
-        self.forget()
-
-    def forget(self) -> None:
-        """Begin anew, with another session."""
-        self.run_time = 0.0
-        """Run time of the last measurement that came off the wire (s)."""
-        self.missing_agents: tuple[str, ...] = ()
-        """Agents for which the plant waits."""
-        self.used: tuple[str, ...] = ()
-        """Neighbours whose states entered the last tick."""
-        self.reports = False
+        self._shown = self.upkeep.shown
 
     @property
     def deadline(self) -> float:
@@ -132,50 +124,90 @@ class AgentTimer:
     @property
     def t(self) -> float:
         """Run time (s) of the own measurement."""
-        return self.heard.t
+        return self._heard.t
 
     def start(self, now: float) -> None:
         self._ticks.start(now)
-        if self.config.deadline > 0.0 and not self.plant_seen:
-            self._give_up = now + self.config.deadline
+        self.upkeep.start(now)
+        if self._config.deadline > 0.0 and not self.plant_seen:
+            self._give_up = now + self._config.deadline
 
     def plant_came(self, now: float) -> None:
+        if self._phases.now == "seeking":
+            self._post.say("the plant is there; waits for its measurement")
         self.plant_seen, self._give_up = True, None
-        self.health.plant_seen(now)
+        self.upkeep.health.plant_seen(now)
 
     def plant_waits(self, message: Waiting | Prepare, now: float) -> None:
-        self.health.plant_seen(now)
+        self.upkeep.health.plant_seen(now)
         if isinstance(message, Waiting):
-            self.missing_agents = message.waits_for
+            self.upkeep.missing_agents = message.waits_for
+
+    def new_plant(self) -> None:
+        self._ran = False
+        self.upkeep.new_plant()
+
+    def new_session(self) -> None:
+        """Forget all that came by the old session."""
+        self.meeting.clear()
+        self._heard.clear()
+        self.upkeep.new_session()
+
+    def changed(self) -> None:
+        self.meeting.listen()
 
     def gone(self, name: str) -> TickVerdict:
         """Note that a process is gone."""
         if name == PLANT:
             return TickVerdict("wait", "the plant is gone; holds, and seeks it again")
-        self.heard.states.pop(name, None)
-        self.health.forget(name)
+        self._heard.states.pop(name, None)
+        self.upkeep.health.forget(name)
         return WAIT
 
-    def leave(self, now: float) -> None:
-        self._leaving = True
+    def hold(self, why: str) -> None:
+        """Drop what was heard; the next measurement shows the set-points to start from."""
+        if self._phases.now == "running":
+            self._phases.on("held")
+            self._post.say(why)
+        self.upkeep.used = ()
+        self._heard.clear()
+        self._heard.agent.restart()
+
+    def joined(self, measurement: Measurement) -> None:
+        joins, P_set, V_set = "goes on" if self._ran else "joins", measurement.P_set, measurement.V_set
+        self._post.say(f"{joins} at t = {measurement.t:.2f} s, from {P_set:.0f} W and {V_set:.1f} V")
+        self._ran = True
+
+    def leave(self, now: float) -> bool:
+        """Say so; return whether there is a plant, which takes the inverter off the network."""
+        post, self._leaving = self._post, True
+        self._reports.last(self.t)
+        post.send(post.keys.leave(post.name), Leave(sender=post.name, epoch=post.epoch, seq=self.upkeep.sent, t=self.t))
+        return post.plant is not None and bool(post.plant.present)
+
+    def run_time(self, t: float, now: float) -> float:
+        """Return the time on the own clock (s of run time)."""
+        return now * self._config.speed
 
     def due(self, now: float) -> None:
         """No message makes a tick due."""
 
     def granted(self, message: Measurement, now: float) -> bool:
         """Note a measurement off the wire, for the next tick; RejectedError if a later one has come."""
-        self.lost += self.post.admission.take(message)
-        self.health.came(PLANT, now)
+        upkeep = self.upkeep
+        upkeep.lost += self._post.admission.take(message)
+        upkeep.health.came(PLANT, now)
         self._ticks.measured(now)
-        self.run_time, self.missing_agents = message.t, ()
+        self.at, upkeep.run_time, upkeep.missing_agents = self.run_time(message.t, now), message.t, ()
         return False
 
     def counts(self, state: State, now: float) -> bool:
         """Whether a state off the wire enters a tick; RejectedError if a later one has come."""
-        self.lost += max(0, self.post.admission.take(state) - state.skipped)
-        self.health.came(state.sender, now)
+        health = self.upkeep.health
+        self.upkeep.lost += max(0, self._post.admission.take(state) - state.skipped)
+        health.came(state.sender, now)
         # The plant sends its commands to links before a measurement: till then no link is known.
-        return self.heard.links is None or self.health.has_come(PLANT)
+        return self._heard.links is None or health.has_come(PLANT)
 
     def missing(self) -> tuple[Awaited, ...]:
         """Nothing: a tick does without what has not come."""
@@ -184,44 +216,50 @@ class AgentTimer:
     def passed(self, now: float, unmet: tuple[Awaited, ...] = ()) -> TickVerdict:
         late = now - self._ticks.due
         skipped = self._ticks.take(now)
-        self.at = now * self.config.speed
+        self.at = now * self._config.speed
         if self._leaving:
             self._left += 1
             return TickVerdict("over") if self._left * self._ticks.period >= LEAVING else WAIT
-        config = self.config
+        config = self._config
         if self._give_up is not None and now >= self._give_up:
             return TickVerdict("break", f"{config.name}: no plant of run {config.run} within {config.deadline:g} s")
-        if self.phases.now != "running":
-            return TickVerdict("tick")
-        self.missed += skipped
-        self.lateness = max(self.lateness, late)
-        too_late = late * config.speed > config.max_age
-        return TickVerdict("tick", f"woken {late:.2f} s late; waits for news" if too_late else "")
+        if self._phases.now == "running":
+            self.upkeep.missed += skipped
+            self.upkeep.lateness = max(self.upkeep.lateness, late)
+            if late * config.speed > config.max_age:
+                self.hold(f"woken {late:.2f} s late; waits for news")
+        self._shown = self.upkeep.shown
+        return TickVerdict("tick")
 
     def decide(
         self, agent: Agent, measurement: Measurement | None, decisions: DecisionJournal | None, now: float
     ) -> State | None:
         """Compute a tick with the states that are not too old; None without a measurement, or if the law has failed."""
-        self.reports = False
         if measurement is None or agent.fault:
             return None
-        heard, neighbours = self.heard, self.meeting.neighbours
-        at = self.at
-        limit = self.config.control.degraded_communication.max_age or self.config.max_age
+        heard, neighbours, upkeep, at = self._heard, self.meeting.neighbours, self.upkeep, self.at
+        limit = agent.config.control.degraded_communication.max_age or self._config.max_age
         ages = {name: age for name in neighbours if (age := heard.age(name, at)) <= limit}
         before = agent.set_points
-        state = replace(agent.tick(measurement, tuple(ages), ages), seq=self.sent)
+        state = replace(agent.tick(measurement, tuple(ages), ages), seq=upkeep.sent)
         if decisions is not None and self._timed is not None:
             all_ages = {name: heard.age(name, at) for name in neighbours}
             decisions.realtime_tick(state.seq, measurement.seq, all_ages, limit, self._timed.now, before)
-        self.used = tuple(name for name in ages if agent.shares_island(name))
-        self.ticks += 1
-        self.sent += 1
-        self.reports = self.ticks % self._report_ticks == 0
+        upkeep.used = tuple(name for name in ages if agent.shares_island(name))
+        upkeep.ticks += 1
+        upkeep.sent += 1
+        self._accounts_due = upkeep.ticks % self._report_ticks == 0
         if state.fault:
-            self.post.say(f"{state.fault}; idle, its inverter stays on primary droop")
+            self._post.say(f"{state.fault}; idle, its inverter stays on primary droop")
         if state.quiet:
             self._skipped += 1
         elif self._skipped:
             state, self._skipped = replace(state, skipped=self._skipped), 0
         return state
+
+    def ticked(self, now: float) -> bool:
+        """Report what is due; return whether a new session is needed."""
+        if self._accounts_due:
+            self._accounts_due = False
+            self._reports.links()
+        return self.upkeep.ticked(self._shown, self.at, now)

@@ -5,19 +5,18 @@ from __future__ import annotations
 from math import inf
 from typing import Literal, cast
 
-from gridpeers.agents.agent import Agent
-from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.agents.tick_timer import AgentTimer
+from gridpeers.agents.agent_reports import JOURNAL_PERIOD, AgentReports
+from gridpeers.agents.hearing import Hearing, OpenMeeting
+from gridpeers.agents.session_health import SessionHealth
 from gridpeers.wire.links import Links
-from gridpeers.wire.messages import MOST_COUNT, PLANT, AgentStatus, Leave, LinkAcknowledgement, LinkRequest
+from gridpeers.wire.messages import MOST_COUNT, PLANT, AgentStatus, LinkAcknowledgement, LinkRequest
+from gridpeers.wire.phases import Phases
+from gridpeers.wire.post import Post, Route
 from gridpeers.wire.timing import Timer
 from gridpeers.wire.wording import printable
 
 STATUS_PERIOD = 0.5
 """Time (s, wall) between two `AgentStatus`; one more goes out whenever the phase or the neighbours in use change."""
-
-JOURNAL_PERIOD = 0.2
-"""Time (s) between two parts of the journal, in simulated time only with emulated links: a kill loses no more."""
 
 
 class LinkCommandReceiver:
@@ -63,59 +62,64 @@ class LinkCommandReceiver:
 
 
 class Upkeep:
-    def __init__(self, timer: AgentTimer, links: Links | None) -> None:
-        self._timer, self._health, self._heard, self._meeting = timer, timer.health, timer.heard, timer.meeting
-        post = self._post = timer.post
-        self._link_commands = LinkCommandReceiver(post.name, post.epoch, links)
+    """What the status of an agent in real time shows, and the health of its session."""
+
+    def __init__(
+        self, run: str, post: Post, phases: Phases, heard: Hearing, meeting: OpenMeeting, reports: AgentReports
+    ) -> None:
+        self._run, self._post, self._phases, self._heard = run, post, phases, heard
+        self._meeting, self._reports = meeting, reports
+        self.health = SessionHealth(post.name)
+        self._link_commands = LinkCommandReceiver(post.name, post.epoch, heard.links)
+        post.routes[post.keys.link_request(post.name)] = Route(PLANT, (LinkRequest,), self.on_link_command)
+        self.ticks = self.missed = self.sent = 0
+        """Ticks done and left out; states sent, which is the number of the next."""
+        self.lost = 0
+        """Messages that did not come off the wire, as the numbers of those that did show."""
+        self.lateness = 0.0
+        """Longest delay of a tick behind its time since the last status (s of wall time)."""
         self.start(0.0)
+        self._forget()
+
+    def _forget(self) -> None:
+        self.run_time = 0.0
+        """Run time of the last measurement that came off the wire (s)."""
+        self.missing_agents: tuple[str, ...] = ()
+        """Agents for which the plant waits."""
+        self.used: tuple[str, ...] = ()
+        """Neighbours whose states entered the last tick."""
 
     def start(self, now: float) -> None:
         self._status, self._journal = Timer(STATUS_PERIOD, now), Timer(JOURNAL_PERIOD, now)
 
     def new_session(self) -> None:
-        """Forget all that came by the old session."""
-        self._health.next_session()
-        self._meeting.clear()
-        self._heard.clear()
-        self._timer.forget()
-
-    def hold(self) -> None:
-        self._timer.used = ()
-        self._heard.clear()
-
-    def leave(self) -> None:
-        post = self._post
-        leave = Leave(sender=post.name, epoch=post.epoch, seq=self._timer.sent, t=self._heard.t)
-        post.send(post.keys.leave(post.name), leave)
-
-    def change(self, config: AgentConfig, agent: Agent) -> None:
-        self._timer.config, self._heard.agent, self._meeting.agent = config, agent, agent
-        self._meeting.listen()
+        self.health.next_session()
+        self._forget()
 
     def new_plant(self) -> None:
         self._link_commands.restart()
-        self._health.forget(PLANT)
+        self.health.forget(PLANT)
 
     def on_link_command(self, request: LinkRequest, payload: bytes, now: float) -> None:
-        answer = self._link_commands.take(request, self._timer.run_time)
+        answer = self._link_commands.take(request, self.run_time)
         if answer is not None:
             self._post.send(self._post.keys.link_acknowledgement(self._post.name), answer)
 
     @property
     def shown(self) -> tuple[str, tuple[str, ...]]:
         """The part of the status whose change is reported at once."""
-        return self._timer.phases.now, self._timer.used
+        return self._phases.now, self.used
 
-    def ticked(self, shown: tuple[str, tuple[str, ...]], failed: bool, now: float) -> bool:
+    def ticked(self, shown: tuple[str, tuple[str, ...]], at: float, now: float) -> bool:
         """Do what is due after a tick; return whether a new session is needed.
 
-        `shown` is the part of the status before the tick; `failed` says whether the agent's law has failed.
+        `shown` is the part of the status before the tick; `at` its time on the own clock (s of run time).
         """
-        post, running = self._post, self._timer.phases.now == "running"
-        if now >= self._journal.due and running:  # then the plant knows this process
+        post = self._post
+        if now >= self._journal.due and self._phases.now == "running":  # then the plant knows this process
             self._journal.take(now)
-            post.send(post.keys.journal(post.name), *post.take_journal(self._heard.t))
-        problem = self._session_problem(failed, now)
+            self._reports.journal(self._heard.t)
+        problem = self._session_problem(now)
         if problem:
             post.say(f"{problem}; opens a new session")
         due = now >= self._status.due
@@ -123,48 +127,47 @@ class Upkeep:
             self._status.take(now)
             post.ask_again()
         if due or self.shown != shown:
-            self._publish_status()
+            self._publish_status(at)
         return bool(problem)
 
-    def _session_problem(self, failed: bool, now: float) -> str:
+    def _session_problem(self, now: float) -> str:
         """Return why a new session is needed, "" if it is not: this one did not bring, or take, what it should."""
-        measured = self._heard.measurement if self._timer.phases.now == "running" else None
+        measured = self._heard.measurement if self._phases.now == "running" else None
         roster = None if measured is None else measured.roster
-        if roster is not None and failed:
+        if roster is not None and self._heard.agent.fault:
             roster = (*roster, self._post.name)  # who says nothing is not heard, and no session changes that
         met = self._post.members.nameplates
-        return self._health.problem(roster, met=met, neighbours=self._meeting.neighbours, now=now)
+        return self.health.problem(roster, met=met, neighbours=self._meeting.neighbours, now=now)
 
-    def _publish_status(self) -> None:
-        post, timer, heard, neighbours = self._post, self._timer, self._heard, self._meeting.neighbours
-        phase, run = timer.phases.now, timer.config.run
-        missing = f", which waits for {', '.join(timer.missing_agents)}" if timer.missing_agents else ""
+    def _publish_status(self, at: float) -> None:
+        post, phase, heard, neighbours = self._post, self._phases.now, self._heard, self._meeting.neighbours
+        missing = f", which waits for {', '.join(self.missing_agents)}" if self.missing_agents else ""
         waits_for = {
-            "seeking": f"the plant of run {run}",
+            "seeking": f"the plant of run {self._run}",
             "waiting": f"a measurement of {post.name} from the plant{missing}",
         }
         links = heard.links
         dropped = 0 if links is None else links.dropped
-        ages = [heard.age(name, timer.at) for name in neighbours]
+        ages = [heard.age(name, at) for name in neighbours]
         status = AgentStatus(
             sender=post.name,
             epoch=post.epoch,
-            seq=timer.sent,
+            seq=self.sent,
             t=heard.t,
             phase=cast(Literal["seeking", "waiting", "running"], phase),
             waits_for=printable(waits_for.get(phase, "")),
             island="" if heard.measurement is None else heard.measurement.island,
             neighbours=neighbours,
             ages=tuple(age if age < inf else -1.0 for age in ages),
-            used=timer.used,
+            used=self.used,
             received=post.used,
-            sent=timer.sent,
+            sent=self.sent,
             rejected=sum(post.rejects.counts.values()),
-            lost=min(timer.lost + dropped, MOST_COUNT),
-            ticks=timer.ticks,
-            missed=timer.missed,
-            lateness=timer.lateness,
-            impaired=() if links is None else links.impaired(timer.run_time),
+            lost=min(self.lost + dropped, MOST_COUNT),
+            ticks=self.ticks,
+            missed=self.missed,
+            lateness=self.lateness,
+            impaired=() if links is None else links.impaired(self.run_time),
         )
-        timer.lateness = 0.0
+        self.lateness = 0.0
         post.send(post.keys.status(post.name), status)

@@ -35,9 +35,9 @@ _TICKS = frozenset({"preparing", "running", "joining", "holding"})
 
 
 class LockstepBarrier:
-    grants = True  # whether agents wait for each measurement, so that the plant measures as soon as it has advanced
-    waiting = AGAIN  # time (s) between two messages of a plant that waits to the agents that are there
-    recording = inf  # time (s) for which an ended run stays for a recorder
+    """A tick policy (`gridpeers.wire.tick_policy`): it measures as soon as it has advanced."""
+
+    grants, waiting, recording = True, AGAIN, inf
     report_ticks = TELEMETRY_TICKS, REPORT_TICKS
 
     def __init__(self, post: Post, stepper: PlantStepper, phases: Phases, feed: RecorderFeed) -> None:
@@ -46,7 +46,7 @@ class LockstepBarrier:
         self._stepper, self._phases, self._feed = stepper, phases, feed
         self.waits = TickBarrier(PLANT, stepper.config.deadline)
         self.waits.last_heard = post.last_heard
-        self.again_at = inf  # when open questions are asked again (s on the driver's clock)
+        self.again_at = inf
 
     @property
     def messages_needed(self) -> int:
@@ -60,6 +60,9 @@ class LockstepBarrier:
     def start(self, now: float) -> None:
         self.waits.renew(now)
         self.again_at = now + AGAIN
+
+    def run_time(self, t: float, now: float) -> float:
+        return t
 
     def due(self, now: float) -> int | None:
         """Return the tick to do now; before it, perhaps the roster has to change."""
@@ -75,7 +78,6 @@ class LockstepBarrier:
         return self.waits.missing_messages()
 
     def passed(self, now: float, unmet: tuple[Awaited, ...] = ()) -> TickVerdict:
-        """Judge a deadline; `unmet`: tokens and nameplates that the roster waits for."""
         if not self.waits.is_over(now):
             return WAIT
         if unmet and self._feed.is_silent(now):  # the process that records also starts the agents
@@ -86,8 +88,7 @@ class LockstepBarrier:
             return TickVerdict("over")
         return TickVerdict("break", self.waits.complaint(missing, now))
 
-    def heard(self, now: float) -> None:
-        """Return None: agents know from the roster whom the plant hears."""
+    def heard(self, now: float) -> None: ...
 
     def measured(self, names: Iterable[str], now: float) -> None:
         """Begin the wait for the states of a tick."""
@@ -99,7 +100,6 @@ class LockstepBarrier:
         self.again_at = again_at
 
     def wait_until(self, until: float, again_at: float = inf) -> None:
-        """Wait for no message, until a time (s)."""
         self.waits.wait_for({}, until)
         self.waits.deadline, self.again_at = None if until == inf else until, again_at
 
@@ -113,6 +113,7 @@ class LockstepRoster:
         joiners = {name for actions in self._schedule.values() for name in actions.join}.difference(config.agents)
         self.everyone = (*config.agents, *(name for name in stepper.inverters if name in joiners))
         self.names: tuple[str, ...] = ()  # agents of the last roster sent
+        self.state_keys, self.publications = (post.keys.state,), ()
         self._number = -1  # of that roster
         self._changed = False  # whether an agent has joined or gone since
         self._joining: tuple[str, ...] = ()  # newcomers that the held tick waits for; they may appear then

@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from functools import partial
 from math import inf
-from typing import cast
+from typing import Protocol, cast
 
 from gridpeers.plant.lockstep import LockstepBarrier, LockstepRoster
 from gridpeers.plant.meeting import AGAIN, Meeting
@@ -27,7 +27,7 @@ from gridpeers.plant.plant_interface import LivePlant, PlantLike
 from gridpeers.plant.plant_stepper import PlantStepper
 from gridpeers.plant.realtime.pacer import sentence
 from gridpeers.plant.realtime.realtime import RealtimeRoster, RealtimeTimer
-from gridpeers.plant.realtime.run_commands import LinkCommandSender, RunCommands
+from gridpeers.plant.realtime.run_commands import RunCommands
 from gridpeers.plant.recorder_feed import KEPT_BYTES, KEPT_BYTES_RECORDED, RecorderFeed, RunReports
 from gridpeers.wire.codec import RejectedError, encode
 from gridpeers.wire.journal import JournalBuffer, TickTraffic, TimedTraffic
@@ -35,6 +35,7 @@ from gridpeers.wire.links import Links
 from gridpeers.wire.messages import PLANT, Answer, Command, Journal, LinkReport, Nameplate, State, Waiting
 from gridpeers.wire.phases import Phases, PhaseTable
 from gridpeers.wire.post import ANYBODY, Post, Route
+from gridpeers.wire.tick_policy import TickPolicy
 from gridpeers.wire.timing import Awaited
 
 PHASES: PhaseTable = {
@@ -58,6 +59,29 @@ PHASES: PhaseTable = {
 CLOSING = 2.0  # longest wait (s) for the other nodes to close
 
 
+class PlantTickPolicy(TickPolicy, Protocol):
+    """What the node asks beside."""
+
+    again_at: float  # when open questions are asked again (s on the driver's clock)
+
+    @property
+    def waiting(self) -> float:
+        """Time (s) between two messages of a plant that waits to the agents that are there."""
+
+    @property
+    def recording(self) -> float:
+        """Time (s) for which an ended run stays for a recorder."""
+
+    def heard(self, now: float) -> tuple[str, ...] | None:
+        """Return the agents that the plant hears; None if they know that from the roster."""
+
+    def measured(self, names: Iterable[str], now: float) -> None:
+        """Note that the measurements of a tick are out to these agents."""
+
+    def wait_until(self, until: float, again_at: float = inf) -> None:
+        """Wait for no message, until a time (s)."""
+
+
 class PlantNode:
     """ValueError if the configuration and the plant do not fit."""
 
@@ -73,43 +97,40 @@ class PlantNode:
         self.received, self.lost = post.received, post.lost
         self.take_actions, self.take_rejects = post.take_actions, post.take_rejects
         post.on_nameplate = self._on_nameplate
-        wall = config.clock == "wall"
+        realtime = config.clock == "wall"
         stepper = self.stepper = PlantStepper(config, plant)
         phases = self._phases = Phases(PHASES)
-        kept = None if not wall else KEPT_BYTES if post.journal is None else KEPT_BYTES_RECORDED
-        self.feed = RecorderFeed(config.recorders, partial(post.publish, keys.telemetry), kept)
-        self.ticks = RealtimeTimer(post, stepper, phases) if wall else LockstepBarrier(post, stepper, phases, self.feed)
-        self.reports = RunReports(post, stepper, self.feed, self.ticks.report_ticks, live=wall)
-        self.meeting = Meeting(post, stepper, phases, self.feed)
+        kept = None if not realtime else KEPT_BYTES if post.journal is None else KEPT_BYTES_RECORDED
+        feed = self.feed = RecorderFeed(config.recorders, partial(post.publish, keys.telemetry), kept)
+        self.meeting = Meeting(post, stepper, phases, feed)
+        self.ticks: PlantTickPolicy
         self.roster: LockstepRoster | RealtimeRoster
         self._states: dict[str, State] = {}  # states that the links let through and that are not held yet
         self._tick_traffic: TickTraffic | None = None
         self._timed: TimedTraffic | None = None
-        if isinstance(self.ticks, RealtimeTimer):
-            sender = LinkCommandSender(post, links, self.reports.publish)
-            self.reports.pacing, self.reports.impaired = self.ticks.pacing, lambda: sender.impaired(stepper.t)
-            self.reports.omitted = self.ticks.warnings.left_out
-            self.roster = RealtimeRoster(self.meeting, self.ticks, self.reports, sender)
-            RunCommands(self, cast(LivePlant, plant), self.ticks, sender)
-            state_keys = [keys.state, keys.set_points]
-            requests = tuple(map(keys.link_request, stepper.inverters))
+        if realtime:
+            self.ticks = timer = RealtimeTimer(post, stepper, phases)
+            self.reports = RunReports(post, stepper, feed, timer.report_ticks, live=True)
+            self.roster = roster = RealtimeRoster(self.meeting, timer, self.reports, links)
+            RunCommands(self, cast(LivePlant, plant), timer, roster.link_commands)
             if post.journal is not None:
                 arrivals = config.record == "all"
                 post.traffic = self._timed = TimedTraffic(keys, post.journal, arrivals=arrivals, whole=True)
         else:
-            self.roster = LockstepRoster(self.meeting, self.ticks, self.reports)
+            self.ticks = barrier = LockstepBarrier(post, stepper, phases, feed)
+            self.reports = RunReports(post, stepper, feed, barrier.report_ticks, live=False)
+            self.roster = LockstepRoster(self.meeting, barrier, self.reports)
             post.routes[keys.request] = Route(ANYBODY, (Command,), self._on_request)
-            state_keys, requests = [keys.state], ()
             if post.journal is not None:
                 post.traffic = self._tick_traffic = TickTraffic(keys, self.roster.everyone, post.journal)
         for name in self.roster.everyone:
-            for key in state_keys:
+            for key in self.roster.state_keys:
                 post.routes[key(name)] = Route(name, (State,), self._on_state)
             post.routes[keys.report(name)] = Route(name, (LinkReport,), self._on_report)
             post.routes[keys.journal(name)] = Route(name, (Journal,), self._on_report)
         self.subscriptions = tuple(post.routes)
         self._measurement_keys = {name: keys.measurement(name) for name in self.roster.everyone}
-        self.publications = keys.control, keys.telemetry, *self._measurement_keys.values(), *requests
+        self.publications = keys.control, keys.telemetry, *self._measurement_keys.values(), *self.roster.publications
 
     @property
     def phase(self) -> str:
@@ -235,7 +256,7 @@ class PlantNode:
             raise RejectedError(kind, f"State({state.seq}) of {state.sender} at tick {tick} ({self.phase})")
         if state.fault or state.quiet:
             self.stepper.hear(state)
-        at = state.t if self.ticks.grants else now * self.config.speed
+        at = self.ticks.run_time(state.t, now)
         if self.post.admission.is_usable(self.links, state, payload, at):
             self._states[state.sender] = state
 
@@ -306,7 +327,7 @@ class PlantNode:
             self._tick_traffic.ticked(stepper.tick)
         self.feed.replay()
         states, self._states = self._states, {}
-        at = stepper.t if self.ticks.grants else now * self.config.speed
+        at = self.ticks.run_time(stepper.t, now)
         for late in self.post.admission.arrived(self.links, at, self.rejects):
             if isinstance(late, State):
                 states[late.sender] = late

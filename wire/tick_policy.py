@@ -25,8 +25,21 @@ class TickPolicy(Protocol):
     """Decides when a node ticks and with what; the node decides everything else. Times are s on the driver's clock."""
 
     @property
+    def grants(self) -> bool:
+        """Whether each measurement grants a tick, as in simulated time: no clock decides."""
+
+    @property
+    def messages_needed(self) -> int:
+        """Number of messages that are needed before the deadline."""
+
+    @property
     def deadline(self) -> float | None:
         """When to ask `passed` next."""
+
+    def start(self, now: float) -> None: ...
+
+    def run_time(self, t: float, now: float) -> float:
+        """Return the run time (s) at which what belongs to t comes: t itself, or now by the own clock."""
 
     def due(self, now: float) -> int | None:
         """Return the tick to do now, None if there is none."""

@@ -19,7 +19,7 @@ from gridpeers.plant.realtime.pacer import RealTimePacer
 from gridpeers.plant.realtime.run_commands import LinkCommandSender
 from gridpeers.plant.realtime.silence_detector import SilenceDetector
 from gridpeers.plant.recorder_feed import TELEMETRY, RunReports
-from gridpeers.wire.links import REPORT_TICKS
+from gridpeers.wire.links import REPORT_TICKS, Links
 from gridpeers.wire.messages import AgentStatus, Leave, LinkAcknowledgement, Pacing, State
 from gridpeers.wire.node import CLOCK_ALONE
 from gridpeers.wire.phases import Phases
@@ -35,9 +35,9 @@ RECORDING = 13.0  # longest time that an ended run stays for a recorder that has
 
 
 class RealtimeTimer:
-    grants = False  # whether agents wait for each measurement, so that the plant measures as soon as it has advanced
-    waiting = 0.5  # time (s, wall) between two messages of a plant that waits to the agents that are there
-    recording = RECORDING
+    """A tick policy (`gridpeers.wire.tick_policy`): the clock decides."""
+
+    grants, waiting, recording = False, 0.5, RECORDING
 
     def __init__(self, post: Post, stepper: PlantStepper, phases: Phases) -> None:
         config = stepper.config
@@ -72,6 +72,9 @@ class RealtimeTimer:
     def begin(self, now: float) -> None:
         """Begin to tick, after a moment."""
         self.pacer, self.again_at = RealTimePacer(self.pacer.period, now + LEAD), now + AGAIN
+
+    def run_time(self, t: float, now: float) -> float:
+        return now * self._config.speed
 
     def due(self, now: float) -> int | None:
         """Return the tick whose measurements are out: the plant advances ahead of time."""
@@ -109,7 +112,6 @@ class RealtimeTimer:
         self._measured = self._stepper.tick
 
     def heard(self, now: float) -> tuple[str, ...]:
-        """Return the agents that the plant hears."""
         return tuple(name for name in self._stepper.inverters if now - self._heard_at.get(name, -inf) < HEARD)
 
     def forget(self, name: str) -> None:
@@ -121,12 +123,15 @@ class RealtimeTimer:
 
 
 class RealtimeRoster:
-    def __init__(
-        self, meeting: Meeting, timer: RealtimeTimer, reports: RunReports, link_commands: LinkCommandSender
-    ) -> None:
+    def __init__(self, meeting: Meeting, timer: RealtimeTimer, reports: RunReports, links: Links | None) -> None:
         post, stepper = meeting.post, meeting.stepper
         self._post, self._stepper, self._phases = post, stepper, meeting.phases
-        self._meeting, self._timer, self._reports, self._link_commands = meeting, timer, reports, link_commands
+        self._meeting, self._timer, self._reports = meeting, timer, reports
+        link_commands = self.link_commands = LinkCommandSender(post, links, reports.publish)
+        reports.pacing, reports.impaired = timer.pacing, lambda: link_commands.impaired(stepper.t)
+        reports.omitted = timer.warnings.left_out
+        self.state_keys = post.keys.state, post.keys.set_points
+        self.publications = tuple(map(post.keys.link_request, stepper.inverters))
         self._schedule = agent_schedule(stepper.config, stepper.inverters)
         self.everyone = stepper.inverters
         for name in self.everyone:
@@ -173,7 +178,7 @@ class RealtimeRoster:
         self._timer.silence.joined(name)
         self._stepper.connect(name, True)
         self._note(name, f"{name} joined")
-        self._link_commands.send(self.names, now)
+        self.link_commands.send(self.names, now)
 
     def died(self, name: str, now: float) -> None:
         self._forget(name)
@@ -191,7 +196,7 @@ class RealtimeRoster:
         if join:
             self._post.say(f"{', '.join(join)} may join from t = {t:.2f} s on, as the scenario says")
             self._reports.telemetry(awaited=join)
-        self._link_commands.send(self.names, now)
+        self.link_commands.send(self.names, now)
         return True
 
     def advanced(self, now: float) -> None:
@@ -204,7 +209,7 @@ class RealtimeRoster:
         self._post.ask_again()
 
     def _forget(self, name: str) -> None:
-        self._link_commands.forget(name)
+        self.link_commands.forget(name)
         self._timer.forget(name)
 
     def _note(self, subject: str, text: str) -> None:

@@ -52,7 +52,7 @@ def test_ticks_keep_their_schedule_and_missed_ones_are_counted() -> None:
     lab.go(0.037)
 
     assert len(lab.decided()) == 2
-    assert lab.side.policy.missed == 2
+    assert lab.side.policy.upkeep.missed == 2
     assert lab.side.deadline == pytest.approx(start + 0.050)
 
 
