@@ -16,8 +16,8 @@ from gridpeers.scenarios.results.run_files import write_whole
 from gridpeers.scenarios.results.sharing_index import sharing_index
 from gridpeers.scenarios.short_texts import in_order
 from gridpeers.wire.codec import sound
-from gridpeers.wire.journal import EACH_TICK, SentMessage, kind_of
-from gridpeers.wire.messages import PLANT, Measurement, State
+from gridpeers.wire.journal import EACH_TICK, MessageReference, ReceivedMessage, SentMessage, kind_of
+from gridpeers.wire.messages import PLANT, State
 
 
 class Flow(NamedTuple):
@@ -81,28 +81,32 @@ def _implied(record: RunRecord, since: float, until: float) -> Iterator[Flow]:
                 if (each.name in last or state.t >= decision.t - 1.5 * T) and since - 1e-9 <= state.t <= until + 1e-9:
                     yield Flow(state.t, each.name, agent, state.seq, decision.t)
                 last[each.name] = state.epoch, state.seq
-    for message in record.messages(since=since, until=until, kind="State"):
-        yield Flow(message.t, message.sender, PLANT, message.number, message.t)
+    for state in record.messages(State, since=since, until=until):
+        yield Flow(state.t, state.sender, PLANT, state.seq, state.t)
 
 
 def _noted(record: RunRecord, since: float, until: float) -> Iterator[Flow]:
     """Yield the messages of real time as their receivers noted them; clocks of one host agree."""
-    everybody = (*record.agents, PLANT)
-    sent = {}  # when (s, monotonic), by the journal of the sender: the plant notes states too, but not when
-    for sender in everybody:
-        for entry in record.entries(sender, since=since, until=until):
-            if isinstance(entry, SentMessage) and entry.at is not None and kind_of(entry.key) in EACH_TICK:
-                message = sound(entry.payload)
-                if message is not None:
-                    sent[entry.key, message.epoch, message.seq] = entry.at
-    speed = record.info.agents[0].speed if record.info.agents else 1.0
-    for receiver in everybody:
-        for heard in record.heard(receiver, since=since, until=until):
-            if heard.kind not in (State.__name__, Measurement.__name__):
-                continue
-            begun = sent.get((heard.key, heard.epoch, heard.number))
-            way = 0.0 if begun is None or heard.at is None else max(0.0, heard.at - begun)
-            yield Flow(heard.t, heard.sender, receiver, heard.number, heard.t + way * speed, heard.rejected)
+    index, speed = record.index, record.info.plant.speed
+    noted = [each for part in index.near(since, until) for each in index.part(part).entries]
+    sent: dict[tuple[str, int, int], float] = {}
+    """When (s, monotonic), by the journal of the sender: the plant notes states too, but not when."""
+    for _, entry in noted:
+        if isinstance(entry, SentMessage) and entry.at is not None and kind_of(entry.key) in EACH_TICK:
+            message = sound(entry.payload)
+            if message is not None:
+                sent[entry.key, message.epoch, message.seq] = entry.at
+    for journal, entry in noted:
+        if not isinstance(entry, MessageReference | ReceivedMessage) or kind_of(entry.key) not in EACH_TICK:
+            continue
+        heard = sound(entry.payload) if isinstance(entry, ReceivedMessage) else index.named_by(entry, journal.t)
+        if heard is None:
+            continue
+        t = journal.t if entry.rejected else heard.t  # of a rejected one any time may be said
+        if since - 1e-9 <= t <= until + 1e-9:
+            begun = sent.get((entry.key, heard.epoch, heard.seq))
+            way = 0.0 if begun is None or entry.at is None else max(0.0, entry.at - begun)
+            yield Flow(t, heard.sender, journal.sender, heard.seq, t + way * speed, entry.rejected)
 
 
 # -------------------------------------------------------------------- Perfetto trace

@@ -16,7 +16,7 @@ from gridpeers.lab.communication.sent_states import Link, SentState
 from gridpeers.netem.ledger import LinkCounts, LinkTrace
 from gridpeers.scenarios.checks.check_verdict import NotJudgedError
 from gridpeers.scenarios.emulation.link_data import data_of
-from gridpeers.scenarios.record.decision_entries import JournalEnds
+from gridpeers.scenarios.record.decision_reader import JournalEnds
 from gridpeers.scenarios.record.journal_reader import entries_of, values_of
 from gridpeers.scenarios.record.record_file import RecordFile
 from gridpeers.scenarios.record.record_info import RecordInfo

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from math import inf
 from typing import NamedTuple
 
-from gridpeers.scenarios.record.decision_entries import JournalEnds
+from gridpeers.scenarios.record.decision_reader import JournalEnds
 from gridpeers.wire.journal import Decision
 
 Link = tuple[str, str]  # Sender and receiver

@@ -11,7 +11,6 @@ from gridpeers.agents.laws.call import objection_to
 from gridpeers.agents.laws.law import Neighbour
 from gridpeers.lab.explanation.law_step import LawStep, law_step
 from gridpeers.netem.ledger import Outcome, copies_of
-from gridpeers.scenarios.record.message_index import MessageOnWire
 from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
 from gridpeers.scenarios.record.recorded_decision import NeighbourInput, RecordedDecision
 from gridpeers.scenarios.short_texts import short
@@ -222,10 +221,10 @@ def missed(
     last = -1 if each.number is None else each.number
     counts: Counter[str] = Counter()
     declared = {quantity.name: quantity for quantity in decision.config.control.law.shared}
-    for message in record.messages(each.name, since=since, until=decision.t - 0.5 * decision.config.T_c, kind="State"):
-        if message.number > last or (each.state is not None and message.epoch != each.state.epoch):
-            fate, state = _fate(message, fates), message.message
-            beyond = isinstance(state, State) and not fate and objection_to(state.shared, declared)
+    for state in record.messages(State, each.name, since=since, until=decision.t - 0.5 * decision.config.T_c):
+        if state.seq > last or (each.state is not None and state.epoch != each.state.epoch):
+            fate = _fate(state, fates)
+            beyond = not fate and objection_to(state.shared, declared)
             counts['rejected as "implausible"' if beyond else fate] += 1
     others: Counter[str] = Counter()
     for number, kind, count in sorted(rejected.get(each.name, ()), reverse=True):
@@ -243,11 +242,11 @@ def missed(
     return "; ".join([text, *strange])
 
 
-def _fate(message: MessageOnWire, fates: Fates) -> str:
+def _fate(state: State, fates: Fates) -> str:
     """Return why a state has not been heard: a key of `WORDS`, or empty if nothing tells."""
-    if isinstance(message.message, State) and (message.message.quiet or message.message.idle):
-        return "quiet" if message.message.quiet else "idle"
-    judged = [outcome for t, outcome in fates.get((message.sender, message.number), ()) if abs(t - message.t) < 1.0]
+    if state.quiet or state.idle:
+        return "quiet" if state.quiet else "idle"
+    judged = [outcome for t, outcome in fates.get((state.sender, state.seq), ()) if abs(t - state.t) < 1.0]
     outcome = judged[-1] if judged else ""
     if isinstance(outcome, str):
         return outcome
@@ -276,9 +275,8 @@ def reason(record: RunRecord, decision: RecordedDecision, each: NeighbourInput) 
 
 def _island_at(record: RunRecord, decision: RecordedDecision, t: float) -> str:
     island = ""
-    for message in record.messages(decision.agent, since=max(0.0, t - decision.config.T_c), until=t, kind="State"):
-        if isinstance(message.message, State):
-            island = message.message.island
+    for state in record.messages(State, decision.agent, since=max(0.0, t - decision.config.T_c), until=t):
+        island = state.island
     return island
 
 

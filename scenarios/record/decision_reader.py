@@ -1,11 +1,16 @@
-"""The decisions of an agent from its journal, with the messages that they name, also those that were lies."""
+"""How agents decided, from their journals, with the messages that these name, also those that were lies.
+
+In simulated time an entry holds until the next one of its agent, which may be minutes away: one pass over the file
+notes the places of the entries. In real time each decision has its own entry.
+"""
 
 from __future__ import annotations
 
-import dataclasses
+from bisect import bisect_right, insort
 from collections.abc import Iterator
 from contextlib import suppress
 from functools import lru_cache, partial
+from math import inf
 
 from msgspec.structs import replace
 
@@ -14,17 +19,77 @@ from gridpeers.agents.graphs import GraphError, in_neighbours, rule_of
 from gridpeers.netem.liar import HeardFrom, last_before, lies_about
 from gridpeers.netem.models import INSTANT
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
-from gridpeers.scenarios.record.decision_entries import DecisionEntries
-from gridpeers.scenarios.record.message_index import MessageIndex, MessageOnWire, heard_of, on_wire
+from gridpeers.scenarios.record.message_index import MessageIndex
+from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.scenarios.record.recorded_decision import Action, NeighbourInput, RecordedDecision
-from gridpeers.wire.journal import Decision, MessageReference, ReceivedMessage
-from gridpeers.wire.messages import OFF, PLANT, Measurement, Nameplate, State
+from gridpeers.wire.journal import Decision
+from gridpeers.wire.messages import OFF, Journal, Measurement, Nameplate, State
 from gridpeers.wire.timing import time_of
 
 _REACH = 2.0
 """Time (s) before the moment of a lie in which the true state is sought first."""
 
 _NOTHING = Decision(0, 0, [], [], [], [])
+
+
+class JournalEnds:
+    """Up to when it is known how an agent decides in simulated time: a killed process has not sent its last part.
+
+    With emulated links its journal comes in parts all the time. Without, each change has a part of its own at once.
+    """
+
+    def __init__(self, info: RecordInfo) -> None:
+        self._in_parts = {config.name for config in info.agents if config.links}
+        self._ends: dict[tuple[str, int], float] = {}
+        """Run time of the last part (s), by agent and epoch."""
+
+    def take(self, journal: Journal) -> None:
+        one = journal.sender, journal.epoch
+        self._ends[one] = max(journal.t, self._ends.get(one, 0.0))
+
+    def know(self, agent: str, epoch: int, t: float) -> bool:
+        """Return whether the record says how a process of an agent decided at a run time (s)."""
+        return agent not in self._in_parts or t <= self._ends.get((agent, epoch), -inf) + 1e-9
+
+
+class DecisionEntries:
+    """The entries of simulated time: where each is in the file, and up to when the record has them."""
+
+    def __init__(self, index: MessageIndex) -> None:
+        self._index = index
+        self._parts = 0
+        self._places: dict[str, list[tuple[int, int]]] = {}
+        """By agent: the first tick in each part of its journal that has entries, and the part of the file."""
+        self._ends = JournalEnds(index.info)
+
+    def at(self, agent: str, tick: int) -> Decision | None:
+        """Return the entry that holds at a tick; None before the first one.
+
+        Behind the end of a killed process's journal another one may have held: ask `know` first.
+        """
+        self._go_through()
+        places = self._places.get(agent, [])
+        place = bisect_right(places, (tick, self._parts)) - 1
+        if place < 0:
+            return None
+        entries = self._index.part(places[place][1]).decisions[agent]
+        return entries[max(each for each in entries if each <= tick)]
+
+    def know(self, state: State, t: float) -> bool:
+        """Return whether the record says how an agent decided a state of a run time (s)."""
+        self._go_through()
+        return self._ends.know(state.sender, state.epoch, t)
+
+    def _go_through(self) -> None:
+        """Note where the entries of the parts are that are new."""
+        for part in range(self._parts, self._index.parts):
+            for journal in self._index.journals_in(part):
+                self._ends.take(journal)
+                entries = self._index.entries_in(journal)
+                first = next((entry.tick for entry in entries if isinstance(entry, Decision)), None)
+                if first is not None:
+                    insort(self._places.setdefault(journal.sender, []), (first, part))
+        self._parts = self._index.parts
 
 
 class DecisionReader:
@@ -169,42 +234,6 @@ class DecisionReader:
             if config is not None:
                 return in_neighbours(config.control, agent, self._nameplates, rule_of(config.control))
         return ()
-
-    def heard(self, receiver: str, since: float, until: float) -> Iterator[MessageOnWire]:
-        if self._info.clock == "wall":
-            return self._heard_in_real_time(receiver, since, until)
-        if receiver != PLANT:
-            return self._heard_in_ticks(receiver, since, until)
-        states = self._index.messages(None, since, until, "State")
-        return (dataclasses.replace(each, receiver=PLANT) for each in states)
-
-    def _heard_in_ticks(self, receiver: str, since: float, until: float) -> Iterator[MessageOnWire]:
-        last: dict[str, int | None] = {}
-        for decision in self.decisions(receiver, since, until):
-            if not decision.measurement_age:
-                key = f"measurement/{receiver}"
-                yield on_wire(key, b"", None, receiver=receiver, message=decision.measurement)
-            for each in decision.neighbours:
-                if each.state is not None and each.number != last.get(each.name):
-                    yield on_wire(f"state/{each.name}", b"", None, receiver=receiver, message=each.state)
-                last[each.name] = each.number
-
-    def _heard_in_real_time(self, receiver: str, since: float, until: float) -> Iterator[MessageOnWire]:
-        for index in self._index.near(since, until):
-            for journal, entry in self._index.part(index).entries:
-                if journal.sender != receiver:
-                    continue
-                if isinstance(entry, MessageReference):
-                    message = heard_of(receiver, self._index.named_by(entry, journal.t), entry, journal.t)
-                elif isinstance(entry, ReceivedMessage):
-                    message = on_wire(entry.key, entry.payload, entry.at, receiver=receiver, rejected=entry.rejected)
-                else:
-                    continue
-                if message.rejected:  # it may say any time
-                    message = dataclasses.replace(message, t=journal.t)
-                t = journal.t if message.t < 0.0 else message.t
-                if since - 1e-9 <= t <= until + 1e-9:
-                    yield message
 
 
 def _action(config: AgentConfig, state: State, measured: Measurement) -> Action:

@@ -20,21 +20,17 @@ _decode_all = msgspec.msgpack.Decoder(list[AnyEntry]).decode
 _decode_one = msgspec.msgpack.Decoder(AnyEntry).decode
 
 
-def entries_of(data: bytes, note_damage: Callable[[ValueError], None] | None = None) -> Iterator[Entry]:
+def _raised(error: ValueError) -> None:
+    raise error
+
+
+def entries_of(data: bytes, note_damage: Callable[[ValueError], None] = _raised) -> Iterator[Entry]:
     """Yield the entries in the data of a `Journal`; those of unknown kinds, of a later version, are left out.
 
-    With `note_damage`, which takes their errors, damaged entries are left out too.
-
-    Raise ValueError where the bytes end within an entry, or make none.
+    `note_damage` takes the errors of damaged entries, which are left out too; by default they are raised.
     """
-
-    def damaged(text: str) -> None:
-        if note_damage is None:
-            raise ValueError(text)
-        note_damage(ValueError(text))
-
     if len(data) > LONGEST_MESSAGE:
-        damaged(f"{len(data)} bytes, a part of a journal has at most {LONGEST_MESSAGE}")
+        note_damage(ValueError(f"{len(data)} bytes, a part of a journal has at most {LONGEST_MESSAGE}"))
         return
     ends, broken = _ends(data)
     whole = _HEAD + (len(ends) - 1).to_bytes(4, "big") + data[: ends[-1]]
@@ -46,9 +42,9 @@ def entries_of(data: bytes, note_damage: Callable[[ValueError], None] | None = N
                 yield _decode_one(data[begin:end])
             except (msgspec.DecodeError, ValueError, RecursionError) as error:
                 if not str(error).startswith("Invalid value"):  # else it is of a kind of a later version
-                    damaged(f"an entry is none of ours: {error}")
+                    note_damage(ValueError(f"an entry is none of ours: {error}"))
     if broken:
-        damaged(broken)
+        note_damage(ValueError(broken))
 
 
 def _ends(data: bytes) -> tuple[list[int], str]:

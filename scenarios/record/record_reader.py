@@ -12,26 +12,24 @@ from collections.abc import Iterable, Iterator
 from math import inf, isnan
 from numbers import Real
 from pathlib import Path
-from typing import TypeVar, get_args
+from typing import TypeVar
 
 from gridpeers.netem.ledger import LinkCounts, LinkTrace
 from gridpeers.scenarios.emulation.link_data import LinkReportData, data_of
 from gridpeers.scenarios.record.decision_reader import DecisionReader
-from gridpeers.scenarios.record.message_index import MessageIndex, MessageOnWire
+from gridpeers.scenarios.record.message_index import MessageIndex
 from gridpeers.scenarios.record.record_file import RecordFile, RecordFileError, record_path
 from gridpeers.scenarios.record.recorded_decision import RecordedDecision
 from gridpeers.scenarios.results.history import History
 from gridpeers.scenarios.results.record import canonical
 from gridpeers.scenarios.short_texts import short
 from gridpeers.wire.journal import Entry
-from gridpeers.wire.messages import AnyMessage, LinkReport, LinkRequest, PlantEvent, Telemetry
-from gridpeers.wire.wording import suggestion
+from gridpeers.wire.messages import LinkReport, LinkRequest, Message, PlantEvent, Telemetry
 
 __all__ = ["RecordFileError", "RunRecord"]
 
 T = TypeVar("T")
-
-KINDS = tuple(kind.__name__ for kind in get_args(AnyMessage))  # Types of the messages that a record may have
+M = TypeVar("M", bound=Message)
 
 
 class RunRecord:
@@ -107,22 +105,14 @@ class RunRecord:
         return tuple(event for message in self.telemetry() for event in message.events)
 
     def messages(
-        self, sender: str | None = None, *, since: float = 0.0, until: float = inf, kind: str | None = None
-    ) -> Iterator[MessageOnWire]:
-        """Yield messages as they were sent, each once, in the order of the record; run times (s) include the limits."""
-        _check_times(since=since, until=until)
-        if kind is not None and kind not in KINDS:
-            raise RecordFileError(f"kind: no message is a {kind!r:.60}; {suggestion(str(kind), KINDS, 'types')}")
-        return self.index.messages(sender, since, until, kind)
+        self, kind: type[M], sender: str | None = None, *, since: float = 0.0, until: float = inf
+    ) -> Iterator[M]:
+        """Yield the messages of a type as they were sent, each once, in the order of the record.
 
-    def heard(self, agent: str, *, since: float = 0.0, until: float = inf) -> Iterator[MessageOnWire]:
-        """Yield messages as an agent, or the plant, heard them, in the order of their arrival.
-
-        Raise RecordFileError if there was no such agent.
+        Run times (s) include the limits. `gridpeers.wire.messages.Message` is the type of all.
         """
-        self._require(agent)
         _check_times(since=since, until=until)
-        return self._decisions.heard(agent, since, until)
+        return self.index.messages(kind, sender, since, until)
 
     def entries(self, node: str, *, since: float = 0.0, until: float = inf) -> Iterator[Entry]:
         """Yield all entries of the journal of an agent, or of "plant": tokens, process events and the rest.

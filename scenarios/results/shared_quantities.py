@@ -42,10 +42,9 @@ def read_shared(record: RunRecord) -> dict[str, Series]:
     if record.info.level == "physics":
         raise RecordFileError(f'{record.path}: it has no states: the run was recorded with record = "physics"')
     found: dict[str, dict[str, list[tuple[float, float]]]] = {}
-    for each in record.messages(kind="State"):
-        if isinstance(each.message, State):
-            for name, value in each.message.shared.items():
-                found.setdefault(name, {}).setdefault(each.sender, []).append((each.message.t, value))
+    for state in record.messages(State):
+        for name, value in state.shared.items():
+            found.setdefault(name, {}).setdefault(state.sender, []).append((state.t, value))
     inverters = record.agents
     return {name: {it: _columns(of[it]) for it in inverters if it in of} for name, of in found.items()}
 

@@ -10,6 +10,8 @@ import pytest
 from gridpeers.agents.laws.consensus import Consensus
 from gridpeers.lab.replay.recomputation import recomputed
 from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.wire.codec import encode
+from gridpeers.wire.messages import Measurement, State
 from tests.conformance.test_links import STORM
 from tests.record.recorded_runs import recorded_run
 
@@ -19,7 +21,7 @@ def assert_decisions_are_recorded(record: RunRecord, *agents: str) -> None:
     assert record.complete
     assert record.damage == ()
     for agent in agents or record.agents:
-        states = [message.number for message in record.messages(agent, kind="State")]
+        states = [state.seq for state in record.messages(State, agent)]
         again = list(recomputed(record, agent))
         assert [each.decision.tick for each in again] == states
         assert [each.decision.tick for each in again if not each.agrees] == []
@@ -33,7 +35,7 @@ def test_islanding(tmp_path: Path) -> None:
     again = list(recomputed(record, "inv4", Consensus(k_p=0.0008)))
     assert {each.decision.action for each in again if each.agrees} == {"hold"}
     assert not any(each.agrees for each in again if each.decision.t > 2.0)
-    assert sum(1 for _ in record.messages(kind="State")) == 9 * 350
+    assert sum(1 for _ in record.messages(State)) == 9 * 350
     assert np.array_equal(
         record.physics().table, np.loadtxt(tmp_path / "IV" / "history.csv", delimiter=",", skiprows=1)
     )
@@ -72,10 +74,8 @@ def test_every_driver_records_what_the_bus_carries(tmp_path: Path) -> None:
     assert_decisions_are_recorded(bus, "inv4")
     for way in ("direct", "processes"):
         other = recorded_run("islanding", "III", tmp_path / way, processes=way == "processes")
-        for kind in ("Measurement", "State"):
-            assert sorted((each.key, each.number, each.payload) for each in other.messages(kind=kind)) == sorted(
-                (each.key, each.number, each.payload) for each in bus.messages(kind=kind)
-            )
+        for kind in (Measurement, State):
+            assert sorted(map(encode, other.messages(kind))) == sorted(map(encode, bus.messages(kind)))
         for agent in bus.agents:
             assert [(d.neighbours, d.before, d.action, d.state) for d in other.decisions(agent)] == [
                 (d.neighbours, d.before, d.action, d.state) for d in bus.decisions(agent)

@@ -10,24 +10,31 @@ import pytest
 
 from gridpeers.lab.trace import Flow, flows
 from gridpeers.netem.ledger import LinkTrace, Outcome
-from gridpeers.scenarios.record.message_index import on_wire
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.wire.codec import encode
-from gridpeers.wire.journal import SentMessage
+from gridpeers.wire.journal import Entry, ReceivedMessage, SentMessage
+from gridpeers.wire.messages import Journal
 from tests.record.fake_clock import fake_clock_record
 from tests.unit.lab.explanation.decisions import state
+
+
+def record_of(
+    *traces: LinkTrace, clock: str = "simulated", speed: float = 1.0, entries: tuple[tuple[Journal, Entry], ...] = ()
+) -> RunRecord:
+    """A record with verdicts of links, and entries of journals, alone."""
+    none: Any = lambda *words, **more: iter(())  # noqa: E731
+    info = SimpleNamespace(T_c=0.02, clock=clock, plant=SimpleNamespace(speed=speed))
+    index = SimpleNamespace(near=lambda *times: (0,), part=lambda number: SimpleNamespace(entries=entries))
+    return cast(
+        RunRecord,
+        SimpleNamespace(links=lambda: traces, info=info, agents=(), index=index, messages=none, decisions=none),
+    )
 
 
 def judged(*rows: tuple[float, Outcome], clock: str = "simulated") -> list[Flow]:
     """Flows of the link from inv2 to inv1 whose messages have these times and verdicts."""
     times, outcomes = zip(*rows, strict=True)
-    trace = LinkTrace("inv2", "inv1", tuple(range(5, 5 + len(rows))), times, outcomes)
-    none: Any = lambda *words, **more: iter(())  # noqa: E731
-    info = SimpleNamespace(T_c=0.02, clock=clock, agents=())
-    record = SimpleNamespace(
-        links=lambda: [trace], info=info, agents=(), messages=none, entries=none, heard=none, decisions=none
-    )
-    return flows(cast(RunRecord, record))
+    return flows(record_of(LinkTrace("inv2", "inv1", tuple(range(5, 5 + len(rows))), times, outcomes), clock=clock))
 
 
 def test_in_ticks_a_message_arrives_with_the_decision_that_can_use_it() -> None:
@@ -47,15 +54,12 @@ def test_in_ticks_a_message_arrives_with_the_decision_that_can_use_it() -> None:
 
 def test_a_message_that_was_judged_anew_has_its_last_verdict() -> None:
     """A cut that kept it was healed early."""
-    trace = LinkTrace("inv2", "inv1", (5, 5), (0.1, 0.1), (float("inf"), 0.2))
-    none: Any = lambda *words, **more: iter(())  # noqa: E731
-    info = SimpleNamespace(T_c=0.02, clock="wall", agents=())
-    record = SimpleNamespace(links=lambda: [trace], info=info, agents=(), entries=none, heard=none)
+    record = record_of(LinkTrace("inv2", "inv1", (5, 5), (0.1, 0.1), (float("inf"), 0.2)), clock="wall")
 
-    (flow,) = flows(cast(RunRecord, record))
+    (flow,) = flows(record)
     assert (flow.fate, flow.arrived) == ("", pytest.approx(0.3))
-    assert flows(cast(RunRecord, record), since=0.11) == []
-    assert flows(cast(RunRecord, record), until=0.09) == []
+    assert flows(record, since=0.11) == []
+    assert flows(record, until=0.09) == []
 
 
 def test_in_real_time_messages_arrive_when_their_receivers_noted_them(tmp_path: Path) -> None:
@@ -83,15 +87,13 @@ def test_in_real_time_messages_arrive_when_their_receivers_noted_them(tmp_path: 
 
 def test_with_speed_the_way_of_a_message_is_run_time() -> None:
     """A millisecond by the clock is ten of a run at ten times real time; a rejected message says so."""
-    sent = SentMessage(10.0, "state/inv2", encode(state("inv2", 5)))
-    heard = on_wire("state/inv2", encode(state("inv2", 5)), 10.001, receiver="inv1", rejected="stale")
-    info = SimpleNamespace(T_c=0.02, clock="wall", agents=(SimpleNamespace(speed=10.0),))
-    record = SimpleNamespace(
-        links=lambda: [],
-        info=info,
-        agents=("inv1", "inv2"),
-        entries=lambda sender, **words: iter([sent] if sender == "inv2" else []),
-        heard=lambda receiver, **words: iter([heard] if receiver == "inv1" else []),
+    payload = encode(state("inv2", 5))
+    sent, heard = (Journal(sender=name, epoch=1, seq=0, t=0.1, data=b"") for name in ("inv2", "inv1"))
+    entries = (
+        (sent, SentMessage(10.0, "state/inv2", payload)),
+        (heard, ReceivedMessage(10.001, "state/inv2", payload, "stale")),
     )
 
-    assert flows(cast(RunRecord, record)) == [Flow(0.1, "inv2", "inv1", 5, pytest.approx(0.11), "stale")]
+    found = flows(record_of(clock="wall", speed=10.0, entries=entries))
+
+    assert found == [Flow(0.1, "inv2", "inv1", 5, pytest.approx(0.11), "stale")]

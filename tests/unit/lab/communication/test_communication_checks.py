@@ -15,6 +15,7 @@ from gridpeers.scenarios.checks.check_verdict import NotJudgedError
 from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.record.record_file import RecordFile
 from gridpeers.wire.journal import Decision
+from gridpeers.wire.messages import State
 from tests.unit.lab.communication.records import CUT, LOSSY, QUIET
 from tests.unit.scenarios.checks.cases import ran_with, verdict, with_content
 
@@ -55,7 +56,7 @@ def test_the_pass_over_a_record_agrees_with_its_reader() -> None:
     content, record = result.checked_case.content, result.run_record
 
     for agent in ("inv1", "inv5"):
-        sent = [message.number for message in record.messages(agent, kind="State")]
+        sent = [state.seq for state in record.messages(State, agent)]
         assert [state.number for state in sorted(content.states[agent].values(), key=lambda it: it.t)] == sent
     assert dict(content.counts) == record.link_counts()
 

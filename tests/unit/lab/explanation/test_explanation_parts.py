@@ -14,10 +14,8 @@ from gridpeers.lab.explanation import law_step as module
 from gridpeers.lab.explanation.explanation import WORDS, missed, reason, verdicts
 from gridpeers.lab.explanation.law_step import LawStep, law_step
 from gridpeers.netem.ledger import LinkTrace, Outcome
-from gridpeers.scenarios.record.message_index import MessageOnWire, on_wire
 from gridpeers.scenarios.record.recorded_decision import RecordedDecision
-from gridpeers.wire.codec import encode
-from gridpeers.wire.messages import OFF
+from gridpeers.wire.messages import OFF, State
 from tests.toy.toy_configs import ALL_FULL, agent_config
 from tests.unit.lab.explanation.decisions import decision, neighbour, record_of, state
 
@@ -25,16 +23,15 @@ EVERY = decision(neighbour("inv2", 5), state=None)
 NOBODY = record_of(messages=lambda *words, **more: iter(()))
 
 
-def sent(name: str, *numbers: int, **changes: Any) -> list[MessageOnWire]:
+def sent(name: str, *numbers: int, **changes: Any) -> list[State]:
     """States as their sender sent them."""
-    states = [replace(state(name, number), **changes) for number in numbers]
-    return [on_wire(f"state/{name}", encode(each), None) for each in states]
+    return [replace(state(name, number), **changes) for number in numbers]
 
 
 def fate_of(outcome: Outcome, *later: Outcome, **changes: Any) -> str:
     """What is said of the state of tick 6, whose verdict this is, after that of tick 5 was heard."""
 
-    def messages(name: str, *, since: float, until: float, kind: str) -> Iterator[MessageOnWire]:
+    def messages(kind: type[State], name: str, *, since: float, until: float) -> Iterator[State]:
         found = (*sent("inv2", 4, 5), *sent("inv2", 6, **changes))
         return (each for each in found if since - 1e-9 <= each.t <= until + 1e-9)
 

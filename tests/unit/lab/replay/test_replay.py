@@ -60,7 +60,7 @@ def test_a_replay_compares_everything(record: RunRecord) -> None:
     assert list(parts) == ["plant", "inv1", "inv2", "inv3"]
     assert [len(parts[name]) for name in parts] == [1, 1, 2, 1]
     for name in ("inv1", "inv2", "inv3"):
-        states = list(record.messages(sender=name, kind="State"))
+        states = list(record.messages(State, name))
         lost = len(states) - sum(part.count for part in parts[name])
         assert 0 < lost < 10 if name == "inv2" else lost == 0
         assert parts[name][-1].t_end == pytest.approx(states[-1].t)

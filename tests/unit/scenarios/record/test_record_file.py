@@ -17,6 +17,7 @@ from gridpeers.scenarios.record.message_index import MessageIndex
 from gridpeers.scenarios.record.record_file import RecordFile, RecordFileError
 from gridpeers.scenarios.record.record_info import FILE, FORMAT, METADATA, PROFILE
 from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.wire.messages import Message
 from tests.record.recorded_runs import recorded_in_chunks, recorded_run
 
 CALM = '[time]\nend_s = 2.0\n[case.calm]\nsecondary = "all"\ngraph = "ring"\n'
@@ -31,7 +32,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def read_all(path: Path) -> tuple[RunRecord, int]:
     """Read everything there is in a record; return it with the number of its messages."""
     record = RunRecord.open(path)
-    count = sum(1 for _ in record.messages())
+    count = sum(1 for _ in record.messages(Message))
     for agent in record.agents:
         count += sum(1 for _ in record.decisions(agent))
     record.events()
@@ -189,7 +190,7 @@ def test_physics_alone_have_no_decisions(tmp_path: Path) -> None:
     record = recorded_run(tmp_path / "calm.toml", "calm", tmp_path / "calm", level="physics")
 
     assert record.physics().t[-1] == 2.0
-    assert list(record.messages()) == []
+    assert list(record.messages(Message)) == []
     with pytest.raises(RecordFileError, match='record = "physics"'):
         record.decision("inv1", 0.5)
 
