@@ -23,6 +23,15 @@ from gridpeers.wire.driver.ending import OutputLostError as OutputLostError
 
 
 @contextmanager
+def files_written(place: Path) -> Iterator[None]:
+    """Write files within this; FolderError says which could not be written: `place` if the system does not say."""
+    try:
+        yield
+    except OSError as error:
+        raise FolderError(refusal(place, error)) from error
+
+
+@contextmanager
 def whole_folder(folder: Path) -> Iterator[None]:
     """Fill a folder, new or empty, within this; whatever ends it early leaves the folder as it was.
 

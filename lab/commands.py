@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gridpeers.cli.usage import (
-    BAD_INPUT,
     BROKEN,
     CLAIM_FAILED,
     ScenarioName,
@@ -21,7 +20,6 @@ from gridpeers.cli.usage import (
     flag,
     load,
     option,
-    refuse,
     require,
     terminal,
 )
@@ -54,16 +52,13 @@ def predict(
 
     from gridpeers.lab.predict.prediction import predictions
     from gridpeers.scenarios.run_request import BrokenRunError
-    from gridpeers.scenarios.schema import ScenarioError
 
     if not feeder.inverters:
-        fail([f"{scenario}: the feeder {feeder.name} has no inverters, so there is nothing to control"], BAD_INPUT)
+        fail(f"{scenario}: the feeder {feeder.name} has no inverters, so there is nothing to control")
     try:
         predicted = predictions(spec, feeder, voltage=vars_)
-    except ScenarioError as error:
-        refuse(error)
     except BrokenRunError as error:
-        fail([str(error)], BROKEN)
+        fail(str(error), code=BROKEN)
     typer.echo("\n\n".join(map(str, predicted.values())))
 
 
@@ -84,16 +79,11 @@ def why(
 
     from gridpeers.lab.explanation.explanation import explain
     from gridpeers.lab.explanation.explanation_text import show
-    from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
+    from gridpeers.scenarios.record.record_reader import RunRecord
 
     if not isfinite(t):
-        fail([f"TIME {t}: needs a run time in s, as 4.3"], BAD_INPUT)
-    try:
-        record = RunRecord.open(run, case)
-        explanation = explain(record, agent, t)
-    except RecordFileError as error:
-        fail([str(error)], BAD_INPUT)
-    show(explanation, terminal())
+        fail(f"TIME {t}: needs a run time in s, as 4.3")
+    show(explain(RunRecord.open(run, case), agent, t), terminal())
 
 
 def _tell_notes(notes: Iterable[str]) -> None:
@@ -120,17 +110,13 @@ def trace(
     require({"perfetto": "a Perfetto trace"}, "install it: pip install 'gridpeers[trace]'")
 
     from gridpeers.lab.trace import write_perfetto_trace
-    from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
-    from gridpeers.scenarios.results.run_files import refusal, shown
+    from gridpeers.output_folders import files_written, shown
+    from gridpeers.scenarios.record.record_reader import RunRecord
 
-    try:
-        record = RunRecord.open(run, case)
-        target = out or record.path.with_name("trace.pftrace")
+    record = RunRecord.open(run, case)
+    target = out or record.path.with_name("trace.pftrace")
+    with files_written(target):
         arrows = write_perfetto_trace(record, target)
-    except RecordFileError as error:
-        fail([str(error)], BAD_INPUT)
-    except OSError as error:
-        fail([refusal(target, error)], BAD_INPUT)
     _tell_notes(record.damage)
     typer.echo(f"{shown(target)}: {arrows} messages")
 
@@ -168,26 +154,18 @@ def replay(
 
     from gridpeers.cli.usage import ended_by_signals
     from gridpeers.lab.replay.changes import Changes
-    from gridpeers.lab.replay.recorded_process import ReplayError
-    from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
-    from gridpeers.scenarios.results.run_files import FolderError, refusal
+    from gridpeers.output_folders import files_written
+    from gridpeers.scenarios.record.record_reader import RunRecord
 
-    with ended_by_signals("nothing was written"):
-        try:
-            record = RunRecord.open(run, case)
-            changes = Changes(
-                without=tuple(without or ()),
-                law=law,
-                keys=dict(map(_key_and_value, values or ())),
-                since=since,
-            )
-            differs = _counterfactual(record, changes, out) if changes else _replay(record, since, out)
-        except ReplayError as error:
-            fail(list(error.problems), BAD_INPUT)
-        except (RecordFileError, FolderError) as error:
-            fail([str(error)], BAD_INPUT)
-        except OSError as error:
-            fail([refusal(out or Path("runs"), error)], BAD_INPUT)
+    with ended_by_signals("nothing was written"), files_written(out or Path("runs")):
+        record = RunRecord.open(run, case)
+        changes = Changes(
+            without=tuple(without or ()),
+            law=law,
+            keys=dict(map(_key_and_value, values or ())),
+            since=since,
+        )
+        differs = _counterfactual(record, changes, out) if changes else _replay(record, since, out)
     _tell_notes(record.damage)
     if differs:
         raise SystemExit(CLAIM_FAILED)
@@ -197,7 +175,7 @@ def _key_and_value(text: str) -> tuple[str, Any]:
     """Read a key and its value, which is as in a scenario file; what is no value there is a text."""
     key, equals, value = text.partition("=")
     if not equals or not key.strip():
-        fail([f"--set {text}: needs a key and its value, as gains.k_p=0.001"], BAD_INPUT)
+        fail(f"--set {text}: needs a key and its value, as gains.k_p=0.001")
     try:
         return key.strip(), tomllib.loads(f"value = {value}")["value"]
     except ValueError:
@@ -206,10 +184,10 @@ def _key_and_value(text: str) -> tuple[str, Any]:
 
 def _replay(record: RunRecord, since: float, out: Path | None) -> bool:
     if since:
-        fail([f"--from {since:g}: nothing is changed from then on; give {CHANGES}"], BAD_INPUT)
+        fail(f"--from {since:g}: nothing is changed from then on; give {CHANGES}")
     if out is not None:
         text = f"a replay without a change writes no folder; leave it out, or give {CHANGES}"
-        fail([f"--out {out}: {text}"], BAD_INPUT)
+        fail(f"--out {out}: {text}")
 
     from gridpeers.cli.progress import explained
     from gridpeers.lab.replay.replay import replay as replay_record
@@ -224,7 +202,7 @@ def _replay(record: RunRecord, since: float, out: Path | None) -> bool:
         typer.echo(f"  {part.name:<8}{part.count:>7} {of} up to {part.t_end:.2f} s: {verdict}")
     if done.difference is None and not any(part.count for part in done.parts):
         _tell_notes(done.notes)
-        fail(["the record ends before anything that a replay could be compared with"], BAD_INPUT)
+        fail("the record ends before anything that a replay could be compared with")
     if done.difference is None:
         same = "The replay gives what was recorded, within 1e-9"
         partly = bool(done.notes or record.damage)  # the command prints the damage after these notes

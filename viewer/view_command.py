@@ -10,8 +10,8 @@ from urllib.parse import quote
 
 import typer
 
-from gridpeers.cli.commands.options import LiveRun, of_live_run, usage_errors
-from gridpeers.cli.usage import BAD_INPUT, INTERRUPTED, TERMINATED, fail, require
+from gridpeers.cli.commands.options import LiveRun, of_live_run
+from gridpeers.cli.usage import INTERRUPTED, TERMINATED, fail, require
 from gridpeers.scenarios.live.run_address import RUN
 from gridpeers.wire.driver.ending import watch_readers
 
@@ -59,11 +59,11 @@ def view(
     require(modules, "install it: pip install 'gridpeers[view]'")
     if record is None:
         if case:
-            fail(["--case: goes with a RECORD; a live run has one case"], BAD_INPUT)
+            fail("--case: goes with a RECORD; a live run has one case")
         _serve(lambda: _live(live, control=control), address, port, token)
     if control or live.connect or live.keys or live.run != RUN:
         option = "--control" if control else "--connect" if live.connect else "--keys" if live.keys else "--run"
-        fail([f"{option}: goes with a live run; nothing can be done to a record"], BAD_INPUT)
+        fail(f"{option}: goes with a live run; nothing can be done to a record")
     _serve(lambda: _recorded(record, case), address, port, token)
 
 
@@ -85,25 +85,20 @@ def _live(live: LiveRun, *, control: bool) -> Iterator[tuple[Pages, Line]]:
 def _recorded(path: Path, case: str) -> Iterator[tuple[Pages, Line]]:
     require({"mcap": "the record of a run"})
     from gridpeers.scenarios.record.record_file import record_path
-    from gridpeers.scenarios.record.record_reader import RecordFileError
     from gridpeers.viewer.record_pages import RecordedRun, RecordPages
 
-    try:
-        path = record_path(path, case).parent if case else path
-        recorded = RecordedRun(path)
-    except RecordFileError as error:
-        fail([str(error)], BAD_INPUT)
+    path = record_path(path, case).parent if case else path
+    recorded = RecordedRun(path)
     yield RecordPages(recorded), lambda url: f"record {path}: open {url} in a browser; Ctrl-C ends the page"
 
 
 def _serve(
     pages: Callable[[], AbstractContextManager[tuple[Pages, Line]]], address: str, port: int, token: str
 ) -> NoReturn:
-    with usage_errors():
-        from gridpeers.viewer.page_server import access, listen, url_of
+    from gridpeers.viewer.page_server import access, listen, url_of
 
-        token, hosts = access(address, token)
-        listening = listen(address, port)  # first: a port in use is told at once
+    token, hosts = access(address, token)
+    listening = listen(address, port)  # first: a port in use is told at once
     with listening, pages() as (shown, line):
         from gridpeers.viewer.page_server import PageServer
         from gridpeers.wire.driver.drive import StoppedError
@@ -116,4 +111,4 @@ def _serve(
         except (KeyboardInterrupt, StoppedError) as stop:
             signal = str(stop) or "SIGINT"
         finished = f"{signal}: the page has ended"
-    fail([finished], TERMINATED if signal == "SIGTERM" else INTERRUPTED)
+    fail(finished, code=TERMINATED if signal == "SIGTERM" else INTERRUPTED)

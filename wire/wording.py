@@ -16,6 +16,10 @@ UNPRINTABLE = (
 _UNPRINTABLE = re.compile(f"[{UNPRINTABLE}\ud800-\udfff]")
 
 
+class InputError(ValueError):
+    """Something that a person gave cannot be used; the message says why. It ends a command with exit code 2."""
+
+
 def printable(text: str, limit: int = 4000) -> str:
     r"""Return a text with its unprintable characters spelt out, as \x0a, cut to a length.
 

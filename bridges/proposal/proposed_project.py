@@ -11,7 +11,7 @@ import typer
 from gridpeers.bridges.proposal.feeder_proposal import NoProposalError, NoSwitchError, Proposal, propose
 from gridpeers.cli.commands.feeder_commands import folder_of, read_script, save_readable
 from gridpeers.cli.progress import TRYING, explained
-from gridpeers.cli.usage import BAD_INPUT, fail
+from gridpeers.cli.usage import fail
 from gridpeers.feeder import Feeder
 from gridpeers.plant.equipment.neutrals import returns_in_words
 from gridpeers.scenarios.schema import load_scenario
@@ -75,7 +75,7 @@ def propose_project(folder: Path, script: Path, switches: list[str], leave_out: 
             feeder = read_script(str(script), [*switches, line], leave_out)
             proposal = propose(feeder)
     except NoProposalError as error:
-        fail([f"{script}: {error}"], BAD_INPUT)
+        fail(f"{script}: {error}")
     with_inverters = msgspec.structs.replace(feeder, inverters=proposal.inverters)
     save_readable(with_inverters, folder / folder_of(feeder.name), script.name)
     with explained(lambda: typer.echo(TRYING)):

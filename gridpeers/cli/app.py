@@ -49,9 +49,9 @@ def _main() -> None:
         try:
             app()
         except KeyboardInterrupt:
-            fail(["interrupted; everything that was started has ended"], INTERRUPTED)
+            fail("interrupted; everything that was started has ended", code=INTERRUPTED)
         except OSError as error:  # the machine refuses something: no memory for a process, no room on a disk
-            fail([too_few_files(error) or str(error)], BROKEN)
+            fail(too_few_files(error) or str(error), code=BROKEN)
 
 
 def _start_ahead(words: list[str]) -> None:

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from gridpeers.cli.suggestions import Commands
-from gridpeers.cli.usage import BAD_INPUT, fail
+from gridpeers.cli.usage import fail
 from gridpeers.wire.plugins.registry import PluginError, Registry
 
 _PAPER = "gridpeers.papers.singhal2022"
@@ -100,7 +100,7 @@ class LazyCommands(Commands):
 def _broken(why: str) -> Callable[..., None]:
     def command() -> None:
         """Cannot be imported."""
-        fail([why], BAD_INPUT)
+        fail(why)
 
     return command
 

@@ -1,4 +1,4 @@
-"""Errors of the command line in one line each; typer prints three."""
+"""How a command ends that was typed wrong, or given what cannot be used: with a line for each problem."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from typing import Any
 from typer import BadParameter
 from typer.core import TyperGroup
 
-from gridpeers.cli.usage import BAD_INPUT, fail
+from gridpeers.cli.usage import fail, refuse
 from gridpeers.wire.driver.command_line import command_line
-from gridpeers.wire.wording import suggestion
+from gridpeers.wire.wording import InputError, suggestion
 
 _UsageError: type[BaseException] = BadParameter.__mro__[1]
 """Base of all problems on a command line; releases of typer keep it in different modules."""
 
 
 class Commands(TyperGroup):
-    """Commands that report mistyped words in one line."""
+    """Commands that report mistyped words in one line, where typer prints three."""
 
     def make_context(self, *words: Any, **extra: Any) -> Any:  # noqa: D102
         with _in_one_line():
@@ -30,7 +30,7 @@ class Commands(TyperGroup):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # noqa: D102
         if not args[0].startswith("-") and self.get_command(ctx, args[0]) is None:
-            fail([f'no command "{args[0]}"; {suggestion(args[0], self.list_commands(ctx), "commands")}'], BAD_INPUT)
+            fail(f'no command "{args[0]}"; {suggestion(args[0], self.list_commands(ctx), "commands")}')
         return super().resolve_command(ctx, args)
 
 
@@ -41,7 +41,9 @@ def _in_one_line() -> Iterator[None]:
     except _UsageError as error:
         if type(error).__name__ == "NoArgsIsHelpError":  # the help is all that it says
             raise
-        fail([_line(error)], BAD_INPUT)
+        fail(_line(error))
+    except InputError as error:
+        refuse(error)
 
 
 def _line(error: Any) -> str:

@@ -16,12 +16,11 @@ import typer
 from gridpeers.scenarios.console import terminal as terminal
 from gridpeers.wire.driver.command_line import command_line
 from gridpeers.wire.driver.ending import StopSignal
-from gridpeers.wire.wording import DISTRIBUTIONS, damaged, printable, requirement, suggestion
+from gridpeers.wire.wording import DISTRIBUTIONS, InputError, damaged, printable, requirement, suggestion
 
 if TYPE_CHECKING:
     from gridpeers.plant.equipment import Tables
-    from gridpeers.plant.tables import FeederError
-    from gridpeers.scenarios.schema import ScenarioError, ScenarioModel
+    from gridpeers.scenarios.schema import ScenarioModel
 
 
 def option(metavar: str, help: str, *names: str, **more: Any) -> Any:
@@ -51,34 +50,30 @@ OPTIONS = {
 
 
 def load(name: str, changes: Mapping[str, Any] | None = None) -> tuple[ScenarioModel, Tables]:
-    """Return a checked scenario, with keys changed by the command line, and its feeder; or end with every problem."""
+    """Return a checked scenario, with keys changed by the command line, and its feeder."""
     from gridpeers.scenario import load as load_face
-    from gridpeers.scenarios.schema import ScenarioError
 
     if not name:
-        fail([f"no scenario was named; `{command_line('list')}` shows those of the catalogue"], BAD_INPUT)
-    try:
-        scenario = load_face(name)
-        if changes:
-            scenario = scenario.replace(changes)
-    except ScenarioError as error:
-        refuse(error)
+        fail(f"no scenario was named; `{command_line('list')}` shows those of the catalogue")
+    scenario = load_face(name)
+    if changes:
+        scenario = scenario.replace(changes)
     return scenario.spec, scenario.feeder
 
 
-def refuse(error: ScenarioError | FeederError) -> NoReturn:
-    """End with every problem in a file, or of an option that changes a key of it."""
-    problems = list(error.problems)
+def refuse(error: InputError) -> NoReturn:
+    """End with every problem of a file, or of an option that changes a key of it."""
+    problems = list(getattr(error, "problems", ())) or str(error).splitlines()
     for key, option in OPTIONS.items():
         problems = [re.sub(rf"^replace: {re.escape(key)}:", f"{option}:", problem) for problem in problems]
     head = [] if len(problems) == 1 else [f"{len(problems)} problems:"]
-    fail([*head, *problems], BAD_INPUT)
+    fail(*head, *problems)
 
 
 def check_choice(option: str, kind: str, value: str, known: Collection[str]) -> None:
     """End with the nearest word if a value is none of those that an option takes."""
     if value not in known:
-        fail([f'{option}no {kind} "{value}"; {suggestion(value, tuple(known), f"{kind}s")}'], BAD_INPUT)
+        fail(f'{option}no {kind} "{value}"; {suggestion(value, tuple(known), f"{kind}s")}')
 
 
 def chosen(spec: ScenarioModel, case: str | None, seed: int | None) -> ScenarioModel:
@@ -86,13 +81,9 @@ def chosen(spec: ScenarioModel, case: str | None, seed: int | None) -> ScenarioM
     from msgspec.structs import replace
 
     from gridpeers.runs.choices import with_cases
-    from gridpeers.scenarios.schema import ScenarioError
 
     names = None if case is None else [name.strip() for name in case.split(",") if name.strip()] or [case]
-    try:
-        spec = with_cases(spec, names, option="--case: ")
-    except ScenarioError as error:
-        refuse(error)
+    spec = with_cases(spec, names, option="--case: ")
     return spec if seed is None else replace(spec, seed=seed)
 
 
@@ -107,7 +98,7 @@ def require(modules: Mapping[str, str], install: str = "") -> None:
             f"{DISTRIBUTIONS.get(name, name)} is not installed; it is needed for {modules[name]}" for name in lacking
         ]
         again = f"install what is missing: pip install {' '.join(map(requirement, lacking))}"
-        fail([*lines, install or again], BAD_INPUT)
+        fail(*lines, install or again)
 
 
 def require_loadable(module: str, user: str) -> None:
@@ -116,10 +107,10 @@ def require_loadable(module: str, user: str) -> None:
     done = subprocess.run([sys.executable, "-P", "-c", f"import {module}"], capture_output=True, text=True, check=False)
     if done.returncode:
         reason = done.stderr.strip().rpartition("\n")[2] or f"exit status {done.returncode}"
-        fail([damaged(module, reason, user)], BAD_INPUT)
+        fail(damaged(module, reason, user))
 
 
-def fail(lines: list[str], code: int) -> NoReturn:
+def fail(*lines: str, code: int = BAD_INPUT) -> NoReturn:
     """End the command with lines on standard error; characters that cannot be printed are escaped."""
     for line in lines:
         print("gridpeers: " + "\n".join(map(printable, line.split("\n"))), file=sys.stderr)
@@ -161,4 +152,4 @@ def ended_by_signals(left: str) -> Iterator[None]:
         with interruptible():
             yield
     except KeyboardInterrupt as error:
-        fail([f"interrupted; {left}"], exit_code(error))
+        fail(f"interrupted; {left}", code=exit_code(error))

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from gridpeers.cli.usage import (
-    BAD_INPUT,
     BROKEN,
     CLAIM_FAILED,
     PASSED,
@@ -57,11 +56,11 @@ def chaos(
     spec, feeder = load(scenario)
     spec = chosen(spec, case or list(spec.cases)[-1], None)
     if len(spec.cases) > 1:
-        fail([f"--case: takes one case, got {case}"], BAD_INPUT)
+        fail(f"--case: takes one case, got {case}")
     if (simulator := spec.plant.simulator) != "gridpeers":
-        fail([f'{scenario}: plant.simulator = "{simulator}" lets nobody leave or join; use "gridpeers"'], BAD_INPUT)
+        fail(f'{scenario}: plant.simulator = "{simulator}" lets nobody leave or join; use "gridpeers"')
     if spec.security == "mtls" and driver == "processes":
-        fail([f'{scenario}: security = "mtls" needs certificates, which chaos does not take; leave it out'], BAD_INPUT)
+        fail(f'{scenario}: security = "mtls" needs certificates, which chaos does not take; leave it out')
     require(_PACKAGES, "install what chaos needs: pip install 'gridpeers[chaos]'")
     from datetime import datetime
 
@@ -69,7 +68,6 @@ def chaos(
     from gridpeers.lab.chaos.campaign import Campaign
     from gridpeers.lab.chaos.disturbed_scenario import ChaosBase
     from gridpeers.scenarios.results.run_files import (
-        FolderError,
         broken_if_ended,
         new_folder,
         require_folder,
@@ -80,27 +78,24 @@ def chaos(
     from gridpeers.wire.driver.command_line import command_line
 
     name, console = f"{spec.name}-chaos", terminal()
-    try:
-        campaign = Campaign(
-            base=ChaosBase(spec, feeder),
-            seed=seed,
-            runs=runs,
-            driver=driver,
-            jobs=jobs or cores(),
-        )
-        words = ["--case", campaign.base.case, "--runs", str(runs), "--seed", str(seed), "--driver", driver]
-        campaign.command = command_line("chaos", scenario, *words)
-        with _told_if_ended(campaign):
-            require_folder(out, name)
-            _try_undisturbed(console, campaign)
-            # the folder is made only once the scenario has passed without disturbances
-            path = campaign.path = new_folder(out, name, datetime.now().astimezone())
-            set_status(path, "running")
-            with broken_if_ended(path):
-                campaign.begin()
-            campaign.run(partial(remaining, console))
-    except FolderError as error:
-        fail([str(error)], BAD_INPUT)
+    campaign = Campaign(
+        base=ChaosBase(spec, feeder),
+        seed=seed,
+        runs=runs,
+        driver=driver,
+        jobs=jobs or cores(),
+    )
+    words = ["--case", campaign.base.case, "--runs", str(runs), "--seed", str(seed), "--driver", driver]
+    campaign.command = command_line("chaos", scenario, *words)
+    with _told_if_ended(campaign):
+        require_folder(out, name)
+        _try_undisturbed(console, campaign)
+        # the folder is made only once the scenario has passed without disturbances
+        path = campaign.path = new_folder(out, name, datetime.now().astimezone())
+        set_status(path, "running")
+        with broken_if_ended(path):
+            campaign.begin()
+        campaign.run(partial(remaining, console))
     for line in campaign.lines():
         typer.echo(line)
     typer.echo(f"\nResults: {shown(path)}/")
@@ -123,7 +118,7 @@ def _try_undisturbed(console: Console, campaign: Campaign) -> None:
         entry = f": checks = [{off}] at its top" if off else ""
         advice = f"choose another case (--case), or switch these checks off in the scenario{entry} (docs/checks.md)"
         lines = [f"{name}: violated without any disturbance: {text}" for text in row.violated.values()]
-        fail([*lines, advice], BAD_INPUT)
+        fail(*lines, advice)
     how = "each with processes and again in one" if campaign.driver == "processes" else f"{campaign.jobs} at a time"
     typer.echo(f"{name}: it violates nothing; next {counted(campaign.runs, 'run')} with disturbances, {how} ...")
 
@@ -148,7 +143,7 @@ def _told_if_ended(campaign: Campaign) -> Iterator[None]:
             where = f"in {shown(path)}/"
         left = f"{kept} of {campaign.runs} runs are kept {where}"
         if isinstance(error, KeyboardInterrupt):
-            fail([f"interrupted; {left}"], exit_code(error))
+            fail(f"interrupted; {left}", code=exit_code(error))
         if isinstance(error, OSError) and path:
-            fail([refusal(path, error), left], BROKEN)
-        fail([str(machine_error(error) or error), left], BROKEN)
+            fail(refusal(path, error), left, code=BROKEN)
+        fail(str(machine_error(error) or error), left, code=BROKEN)

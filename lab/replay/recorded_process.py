@@ -39,6 +39,7 @@ from gridpeers.wire.journal import (
 from gridpeers.wire.links import Links
 from gridpeers.wire.messages import PLANT, Journal, Measurement, State
 from gridpeers.wire.node import Loss
+from gridpeers.wire.wording import InputError
 
 CALLS = ("start", "session", "leave")
 """Kinds of process events that are calls of the node; the others say what it did."""
@@ -46,7 +47,7 @@ CALLS = ("start", "session", "leave")
 Input = Token | MessageReference | ReceivedMessage | RejectedCount | WakeUp | ProcessEvent
 
 
-class ReplayError(ValueError):
+class ReplayError(InputError):
     """A record that cannot be replayed, or a change that cannot be made to it; each problem is one sentence."""
 
     def __init__(self, *problems: str) -> None:

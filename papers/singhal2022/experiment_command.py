@@ -12,7 +12,6 @@ import gridpeers as gp
 from gridpeers.cli.commands.sweep_command import failure_lines, finish, read
 from gridpeers.cli.progress import progress
 from gridpeers.cli.usage import (
-    BAD_INPUT,
     BROKEN,
     CLAIM_FAILED,
     argument,
@@ -57,7 +56,7 @@ def experiment(
     try:
         files = result.write(folder)
     except OSError as error:
-        fail([refusal(folder, error)], BROKEN)
+        fail(refusal(folder, error), code=BROKEN)
     for path in files:
         typer.echo(shown(path))
 
@@ -71,9 +70,9 @@ def _from_sweep(source: Experiment, folder: Path, jobs: int | None, again: Seque
     plan = read(source.sweep)
     summary = finish(source.sweep, plan, folder, jobs, again)
     if summary.law_failed:
-        fail(failure_lines(summary), CLAIM_FAILED)
+        fail(*failure_lines(summary), code=CLAIM_FAILED)
     if summary.broke:
-        fail([f"{count} runs broke: {why}" for why, count in summary.broke.items()], BROKEN)
+        fail(*[f"{count} runs broke: {why}" for why, count in summary.broke.items()], code=BROKEN)
     rows = pd.read_csv(summary.table, float_precision="round_trip")
     return source.make(SweepData(rows=rows, base=plan.base, window=plan.base.events[0].label))
 
@@ -86,11 +85,9 @@ def _from_scenario(source: Experiment, folder: Path) -> ExperimentResult:
     try:
         with ended_by_signals(left), progress(terminal(), tuple(scenario.cases)) as tell:
             run = scenario.run(progress=tell, folder=folder)
-    except gp.FolderError as error:
-        fail([str(error)], BAD_INPUT)
     except gp.BrokenRunError as error:
-        fail([f"the run broke: {error}"], BROKEN)
+        fail(f"the run broke: {error}", code=BROKEN)
     if len(run.failures):
-        fail([f"FAILED  {why}" for why in run.failures["why"]], CLAIM_FAILED)
+        fail(*[f"FAILED  {why}" for why in run.failures["why"]], code=CLAIM_FAILED)
     histories = {case: result.record for case, result in run.items()}
     return source.make(CaseData(scenario=scenario.spec, feeder=scenario.feeder, histories=histories))

@@ -16,7 +16,7 @@ from gridpeers.plant.tables.feeder_columns import LOAD_SETS, TABLES, LoadColumns
 from gridpeers.plant.tables.parameter_sets import read_parameter_sets
 from gridpeers.wire.schema.table_reading import read_table
 from gridpeers.wire.text_file import TextFileError, text_of
-from gridpeers.wire.wording import first_of, suggestion
+from gridpeers.wire.wording import InputError, first_of, suggestion
 
 MANIFEST = "feeder.toml"
 DATA = Path(__file__).parents[1] / "data"  # folder of the feeders that come with the package
@@ -24,7 +24,7 @@ KEPT = 8  # feeders that are kept as they were read, by the bytes of their files
 _SHOWN = 24  # so many buses that are cut off are named
 
 
-class FeederError(ValueError):
+class FeederError(InputError):
     """A feeder that cannot be used, with everything that is wrong with it.
 
     `problems`: one sentence each: file, row (the header is row 1), value, what would be right.

@@ -9,6 +9,7 @@ import socket
 from typing import NamedTuple
 
 from gridpeers.wire.driver.command_line import command_line
+from gridpeers.wire.wording import InputError
 
 _FORM = re.compile(
     r"(?P<protocol>[a-z]+)/(?P<host>\[[0-9A-Fa-f:.%a-z]+\]|[^\s:/\[\]]+):(?P<port>[0-9]{1,5})(?P<rest>[?#]\S*)?"
@@ -19,7 +20,7 @@ _OWN = range(20_000, 32_000)
 to the agents, which start with the plant: for listening, or as the near end of a call to the plant."""
 
 
-class ListenError(ValueError):
+class ListenError(InputError):
     """Nobody can listen at an endpoint; the message gives the reason and the ways out."""
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from gridpeers.scenarios.drivers.free_endpoint import parse_endpoint
 from gridpeers.wire.keys import check_name as check_key_part
 from gridpeers.wire.trust.credentials import Credentials
+from gridpeers.wire.wording import InputError
 
 RUN = "gridpeers"
 
@@ -28,7 +29,7 @@ PROBE = 1.0
 _PROTOCOLS = ("tcp", "tls", "quic", "udp")
 
 
-class UsageError(ValueError):
+class UsageError(InputError):
     """An option or argument cannot be used; the message says what would be right."""
 
 

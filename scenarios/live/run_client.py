@@ -14,6 +14,7 @@ from gridpeers.wire.driver.session import Session
 from gridpeers.wire.keys import ANY_ALIVE_PLANT, Keys
 from gridpeers.wire.messages import PLANT, AgentStatus, Answer, AnyMessage, LinkAcknowledgement, Telemetry
 from gridpeers.wire.trust.key_folder import tls_refusal
+from gridpeers.wire.wording import InputError
 
 REMINDER = 2.0
 """Time (s) after which a wait is reported again, then after twice as long, and so on."""
@@ -21,7 +22,7 @@ REMINDER = 2.0
 FIRST_LOOK, RENEWAL = 1.0, 2.0  # Time (s) until the session is checked first, and between two checks
 
 
-class NobodyError(ValueError):
+class NobodyError(InputError):
     """A run, plant or inverter is not there; the message says where the search was, how long, and what to do."""
 
 

@@ -22,7 +22,7 @@ from gridpeers.wire.codec import decode_foreign, encode
 from gridpeers.wire.driver.command_line import command_line
 from gridpeers.wire.messages import MOST_COUNT, PLANT, Answer, Command, LinkAcknowledgement, LoadSetting
 from gridpeers.wire.schema.table_schema import Problem, Range
-from gridpeers.wire.wording import printable
+from gridpeers.wire.wording import InputError, printable
 
 T = TypeVar("T")
 
@@ -41,7 +41,7 @@ LEAVING = 10.0
 """Longest wait (s) for processes that were asked to leave."""
 
 
-class RefusedError(ValueError):
+class RefusedError(InputError):
     """The plant has refused a command; the message is the plant's."""
 
 

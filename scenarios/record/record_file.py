@@ -23,7 +23,7 @@ from mcap.stream_reader import breakup_chunk
 
 from gridpeers.scenarios.record.record_info import FILE, FORMAT, METADATA, PROFILE, RecordInfo, Topic
 from gridpeers.wire.codec import decode_foreign
-from gridpeers.wire.wording import suggestion
+from gridpeers.wire.wording import InputError, suggestion
 
 _MAGIC = bytes((137, 77, 67, 65, 80, 48, 13, 10))
 _FRAME = struct.Struct("<BQ")
@@ -37,7 +37,7 @@ _BROKEN = (
 """What the MCAP library and its decompressors raise over bytes that are none of theirs."""
 
 
-class RecordFileError(ValueError):
+class RecordFileError(InputError):
     """A record that cannot be read, or does not have what was asked for; one sentence says why and what to do."""
 
 

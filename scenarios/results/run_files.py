@@ -19,6 +19,7 @@ import msgspec
 
 from gridpeers.wire.codec import decode_foreign
 from gridpeers.wire.driver.ending import OutputLostError
+from gridpeers.wire.wording import InputError
 
 RUNS = Path("runs")  # Parent of the run folders that the user does not name, seen from the working directory
 STATUS = "status.txt"  # File that says how far a folder's run is
@@ -29,7 +30,7 @@ _GONE = (errno.ENOENT, errno.ENOTDIR, errno.ESTALE, errno.EACCES, errno.EPERM)  
 _NOT_EMPTY = "the folder is not empty; give a new or an empty one"
 
 
-class FolderError(ValueError):
+class FolderError(InputError):
     """The output folder cannot be used."""
 
 

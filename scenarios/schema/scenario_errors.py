@@ -10,7 +10,7 @@ import msgspec
 
 from gridpeers.wire.schema.table_reading import read_table
 from gridpeers.wire.schema.table_schema import MultipleOf, Problem
-from gridpeers.wire.wording import printable, suggestion
+from gridpeers.wire.wording import InputError, printable, suggestion
 
 T = TypeVar("T", bound=msgspec.Struct)
 
@@ -19,7 +19,7 @@ _ENTRY = re.compile(r"^\s*\[\[\s*([^\[\]]+?)\s*\]\]\s*(#.*)?$")
 _KEY = re.compile(r"""^\s*([A-Za-z0-9_\-."'\[\] ]+?)\s*=""")
 
 
-class ScenarioError(ValueError):
+class ScenarioError(InputError):
     """A scenario that cannot be run; `problems` has a sentence each: file, line, key, value and what would be right."""
 
     def __init__(self, problems: Iterable[str]) -> None:

@@ -25,6 +25,7 @@ from gridpeers.wire.driver.ending import leave, stop_at_signals, watch_readers
 from gridpeers.wire.driver.machine import raise_limit
 from gridpeers.wire.driver.session import SessionError
 from gridpeers.wire.links import Links
+from gridpeers.wire.wording import InputError
 
 OK, BAD_CONFIG, BROKE = 0, 2, 3
 
@@ -55,7 +56,7 @@ def new_epoch() -> int:
 C = TypeVar("C")
 
 
-class ConfigurationError(ValueError):
+class ConfigurationError(InputError):
     """A configuration that cannot work; the message says what would be right."""
 
 

@@ -29,7 +29,7 @@ from gridpeers.wire.driver.zenoh_settings import (
 )
 from gridpeers.wire.keys import LATEST_ONLY, is_token
 from gridpeers.wire.trust.credentials import Credentials, LinkCertificates
-from gridpeers.wire.wording import not_importable
+from gridpeers.wire.wording import InputError, not_importable
 
 if TYPE_CHECKING:
     import zenoh
@@ -70,7 +70,7 @@ def do_not_linger() -> None:
                         same.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 0, 0))
 
 
-class SessionError(ValueError):
+class SessionError(InputError):
     """Zenoh could not open a session; the message says why and what to do."""
 
 

@@ -17,7 +17,7 @@ from traceback import walk_tb
 from types import ModuleType
 from typing import Any, Generic, TypeVar
 
-from gridpeers.wire.wording import is_no_path, printable, suggestion
+from gridpeers.wire.wording import InputError, is_no_path, printable, suggestion
 
 T = TypeVar("T")
 
@@ -60,7 +60,7 @@ def line_of(function: Callable[..., Any], error: BaseException, folder: str = ""
     return f" ({printable(file.removeprefix(f'{folder or home}/'), LONGEST_NAME)}:{line})"
 
 
-class PluginError(ValueError):
+class PluginError(InputError):
     """A reference that leads to nothing usable; its text says why and what to write."""
 
 

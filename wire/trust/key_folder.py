@@ -25,7 +25,7 @@ from gridpeers.wire.codec import decode_foreign
 from gridpeers.wire.keys import Role
 from gridpeers.wire.messages import is_name
 from gridpeers.wire.trust.credentials import DATE_AND_TIME, Credentials, SiteMember
-from gridpeers.wire.wording import printable
+from gridpeers.wire.wording import InputError, printable
 
 if TYPE_CHECKING:
     from cryptography import x509
@@ -40,7 +40,7 @@ SOON = timedelta(days=30)
 """A certificate ends soon if it ends within this time."""
 
 
-class KeysError(ValueError):
+class KeysError(InputError):
     """Certificates or keys cannot be used; the message says which, why, and what to do."""
 
 

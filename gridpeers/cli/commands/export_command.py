@@ -7,7 +7,8 @@ from typing import Annotated, Literal
 
 import typer
 
-from gridpeers.cli.usage import BAD_INPUT, fail, require
+from gridpeers.cli.usage import require
+from gridpeers.output_folders import files_written, shown
 
 
 def export(
@@ -35,14 +36,13 @@ def export(
     """
     from gridpeers.runs.export import PACKAGES
     from gridpeers.runs.export import export as export_record
-    from gridpeers.scenarios.record.record_file import RecordFileError, records_in
+    from gridpeers.scenarios.record.record_file import records_in
     from gridpeers.scenarios.record.record_reader import RunRecord
-    from gridpeers.scenarios.results.run_files import FolderError, refusal, shown
 
     if to in PACKAGES:
         require({PACKAGES[to]: f"--to {to}"}, "install it: pip install 'gridpeers[export]'")
-    try:
-        files = records_in(run, case)
+    files = records_in(run, case)
+    with files_written(out or run):
         for file in files:
             record = RunRecord.open(file)
             folder = file.parent if out is None else out / file.parent.name if len(files) > 1 else out
@@ -51,7 +51,3 @@ def export(
                 typer.echo(shown(written))
             for damage in record.damage:
                 typer.echo(f"NOTE  {shown(file)}: {damage}")
-    except (RecordFileError, FolderError) as error:
-        fail([str(error)], BAD_INPUT)
-    except OSError as error:
-        fail([refusal(out or run, error)], BAD_INPUT)

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from gridpeers.cli.usage import BAD_INPUT, argument, fail, option, refuse
+from gridpeers.cli.usage import argument, fail, option
 from gridpeers.feeder import Feeder, reader_of
-from gridpeers.output_folders import FolderError, refusal, shown, whole_folder, write_whole
+from gridpeers.output_folders import files_written, shown, whole_folder, write_whole
 from gridpeers.plant.equipment.connectivity import Connectivity
 from gridpeers.plant.equipment.imported_equipment import is_behind
 from gridpeers.plant.equipment.neutrals import returns_in_words
@@ -36,21 +34,6 @@ SHOWN = 12
 """Notes that are shown."""
 
 
-@contextmanager
-def _problems_told(feeder: str, file: Path | str) -> Iterator[None]:
-    """End the command with every problem of a feeder, or with the reason why a file cannot be written."""
-    try:
-        yield
-    except FeederError as error:
-        refuse(error)
-    except FolderError as error:
-        fail([str(error)], BAD_INPUT)
-    except (ValueError, ArithmeticError) as error:
-        fail([f"{feeder}: {error}"], BAD_INPUT)
-    except OSError as error:
-        fail([refusal(Path(file), error)], BAD_INPUT)
-
-
 @app.command("import")
 def import_(
     file: Annotated[Path, argument("FILE", "Script for OpenDSS (.dss) or model for GridLAB-D (.glm).")],
@@ -64,7 +47,7 @@ def import_(
     """
     feeder = read_script(str(file), switch or [], leave_out or [])
     folder = out or Path(folder_of(feeder.name))
-    with _problems_told(feeder.name, folder), whole_folder(folder):
+    with whole_folder(folder):
         save_readable(feeder, folder, file.name)
     _describe(feeder)
     notes = [*feeder.notes[:SHOWN]]
@@ -112,9 +95,12 @@ def solve(
     Example:  gridpeers feeder solve microgrid123 --open 13-152
     """
     tables = _read(feeder, load_set, switch, leave_out)
-    with _problems_told(feeder, csv or ""):
+    try:
         table = tables.solve(open_ or ())
-        if csv is not None:
+    except (ValueError, ArithmeticError) as error:
+        fail(f"{feeder}: {error}")
+    if csv is not None:
+        with files_written(csv):
             write_whole(csv, table.to_csv(index=False))
     phases = table[table["phase"].isin(list("ABC"))]
     live = phases[phases["V"] > 0.0]
@@ -142,9 +128,8 @@ def read_script(name: str, switches: list[str], leave_out: list[str]) -> Feeder:
     read = reader_of(name)
     if read is None:
         text = "a feeder is a .dss file (OpenDSS) or a .glm file (GridLAB-D), by the end of its name"
-        fail([f"{name}: {text}"], BAD_INPUT)
-    with _problems_told(name, name):
-        return read(name, switches=switches, leave_out=leave_out)
+        fail(f"{name}: {text}")
+    return read(name, switches=switches, leave_out=leave_out)
 
 
 def save_readable(feeder: Feeder, folder: Path, script: str) -> None:
@@ -155,7 +140,7 @@ def save_readable(feeder: Feeder, folder: Path, script: str) -> None:
     except FeederError as error:
         of_script = ROOMS.resolve("of_script")
         problems = dict.fromkeys(of_script(problem, folder, script, feeder.places) for problem in error.problems)
-        refuse(FeederError(script, tuple(problems)))
+        raise FeederError(script, tuple(problems)) from None
 
 
 def folder_of(name: str) -> str:
@@ -171,14 +156,11 @@ def _read(name: str, load_set: str | None, switch: list[str] | None, leave_out: 
     """Read a feeder of tables or a script, or end with every problem in it."""
     if reader_of(name):
         if load_set is not None:
-            fail(
-                [f"--load-set is for a folder of tables; {name} has the one set of loads that it describes"], BAD_INPUT
-            )
+            fail(f"--load-set is for a folder of tables; {name} has the one set of loads that it describes")
         return read_script(name, switch or [], leave_out or [])
     if switch or leave_out:
-        fail(["--switch and --leave-out are for .dss and .glm files; a folder's tables can be edited"], BAD_INPUT)
-    with _problems_told(name, name):
-        return Feeder.read(name, load_set or "main")
+        fail("--switch and --leave-out are for .dss and .glm files; a folder's tables can be edited")
+    return Feeder.read(name, load_set or "main")
 
 
 def _describe(feeder: Feeder) -> None:

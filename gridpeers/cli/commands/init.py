@@ -10,8 +10,8 @@ from typing import Annotated
 
 import typer
 
-from gridpeers.cli.usage import BAD_INPUT, argument, fail, option
-from gridpeers.output_folders import FolderError, shown, whole_folder
+from gridpeers.cli.usage import argument, fail, option
+from gridpeers.output_folders import shown, whole_folder
 from gridpeers.rooms import ROOMS
 from gridpeers.wire.driver.command_line import command_line
 
@@ -37,21 +37,18 @@ def init(
 
     Example:  gridpeers init my-study --feeder Master.dss
     """
-    try:
-        if feeder is None:
-            if switch or leave_out:
-                fail(["--switch and --leave-out go with --feeder"], BAD_INPUT)
-            with whole_folder(folder):
-                shutil.copytree(TEMPLATE, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
-            following = command_line("run", "mine.toml", "--driver", "inprocess")
-            if find_spec("pytest"):
-                following += f" && {command_line(program='pytest')}"
-        else:
-            with whole_folder(folder):
-                ROOMS.resolve("propose_project")(folder, feeder, switch or [], leave_out or [])
-            following = command_line("run", "islanding.toml", "--driver", "inprocess")
-    except FolderError as error:
-        fail([str(error)], BAD_INPUT)
+    if feeder is None:
+        if switch or leave_out:
+            fail("--switch and --leave-out go with --feeder")
+        with whole_folder(folder):
+            shutil.copytree(TEMPLATE, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
+        following = command_line("run", "mine.toml", "--driver", "inprocess")
+        if find_spec("pytest"):
+            following += f" && {command_line(program='pytest')}"
+    else:
+        with whole_folder(folder):
+            ROOMS.resolve("propose_project")(folder, feeder, switch or [], leave_out or [])
+        following = command_line("run", "islanding.toml", "--driver", "inprocess")
     for file in sorted(path.name for path in folder.iterdir()):
         typer.echo(f"{shown(folder / file)}")
     typer.echo(f"Next:  cd {shlex.quote(str(folder))} && {following}")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated
@@ -11,7 +9,7 @@ from typing import Annotated
 import typer
 
 from gridpeers.cli.suggestions import Commands
-from gridpeers.cli.usage import BAD_INPUT, argument, fail, flag, option, require
+from gridpeers.cli.usage import argument, fail, flag, option, require
 from gridpeers.wire.keys import Role
 from gridpeers.wire.trust import site_authority
 from gridpeers.wire.trust.credentials import DATE_AND_TIME
@@ -40,13 +38,13 @@ def init(
 
     Example:  gridpeers keys init lab
     """
-    with _errors(days):
-        known = site_authority.make_site(site, days=days)
-        names = ", ".join(f"{member.name} ({member.role})" for member in known.members)
-        typer.echo(f"{site}: the site {known.site}, with certificates of {names}, until {known.members[0].expires}")
-        typer.echo(
-            f"{site}/ca.key stays here: whoever has it can be anybody. Next: gridpeers keys issue inv1 --keys {site}"
-        )
+    _check(days)
+    known = site_authority.make_site(site, days=days)
+    names = ", ".join(f"{member.name} ({member.role})" for member in known.members)
+    typer.echo(f"{site}: the site {known.site}, with certificates of {names}, until {known.members[0].expires}")
+    typer.echo(
+        f"{site}/ca.key stays here: whoever has it can be anybody. Next: gridpeers keys issue inv1 --keys {site}"
+    )
 
 
 @app.command()
@@ -62,14 +60,14 @@ def issue(
 
     Example:  gridpeers keys issue inv1 inv2 --keys lab
     """
-    with _errors(days):
-        names = list(dict.fromkeys(names))
-        known = read_list(keys)
-        if problems := [why for name in names if (why := site_authority.objection(known, name, role))]:
-            raise KeysError("\n".join(problems))  # all of them, before any certificate is issued
-        for name in names:
-            member = site_authority.issue(keys, name, role, days=days)
-            typer.echo(f"{keys / name}.pem: certificate of {name}, role {member.role}, until {member.expires}")
+    _check(days)
+    names = list(dict.fromkeys(names))
+    known = read_list(keys)
+    if problems := [why for name in names if (why := site_authority.objection(known, name, role))]:
+        raise KeysError("\n".join(problems))  # all of them, before any certificate is issued
+    for name in names:
+        member = site_authority.issue(keys, name, role, days=days)
+        typer.echo(f"{keys / name}.pem: certificate of {name}, role {member.role}, until {member.expires}")
 
 
 @app.command()
@@ -81,12 +79,12 @@ def revoke(
 
     Example:  gridpeers keys revoke inv4 --keys lab
     """
-    with _errors():
-        site_authority.revoke(keys, name)
-        typer.echo(
-            f"{name}: revoked. Copy {keys / 'members.json'} to every host, and start anew what runs: what has begun "
-            "before still lets it in"
-        )
+    _check()
+    site_authority.revoke(keys, name)
+    typer.echo(
+        f"{name}: revoked. Copy {keys / 'members.json'} to every host, and start anew what runs: what has begun "
+        "before still lets it in"
+    )
 
 
 @app.command()
@@ -97,32 +95,27 @@ def show(keys: _Keys = Path()) -> None:
 
     Example:  gridpeers keys show --keys lab
     """
-    with _errors():
-        known, now, warnings = read_list(keys), f"{datetime.now(UTC):{DATE_AND_TIME}}", key_warnings(keys)
-        authority = f"; {CA_KEY} is here: certificates are issued in this folder" if (keys / CA_KEY).is_file() else ""
-        if CA_KEY in warnings:
-            authority = f"; {CA_KEY} is here, but cannot be used: no certificates can be issued here"
-        typer.echo(f"site {known.site}, {LIST} is version {known.version}{authority}")
-        width = max(len(member.name) for member in known.members)
-        for member in sorted(known.members, key=lambda member: (member.role, member.name)):
-            state, here = "revoked", ""
-            if not member.revoked:
-                state = f"{'expired ' if member.expires < now else 'valid    until'} {member.expires}"
-                key = f"{member.name}.key"
-                if (keys / key).is_file():
-                    here = ", key here, but see below" if key in warnings else ", key here"
-            typer.echo(f"{member.role:9} {member.name:{width}}  {state}{here}")
-        for warning in warnings.values():
-            typer.echo(f"WARNING  {warning}")
+    _check()
+    known, now, warnings = read_list(keys), f"{datetime.now(UTC):{DATE_AND_TIME}}", key_warnings(keys)
+    authority = f"; {CA_KEY} is here: certificates are issued in this folder" if (keys / CA_KEY).is_file() else ""
+    if CA_KEY in warnings:
+        authority = f"; {CA_KEY} is here, but cannot be used: no certificates can be issued here"
+    typer.echo(f"site {known.site}, {LIST} is version {known.version}{authority}")
+    width = max(len(member.name) for member in known.members)
+    for member in sorted(known.members, key=lambda member: (member.role, member.name)):
+        state, here = "revoked", ""
+        if not member.revoked:
+            state = f"{'expired ' if member.expires < now else 'valid    until'} {member.expires}"
+            key = f"{member.name}.key"
+            if (keys / key).is_file():
+                here = ", key here, but see below" if key in warnings else ", key here"
+        typer.echo(f"{member.role:9} {member.name:{width}}  {state}{here}")
+    for warning in warnings.values():
+        typer.echo(f"WARNING  {warning}")
 
 
-@contextmanager
-def _errors(days: float = 1.0) -> Iterator[None]:
-    """End the command with one line if something about the keys is wrong."""
+def _check(days: float = 1.0) -> None:
+    """End the command if it lacks a package, or certificates cannot have such a life (days)."""
     require({"cryptography": "certificates"}, "install it: pip install 'gridpeers[keys]'")
     if not 0.0 < days <= 3650.0:
-        fail([f"--days: must be more than 0 and at most 3650 days, got {days:g}"], BAD_INPUT)
-    try:
-        yield
-    except KeysError as error:
-        fail(str(error).splitlines(), BAD_INPUT)
+        fail(f"--days: must be more than 0 and at most 3650 days, got {days:g}")

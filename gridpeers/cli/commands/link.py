@@ -142,4 +142,4 @@ def _give(links: list[str], arrow: str, fault: dict[str, Any] | None, duration: 
     if result.absent:
         typer.echo(f"no agent yet, told when it comes: {', '.join(result.absent)}")
     if result.failures:
-        fail(result.failures, BROKEN)
+        fail(*result.failures, code=BROKEN)

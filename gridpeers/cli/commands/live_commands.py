@@ -20,9 +20,8 @@ from gridpeers.cli.commands.options import (
     check_open,
     finish,
     of_live_run,
-    usage_errors,
 )
-from gridpeers.cli.usage import BAD_INPUT, BROKEN, argument, fail, flag, option, terminal
+from gridpeers.cli.usage import BROKEN, argument, fail, flag, option, terminal
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
 from gridpeers.scenarios.live.run_address import (
     RUN,
@@ -37,7 +36,6 @@ from gridpeers.scenarios.live.run_requests import LEAVING, ask, has_ended, has_l
 from gridpeers.wire.driver.ending import watch_readers
 
 
-@usage_errors()
 def agent(
     inverters: Annotated[list[str], argument("INVERTER", "Names of their inverters, e.g. inv2; spare ones too.")],
     run: Run = RUN,
@@ -112,7 +110,7 @@ def stop(
     with live.client(acts=True) as client:
         typer.echo(ask(client, "stop", inverter))
         if not has_left(client, inverter):
-            fail([f"{inverter} has not left within {LEAVING:g} s; is its process frozen?"], BROKEN)
+            fail(f"{inverter} has not left within {LEAVING:g} s; is its process frozen?", code=BROKEN)
 
 
 @of_live_run
@@ -129,9 +127,9 @@ def event(
     Example:  gridpeers event close 13-152 --synchronised
     """
     if action not in ("open", "close"):
-        fail([f'"{action}" cannot be done to a switch; write open or close'], BAD_INPUT)
+        fail(f'"{action}" cannot be done to a switch; write open or close')
     if synchronised and action == "open":
-        fail(["--synchronised: only closing can wait for synchronism; leave it out to open a switch"], BAD_INPUT)
+        fail("--synchronised: only closing can wait for synchronism; leave it out to open a switch")
     with live.client(acts=True) as client:
         typer.echo(ask(client, "synchronise" if synchronised else "open" if action == "open" else "close", switch))
 
@@ -165,4 +163,4 @@ def down(live: LiveRun) -> None:
     with live.client(acts=True) as client:
         typer.echo(ask(client, "down"))
         if not has_ended(client):
-            fail([f"the plant has not ended within {LEAVING:g} s; is its process frozen?"], BROKEN)
+            fail(f"the plant has not ended within {LEAVING:g} s; is its process frozen?", code=BROKEN)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gridpeers.cli.usage import BAD_INPUT, BROKEN, CLAIM_FAILED, INTERRUPTED, TERMINATED, fail, flag, option
+from gridpeers.cli.usage import BROKEN, CLAIM_FAILED, INTERRUPTED, TERMINATED, fail, flag, option
 from gridpeers.scenarios.live.run_address import (
     ENDPOINT,
     RUN,
@@ -26,7 +26,7 @@ from gridpeers.scenarios.live.run_address import (
 )
 from gridpeers.wire.keys import Role
 from gridpeers.wire.trust.credentials import Credentials
-from gridpeers.wire.trust.key_folder import COMMANDING, KeysError, open_credentials
+from gridpeers.wire.trust.key_folder import COMMANDING, open_credentials
 
 if TYPE_CHECKING:
     from gridpeers.scenarios.live.live_processes import ProcessOutcome
@@ -69,18 +69,14 @@ class LiveRun:
 
 
 def of_live_run(command: Callable[..., None]) -> Callable[..., None]:
-    """Have typer read the fields of a command's parameter `live`, a dataclass, as its last options.
-
-    An error that a user can make ends the command with one line.
-    """
+    """Have typer read the fields of a command's parameter `live`, a dataclass, as its last options."""
     own = dict(inspect.signature(command, eval_str=True).parameters)
     options: Any = own.pop("live").annotation
     fields = inspect.signature(options, eval_str=True).parameters
 
     @wraps(command)
     def called(**words: Any) -> None:
-        with usage_errors():
-            command(live=options(**{field: words.pop(field) for field in fields}), **words)
+        command(live=options(**{field: words.pop(field) for field in fields}), **words)
 
     parameters = own | dict(fields)
     called.__signature__ = inspect.Signature(list(parameters.values()))  # type: ignore[attr-defined]
@@ -115,29 +111,12 @@ def opened(access: Access, roles: tuple[Role, ...], name: str = "") -> Credentia
     return credentials
 
 
-@contextmanager
-def usage_errors() -> Iterator[None]:
-    """End the command with one line and exit code 2 on a usage error, or if the run is not there."""
-    from gridpeers.scenarios.drivers.free_endpoint import ListenError
-    from gridpeers.scenarios.live.run_client import NobodyError
-    from gridpeers.scenarios.live.run_requests import RefusedError
-    from gridpeers.scenarios.results.run_files import FolderError
-    from gridpeers.wire.driver.process import ConfigurationError
-    from gridpeers.wire.driver.session import SessionError
-
-    of_run = (ConfigurationError, FolderError, KeysError, ListenError, NobodyError, RefusedError, SessionError)
-    try:
-        yield
-    except (*of_run, UsageError) as error:
-        fail([str(error)], BAD_INPUT)
-
-
 def finish(outcome: ProcessOutcome, *, law_failed: bool = False) -> None:
     """End with the exit code of a live run; `law_failed` gives that of a failed law, however the run itself ended."""
     if outcome.interrupted:
         code = TERMINATED if outcome.interrupted == "SIGTERM" else INTERRUPTED
-        fail([f"{outcome.interrupted}: everything that was started here has ended"], code)
+        fail(f"{outcome.interrupted}: everything that was started here has ended", code=code)
     if outcome.broke:
-        fail([outcome.broke], CLAIM_FAILED if law_failed else BROKEN)
+        fail(outcome.broke, code=CLAIM_FAILED if law_failed else BROKEN)
     if law_failed:
         raise typer.Exit(CLAIM_FAILED)

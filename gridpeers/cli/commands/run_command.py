@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Literal, NoReturn
 
 import typer
 
-from gridpeers.cli.commands.options import Keys, usage_errors
+from gridpeers.cli.commands.options import Keys
 from gridpeers.cli.progress import COMPILING, progress
 from gridpeers.cli.usage import (
-    BAD_INPUT,
     BROKEN,
     CLAIM_FAILED,
     PASSED,
@@ -22,7 +21,6 @@ from gridpeers.cli.usage import (
     flag,
     load,
     option,
-    refuse,
     require_loadable,
     terminal,
 )
@@ -86,21 +84,16 @@ def _carry_out(
     from gridpeers.scenarios.results.run_files import new_folder, shown
     from gridpeers.scenarios.run import run as run_scenario
     from gridpeers.scenarios.run_request import BrokenRunError, LawStopError, Request
-    from gridpeers.scenarios.schema import ScenarioError
 
-    try:
-        check_how(driver, pace, spec, dash="--")
-    except ScenarioError as error:
-        refuse(error)
+    check_how(driver, pace, spec, dash="--")
     if pace.get("keys") is not None:
         _check_keys(Path(pace["keys"] or ""), spec, feeder)
     simulator = SIMULATORS.resolve(spec.plant.simulator)
     if simulator.package:
         require_loadable(simulator.package, simulator.words)
-    with usage_errors():
-        if driver == "processes":
-            free_endpoint(local_endpoint(spec.processes.port), option="processes.port")
-        folder = new_folder(out, spec.name, datetime.now().astimezone())
+    if driver == "processes":
+        free_endpoint(local_endpoint(spec.processes.port), option="processes.port")
+    folder = new_folder(out, spec.name, datetime.now().astimezone())
     request = Request(scenario=spec, feeder=feeder, driver=driver, folder=folder, **pace)
     console, left = terminal(), f"what came until then is in {shown(folder)}/"
     try:
@@ -110,7 +103,7 @@ def _carry_out(
     except BrokenRunError as error:
         by_law = isinstance(error, LawStopError)
         why = f"FAILED  {error}" if by_law else f"the run broke: {error}"
-        fail([why, *([left] if folder.is_dir() else [])], CLAIM_FAILED if by_law else BROKEN)
+        fail(why, *([left] if folder.is_dir() else []), code=CLAIM_FAILED if by_law else BROKEN)
     from gridpeers.scenarios.checks.check_registry import LAW_FAILED
     from gridpeers.scenarios.results.report import show  # imports numpy, which the run does without
 
@@ -121,19 +114,15 @@ def _carry_out(
 
 
 def _check_keys(folder: Path, spec: ScenarioModel, feeder: Tables) -> None:
-    """End with every problem of the certificates that a run needs, before anything starts; say which end soon."""
+    """Check the certificates that a run needs before anything starts; say which end soon."""
     from gridpeers.scenarios.schema.configs import configs, secured
     from gridpeers.scenarios.schema.participants import inverters_of
-    from gridpeers.wire.trust.key_folder import KeysError
 
     inverters = tuple(row.name for row in inverters_of(spec, feeder))
     notes: dict[str, None] = {}
-    try:
-        for case in spec.cases:
-            plant, agents = configs(spec, feeder, case)
-            started = {agent.name for agent in agents}
-            notes |= dict.fromkeys(secured(plant, agents, folder, started=started, inverters=inverters)[2])
-    except KeysError as error:
-        fail(str(error).split("\n"), BAD_INPUT)
+    for case in spec.cases:
+        plant, agents = configs(spec, feeder, case)
+        started = {agent.name for agent in agents}
+        notes |= dict.fromkeys(secured(plant, agents, folder, started=started, inverters=inverters)[2])
     for note in notes:
         typer.echo(f"NOTE  {note}")

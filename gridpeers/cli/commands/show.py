@@ -8,7 +8,7 @@ from typing import Annotated, Literal, get_args
 
 import typer
 
-from gridpeers.cli.usage import BAD_INPUT, argument, fail, load, option, refuse, terminal
+from gridpeers.cli.usage import argument, fail, load, option, terminal
 from gridpeers.wire.wording import counted, printable
 
 Topic = Literal[
@@ -49,7 +49,7 @@ def check(
     with explained(lambda: typer.echo(TRYING)):
         problem = start_problem(spec, feeder)
     if problem:
-        fail([f"{file}: the plant cannot start: {problem}"], BAD_INPUT)
+        fail(f"{file}: the plant cannot start: {problem}")
     of_scenario = (supply_notes, ROOMS.resolve("robustness_notes"))
     for note in chain.from_iterable(notes(spec, feeder) for notes in of_scenario):
         typer.echo(f"NOTE  {note}")
@@ -91,23 +91,16 @@ def compare(
     """
     kinds = (".png", ".pdf", ".svg")
     if out.suffix not in kinds:
-        fail([f"--out {out}: must end in {', '.join(kinds)}"], BAD_INPUT)
+        fail(f"--out {out}: must end in {', '.join(kinds)}")
 
+    from gridpeers.output_folders import files_written, shown
     from gridpeers.runs.comparison import compare as compare_runs
-    from gridpeers.scenarios.results.run_files import FolderError, refusal, shown
-    from gridpeers.scenarios.schema import ScenarioError
 
-    try:
-        comparison = compare_runs(first, second, names=_names(first, second))
-        typer.echo(str(comparison))
+    comparison = compare_runs(first, second, names=_names(first, second))
+    typer.echo(str(comparison))
+    with files_written(out):
         out.parent.mkdir(parents=True, exist_ok=True)
         comparison.plot().savefig(out)
-    except ScenarioError as error:
-        refuse(error)
-    except FolderError as error:
-        fail([str(error)], BAD_INPUT)
-    except OSError as error:
-        fail([refusal(out, error)], BAD_INPUT)
     typer.echo(f"\nFigure: {shown(out)}")
 
 
@@ -132,11 +125,7 @@ def metrics(
     Example:  gridpeers metrics runs/islanding/latest/IV
     """
     from gridpeers.scenarios.record.record_metrics import report_of
-    from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
+    from gridpeers.scenarios.record.record_reader import RunRecord
     from gridpeers.scenarios.results.report import show
 
-    try:
-        report = report_of(RunRecord.open(run, case))
-    except RecordFileError as error:
-        fail([str(error)], BAD_INPUT)
-    show(report, terminal())
+    show(report_of(RunRecord.open(run, case)), terminal())

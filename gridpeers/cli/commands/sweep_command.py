@@ -10,7 +10,6 @@ import typer
 
 from gridpeers.cli.progress import remaining
 from gridpeers.cli.usage import (
-    BAD_INPUT,
     BROKEN,
     CLAIM_FAILED,
     PASSED,
@@ -20,12 +19,10 @@ from gridpeers.cli.usage import (
     flag,
     interruptible,
     option,
-    refuse,
     require,
     terminal,
 )
-from gridpeers.scenarios.results.run_files import FolderError, refusal, shown
-from gridpeers.scenarios.schema import ScenarioError
+from gridpeers.output_folders import refusal, shown
 from gridpeers.scenarios.sweep.sweep_reading import Plan, read_sweep
 from gridpeers.scenarios.sweep.workers import WorkersError, cores
 from gridpeers.wire.driver.command_line import command_line
@@ -72,11 +69,8 @@ def sweep(
 
 
 def read(file: str) -> Plan:
-    """Return the plan of a sweep; or end with every problem in it, or with what to install."""
-    try:
-        plan = read_sweep(file)
-    except ScenarioError as error:
-        refuse(error)
+    """Return the plan of a sweep; end with what to install if its runs need more."""
+    plan = read_sweep(file)
     require({"joblib": "the runs over all cores"}, "install what sweeps need: pip install 'gridpeers[sweep]'")
     return plan
 
@@ -89,25 +83,21 @@ def finish(file: str, plan: Plan, path: Path, jobs: int | None, again: Sequence[
     from gridpeers.scenarios.sweep.study import SweepFolder, study
 
     console = terminal()
-    try:
-        with interruptible(), SweepFolder(path, plan) as folder:
-            console.print(_size(file, plan, len(folder.done)), soft_wrap=True)
-            try:
-                with remaining(console, size := len(plan.runs)) as tell:
-                    return study(
-                        plan,
-                        folder,
-                        lambda done: tell(f"{plan.name}, {done} of {size} runs", done),
-                        jobs=jobs or cores(),
-                    )
-            except (KeyboardInterrupt, OSError, WorkersError) as error:
-                onward = command_line(*again)
-                kept = f"{folder.kept} of {size} runs are kept in {shown(path)}/; go on with: {onward}"
-                if isinstance(error, KeyboardInterrupt):
-                    fail([f"interrupted; {kept}"], exit_code(error))
-                fail([refusal(path, error) if isinstance(error, OSError) else str(error), kept], BROKEN)
-    except FolderError as error:
-        fail([str(error)], BAD_INPUT)
+    with interruptible(), SweepFolder(path, plan) as folder:
+        console.print(_size(file, plan, len(folder.done)), soft_wrap=True)
+        try:
+            with remaining(console, size := len(plan.runs)) as tell:
+                return study(
+                    plan,
+                    folder,
+                    lambda done: tell(f"{plan.name}, {done} of {size} runs", done),
+                    jobs=jobs or cores(),
+                )
+        except (KeyboardInterrupt, OSError, WorkersError) as error:
+            kept = f"{folder.kept} of {size} runs are kept in {shown(path)}/; go on with: {command_line(*again)}"
+            if isinstance(error, KeyboardInterrupt):
+                fail(f"interrupted; {kept}", code=exit_code(error))
+            fail(refusal(path, error) if isinstance(error, OSError) else str(error), kept, code=BROKEN)
 
 
 def failure_lines(summary: Summary) -> list[str]:

@@ -11,7 +11,6 @@ import typer
 import gridpeers as gp
 from gridpeers.cli.progress import remaining
 from gridpeers.cli.usage import (
-    BAD_INPUT,
     BROKEN,
     CLAIM_FAILED,
     PASSED,
@@ -20,10 +19,9 @@ from gridpeers.cli.usage import (
     fail,
     interruptible,
     option,
-    refuse,
     terminal,
 )
-from gridpeers.output_folders import FolderError, OutputLostError, new_folder, refusal, set_broken, shown
+from gridpeers.output_folders import OutputLostError, new_folder, refusal, set_broken, shown
 
 
 def reproduce(
@@ -56,10 +54,7 @@ def reproduce(
     if only is not None:
         check_choice("--only: ", "part", only, CHOICES)
     now, console = datetime.now().astimezone(), terminal()
-    try:
-        folder = new_folder(out, "reproduce", now)
-    except FolderError as error:
-        fail([str(error)], BAD_INPUT)
+    folder = new_folder(out, "reproduce", now)
     work = Work(chosen(only), driver, folder, seed, jobs)
     left = f"what came until then is in {shown(folder)}/"
     try:
@@ -71,17 +66,17 @@ def reproduce(
             write(whole, work, folder)
     except gp.ScenarioError as error:
         set_broken(folder, "; ".join(error.problems))
-        refuse(error)
+        raise
     except (RuntimeError, OSError) as error:
         why = refusal(folder, error) if isinstance(error, OSError) else str(error)
         set_broken(folder, why)
-        fail([f"a run broke: {why}", left], BROKEN)
+        fail(f"a run broke: {why}", left, code=BROKEN)
     except OutputLostError as error:
         set_broken(folder, str(error))
         raise
     except KeyboardInterrupt as error:
         set_broken(folder, "interrupted")
-        fail([f"interrupted; {left}"], exit_code(error))
+        fail(f"interrupted; {left}", code=exit_code(error))
     for result in whole.results:
         for verdict in result.verdicts:
             if verdict.status != "PASS":
