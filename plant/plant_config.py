@@ -8,7 +8,7 @@ import msgspec
 
 from gridpeers.plant.inverters.gfl import Gfl
 from gridpeers.plant.inverters.gfm_droop import GfmDroop
-from gridpeers.plant.inverters.inverter_model import Kind
+from gridpeers.plant.inverters.inverter_model import Kind, Method
 from gridpeers.plant.inverters.inverter_registry import ParameterSet, model_of
 from gridpeers.wire.journal import RecordLevel
 from gridpeers.wire.messages import LoadSetting
@@ -108,6 +108,7 @@ class PlantSettings(msgspec.Struct, frozen=True, kw_only=True):
     feeder: str = "microgrid123"  # name of a feeder in `plant/data`, or a path to a folder of the same layout
     load_set: str = "main"  # which load table of the feeder: "main" or "event2"
     h: float = 0.002  # integration step (s)
+    method: Method = "first-order"  # method of time stepping
     P_set0: float = 0.647  # first P_set of every inverter (pu of its rating)
     V_set0: float = 1.0  # first V_set of every inverter (pu of its nominal voltage)
     gfm: Any = GfmDroop()  # an `InverterModel`: that of the GFM that have no other; in JSON, its parameters

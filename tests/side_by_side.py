@@ -52,12 +52,15 @@ def _within(file: str, folders: tuple[str, ...]) -> bool:
 
 def compile_once() -> None:
     """Compile the plant's inner loops in a fresh clone, before several processes do it side by side."""
+    from msgspec.structs import replace
+
     from gridpeers.plant.build import build_plant
     from gridpeers.scenarios.schema import load_scenario
     from gridpeers.scenarios.schema.configs import configs
 
     config, _ = configs(*load_scenario("islanding"), "I")
     build_plant(config)
+    build_plant(replace(config, settings=replace(config.settings, method="second-order")))
 
 
 def give_way() -> None:

@@ -46,7 +46,7 @@ from bench.validation.secondary_gridlabd import (
 from bench.validation.validation_part import inverter_row
 from gridpeers.plant.dynamics import Circuit, Dynamics, Inverter
 from gridpeers.plant.dynamics.kernel.controller_pass import READING, advance_inverters, keep_start, turn_frames
-from gridpeers.plant.dynamics.kernel.step import limit_currents, solve_on
+from gridpeers.plant.dynamics.kernel.step import solve_within_limits
 from gridpeers.plant.dynamics.live_network import TOLERANCE
 from gridpeers.plant.equipment.imported_equipment import LinearElement
 from gridpeers.plant.feeder.circuits import circuit_of
@@ -173,9 +173,7 @@ class ReplayedMachines(Dynamics):
         rotation = np.empty(net.leader.size, complex)
         turn_frames(arrays, net, rotation)
         tolerance, I_b = TOLERANCE * float(units.V_b.max()), np.empty(net.S.size, complex)
-        arrays.limiting[:] = False
-        limit_currents(arrays, arrays.J, arrays.V, arrays.limiting)
-        if solve_on(net, arrays, rotation, network.x, I_b, tolerance) < 0:
+        if solve_within_limits(net, arrays, rotation, network.x, I_b, tolerance) < 0:
             raise RuntimeError("the network has no solution with the replayed machines")
         out = np.zeros((n, READING))
         advance_inverters(arrays, self.h, second, out)

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from gridpeers.plant.dynamics.circuit import PlantError, aligned_sum
 from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Real
 from gridpeers.plant.dynamics.kernel.model_pass import TERMINAL, THETA, F, W, parameters_of, state_of
+from gridpeers.plant.dynamics.kernel.second_order_step import FeedForward
 from gridpeers.plant.equipment import F_NOM
-from gridpeers.plant.inverters.inverter_model import InverterModel, Kind, UnitRating
+from gridpeers.plant.inverters.inverter_model import InverterModel, Kind, Method, UnitRating
 from gridpeers.wire.plugins.registry import ANYTHING, line_of, named
 
 
@@ -49,13 +50,15 @@ class Inverters:
     `single`: single-phase inverters: to the models they have three equal phases (`Circuit.copies`), of base `S_3`;
     `phase`: phase of the first terminal: 0, 1, 2 for A, B, C; `positive_sequence`, `direct`: inverters that measure the
     positive sequence, and those whose internal voltage the droop gives (3.8); `volt_var`: rows of `VoltVar`; `y_f`:
-    filter admittances in the network (S per phase), 0 for a current source; `I_limit`: limits of their phase currents
-    (A); `set_points`: P_set, V_set, Q_set (pu), n x 3, may be written between steps; `J`, `V`, `I`: Norton injections
-    (A), terminal voltages (V), currents out of the inverters (A), n x 3; `limiting`: inverters whose phase currents
-    were limited in the last network solution.
+    filter admittances in the network (S per phase); 0 for a current source, as which the method "second-order" solves
+    those of `feed_forward`; `I_limit`: limits of their phase currents (A); `set_points`: P_set, V_set, Q_set (pu), n x
+    3, may be written between steps; `J`, `V`, `I`: Norton injections (A), terminal voltages (V), currents out of the
+    inverters (A), n x 3; `limiting`: inverters whose phase currents were limited in the last network solution.
     """
 
-    def __init__(self, units: tuple[Inverter, ...], connected: Sequence[bool] | None = None) -> None:
+    def __init__(
+        self, units: tuple[Inverter, ...], connected: Sequence[bool] | None = None, method: Method = "first-order"
+    ) -> None:
         n = len(units)
         self.units = units
         models = [unit.parameters for unit in units]
@@ -76,14 +79,17 @@ class Inverters:
         self.V_set_min = np.array([model.V_set_min for model in models])
         self.V_set_max = np.array([model.V_set_max for model in models])
         self.I_limit = np.array([unit.parameters.current_limit * unit.S_3 / (3.0 * unit.V_b) for unit in units])
-        self.y_f = np.array([unit.parameters.admittance(unit.rating) for unit in units], complex)
+        self.feed_forward = _feed_forward(units, self.S_3, self.V_b)
+        in_rounds = np.array([method == "second-order" and model.feedback() is not None for model in models], bool)
+        filters = [model.admittance(unit.rating) for model, unit in zip(models, units, strict=True)]
+        self.y_f = np.where(in_rounds, 0.0, np.array(filters, complex))
         self._records = [(parameters_of(type(model)), state_of(type(model))) for model in models]
         self.parameters = np.zeros((n, max((it.itemsize for it, _ in self._records), default=0)), np.uint8)
         self.state = np.zeros((n, max((it.itemsize for _, it in self._records), default=0) // 8))
         self.start, self.slope = np.zeros_like(self.state), np.zeros_like(self.state)
         self.passes, self.terminal = np.zeros(n, np.int64), np.zeros(n, TERMINAL)
         for i, (unit, y_f) in enumerate(zip(units, self.y_f.tolist(), strict=True)):
-            if wrong := unit.parameters.objection():
+            if wrong := unit.parameters.objection(method):
                 raise ValueError(wrong)
             record = self.constants(i)
             for name, value in unit.parameters.values(unit.rating, y_f).items():
@@ -175,3 +181,11 @@ class Inverters:
         V = np.mean(np.abs(self.V), axis=1)
         f[~online & (V == 0.0)] = 0.0
         return np.column_stack([f, S.real, S.imag, V])
+
+
+def _feed_forward(units: tuple[Inverter, ...], S_3: Real, V_b: Real) -> FeedForward:
+    y, a = np.zeros(len(units), complex), np.zeros(len(units), complex)
+    for i, unit in enumerate(units):
+        if (slope := unit.parameters.feedback()) is not None:
+            y[i], a[i] = unit.parameters.admittance(unit.rating), slope
+    return FeedForward(y, np.reciprocal(1.0 - a), S_3 / (3.0 * V_b), float(V_b.max(initial=1.0)))

@@ -14,8 +14,10 @@ from gridpeers.plant.dynamics.island_parts import is_large
 from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Real
 from gridpeers.plant.dynamics.kernel.controller_pass import READING, Units
 from gridpeers.plant.dynamics.kernel.model_pass import W, address_of
+from gridpeers.plant.dynamics.kernel.second_order_step import run_second_order_steps
 from gridpeers.plant.dynamics.kernel.step import FAILURES, run_steps, run_steps_unlocked
 from gridpeers.plant.dynamics.live_network import TOLERANCE, LiveNetwork, unsettled_island
+from gridpeers.plant.inverters.inverter_model import Method
 
 MOST_RENEWALS = 20  # tangents of one network solution, while its limited currents shrink; two or three are enough
 
@@ -39,13 +41,15 @@ class Dynamics:
         inverters: tuple[Inverter, ...],
         h: float,
         connected: Sequence[bool] | None = None,
+        method: Method = "first-order",
     ) -> None:
-        self.h = h
-        self.inverters = Inverters(inverters, connected)
+        self.h, self._method = h, method
+        self.inverters = Inverters(inverters, connected, method)
         self._tolerance = TOLERANCE * float(self.inverters.V_b.max(initial=1.0))  # of a network solution (V)
         self.network = LiveNetwork(circuit, self.inverters)
         self._single = np.flatnonzero(self.inverters.single)
         self._trips: list[Trip] = []
+        self._slope_0 = np.zeros_like(self.inverters.state)
 
     def start(
         self, P: Real, Q: Real | None = None, V_set: Real | None = None, *, swing_voltage: Complex = PHASES
@@ -222,15 +226,19 @@ class Dynamics:
         return Units._make(getattr(units, name) for name in Units._fields)
 
     def _advance(self, begin: int, steps: int, out: Real) -> int:
-        network, arrays, tolerance = self.network, self.arrays(), self._tolerance
-        if steps == 0 and is_large(network.net):
-            run_steps_unlocked(0, 0, self.h, tolerance, network.net, arrays, network.x, out)
-        if begin == 0 and (parts := network.parts(arrays)):
-            iterations = parts.advance(steps, self.h, tolerance, arrays, network.x, out)
-            if iterations >= 0:
-                return iterations
-            network.join_parts()
-        return run_steps(begin, steps, self.h, tolerance, network.net, arrays, network.x, out)
+        units, network, arrays, tolerance = self.inverters, self.network, self.arrays(), self._tolerance
+        if self._method == "first-order":
+            if steps == 0 and is_large(network.net):
+                run_steps_unlocked(0, 0, self.h, tolerance, network.net, arrays, network.x, out)
+            if begin == 0 and (parts := network.parts(arrays)):
+                iterations = parts.advance(steps, self.h, tolerance, arrays, network.x, out)
+                if iterations >= 0:
+                    return iterations
+                network.join_parts()
+            return run_steps(begin, steps, self.h, tolerance, network.net, arrays, network.x, out)
+        present = arrays._replace(start=units.state)
+        own = self._slope_0, units.feed_forward, network.x, out
+        return run_second_order_steps(begin, steps, self.h, tolerance, network.net, arrays, present, *own)
 
     def voltages(self) -> Complex:
         """Return the voltages to earth of all nodes (V); 0 in dead islands and at nodes without any admittance."""

@@ -85,6 +85,7 @@ class Plant(RecordedPlant):
             installed_inverters(network, settings),
             settings.h,
             connected=connected,
+            method=settings.method,
         )
         units = self._dynamics.inverters.units
         self._current_limits = CurrentLimits(self.inverters, tuple(unit.parameters.current_limit for unit in units))

@@ -19,6 +19,7 @@ from gridpeers.plant.inverters.inverter_model import (
     Kind,
     LimitOfP,
     LimitOfQ,
+    Method,
     Resistance,
     TimeConstant,
     UnitRating,
@@ -267,6 +268,12 @@ class Gfl(InverterModel, frozen=True, kw_only=True):
     def admittance(self, rating: UnitRating) -> complex:
         return 0.0j if self.model == "current_source" else self._filter(rating)
 
+    def feedback(self) -> complex | None:
+        """Return the slope of section 4.6."""
+        if self.model == "current_source":
+            return None
+        return (1j * self.X_f * self.F_current - self.k_pc) / complex(self.R_f, self.X_f)
+
     def volt_var_at_rest(self) -> VoltVar:
         bands = (self.db_UV, self.db_OV) if self.volt_var else (inf, inf)
         return VoltVar(self.S_max, self.Q_min, self.Q_max, *bands, self.dead_band == "ieee1547")
@@ -275,15 +282,15 @@ class Gfl(InverterModel, frozen=True, kw_only=True):
     def equal_powers(self) -> bool:
         return self.mode == "balanced_power"
 
-    def objection(self) -> str:
-        """Refuse a current controller whose one-pass feedback (section 4.6) cannot be stable (checklist row 23)."""
-        slope = (1j * self.X_f * self.F_current - self.k_pc) / complex(self.R_f, self.X_f)
-        if self.model == "current_source" or abs(slope) < 1.0:
+    def objection(self, method: Method) -> str:
+        """Refuse a current controller whose one-pass feedback cannot be stable (checklist row 23)."""
+        slope = self.feedback()
+        if method == "second-order" or slope is None or abs(slope) < 1.0:
             return ""
         return (
             f"gfl: abs(j X_f F_current - k_pc) / abs(R_f + j X_f) must be below 1, got {abs(slope):.2f} "
             f"from F_current {self.F_current:g}, k_pc {self.k_pc:g} pu: the current controller would diverge on a "
-            'stiff bus; lower F_current or k_pc, or use model "current_source"'
+            'stiff bus; lower F_current or k_pc, use model "current_source", or the method "second-order"'
         )
 
     def time_constants(self) -> dict[str, float]:

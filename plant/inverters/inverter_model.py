@@ -7,7 +7,8 @@ next solution; a step has two, and for each state x and its slope s the pass say
     if not second:
         d.q = s
 
-It is compiled when the plant is built, and so is every function that it calls and that is `compiled`.
+A pass of length h = 0 gives slopes and outputs at the present states, so every method of time stepping takes the same
+pass. It is compiled when the plant is built, and so is every function that it calls and that is `compiled`.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ BoundOfVset = Annotated[float, Unit("pu"), Plausible("a bound of V_set", 0.1, 2.
 PhaseCurrent = Annotated[float, Unit("pu"), Plausible("a limit of a phase's current", 0.5, 1000.0, above_zero=True)]
 
 Kind = Literal["GFM", "GFL"]
+Method = Literal["first-order", "second-order"]
 F = TypeVar("F", bound=Callable[..., Any])
 
 COMPILED: list[Callable[..., Any]] = []
@@ -205,6 +207,14 @@ class InverterModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
         """Return the filter's admittance (S) between internal and terminal voltage; 0 for a current source."""
         return 1.0 / (complex(self.R_f, self.X_f) * (rating.V_b**2 / (rating.S_b / 3.0)))
 
+    def feedback(self) -> complex | None:
+        """Return d i_after / d i_before of the current over a pass at the same voltage (dq); None for a voltage.
+
+        A model whose pass gives its internal voltage from its own current is a current source in the second-order
+        method, and is solved with the network in rounds, for which this is the slope.
+        """
+        return None
+
     def volt_var_at_rest(self) -> VoltVar:
         return VoltVar()
 
@@ -227,8 +237,8 @@ class InverterModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
         """Whether its phases have equal powers; else equal currents, or equal internal voltages."""
         return False
 
-    def objection(self) -> str:
-        """Return why these parameters cannot be stepped, "" if they can."""
+    def objection(self, method: Method) -> str:
+        """Return why these parameters cannot be stepped by a method, "" if they can."""
         return ""
 
     def time_constants(self) -> dict[str, float]:

@@ -275,8 +275,9 @@ def _check_links(path: str, links: tuple[tuple[str, str], ...], inverters: tuple
         seen.add(frozenset(pair))
 
 
-PART_OF_T = 0.3
-"""Longest integration step, as a part of the inverters' shortest time constant: at 0.4 of it microgrid123 rings."""
+PART_OF_T = {"first-order": 0.3, "second-order": 1.0}
+"""Longest integration step of a method, as a part of the inverters' shortest time constant: at 0.4 of it the first
+rings on microgrid123; the second is stable up to 2 of it."""
 
 
 def check_times(scenario: ScenarioModel, problems: Problems) -> None:
@@ -323,11 +324,12 @@ def check_step(scenario: ScenarioModel, feeder: Tables | None, problems: Problem
                 own = feeder.parameters_of(row, gfm, gfl).time_constants()
                 of |= {(f"plant.inverter.{row.name}", name): T for name, T in own.items()}
     (table, name), least = min(of.items(), key=lambda item: item[1], default=(("", ""), math.inf))
-    h, most = scenario.time.h_s, PART_OF_T * least
+    part, h = PART_OF_T[scenario.time.method], scenario.time.h_s
+    most = part * least
     if problems.touch("time.h_s", f"{table}.{name}_s") or h <= most * (1.0 + 1e-9):
         return
     problems.add(
         "time.h_s",
         f"{h:g} s is too long a step for {name}_s = {least:g} s of [{table}], which it would not resolve; "
-        f"at most {most:g} s, {PART_OF_T:g} of the shortest time constant",
+        f"at most {most:g} s, {part:g} of the shortest time constant",
     )

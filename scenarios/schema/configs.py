@@ -58,6 +58,7 @@ def configs(
             feeder=scenario.plant.feeder,
             load_set=scenario.plant.load_set,
             h=time.h_s,
+            method=time.method,
             P_set0=scenario.plant.P_set0_pu,
             V_set0=scenario.plant.V_set0_pu,
             gfm=scenario.plant.gfm,

@@ -57,6 +57,12 @@ def check_simulator(scenario: ScenarioModel, problems: Problems) -> None:
                 problems.add(path, problem.text)
     if simulator == OURS:
         return
+    if scenario.time.method != "first-order":
+        problems.add(
+            "time.method",
+            f'"{scenario.time.method}" is a method of plant.simulator = "gridpeers"; "{simulator}" has its own time '
+            "stepping; leave time.method out",
+        )
     lacks = {"load": "keeps the loads of its own model"} | dict.fromkeys(
         ("leave", "join"), "lets no inverter leave or join"
     )

@@ -16,6 +16,7 @@ from gridpeers.netem.schema.netem import Netem
 from gridpeers.plant.equipment.named_loads import FACTOR
 from gridpeers.plant.inverters.gfl import Gfl
 from gridpeers.plant.inverters.gfm_droop import GfmDroop
+from gridpeers.plant.inverters.inverter_model import Method
 from gridpeers.plant.inverters.inverter_registry import OwnParameters, chosen, chosen_own
 from gridpeers.plant.plant_config import OnLawFailure, Protection, SyncCheck
 from gridpeers.plant.simulators import OURS, tables
@@ -65,8 +66,9 @@ class Time(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         Plausible("an integration step", 1e-5, 0.02, above_zero=True),
     ] = 0.002
     """Integration step of the plant (s); divides T_c_s."""
-    method: Literal["first-order"] = "first-order"
-    """Method of time stepping of the plant: GridLAB-D's own, whose error is of first order in h_s."""
+    method: Method = "first-order"
+    """Method of time stepping of the plant: "first-order", GridLAB-D's own; or "second-order", at 2 ms ten
+    times as accurate as the other at 0.25 ms (with GFL as voltage sources), at 2.5 times its time a step."""
     record_s: Annotated[
         float,
         Unit("s"),

@@ -328,8 +328,7 @@ class DaeDynamics(Dynamics):
         back = np.exp(1j * angle)
         units.V[former], units.V[follower] = V[network.formed] * back, V[network.fed] * back
         units.J[former] = self._gfm.y_f[:, None] * E * back
-        currents = self._gfl.currents(gfl, V[network.fed])[0] * back
-        units.J[follower] = currents + units.y_f[follower, None] * units.V[follower]
+        units.J[follower] = self._gfl.currents(gfl, V[network.fed])[0] * back
         S = np.sum(units.V * np.conj(units.J - units.y_f[:, None] * units.V), axis=1)
         magnitude = np.abs(units.V)
         readings[:, 1], readings[:, 2] = S.real, S.imag
@@ -349,7 +348,7 @@ class DaeDynamics(Dynamics):
 def reference_plant(network: Network, settings: PlantSettings, T_c: float, record_step: float) -> Plant:
     """Return our plant with switches, set-points and readings, but with `DaeDynamics`."""
     with patch("gridpeers.plant.feeder.plant.Dynamics", DaeDynamics):
-        return Plant(network, replace(settings, h=record_step), T_c, record_step)
+        return Plant(network, replace(settings, h=record_step, method="second-order"), T_c, record_step)
 
 
 def _states(units: Inverters, places: NDArray[np.int64], names: tuple[str, ...]) -> Real:

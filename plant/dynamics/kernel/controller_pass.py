@@ -1,4 +1,8 @@
-"""One pass of all inverters' controllers: from a network solution to the injections of the next one, compiled."""
+"""One pass of all inverters' controllers: from a network solution to the injections of the next one, compiled.
+
+Every method of time stepping consists of such passes. A pass of length 0 writes slopes and outputs at the present
+states, which it only holds within their limits. So a model is described once, for every method.
+"""
 
 from __future__ import annotations
 

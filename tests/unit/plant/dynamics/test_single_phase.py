@@ -14,9 +14,11 @@ from gridpeers.plant.dynamics.circuit import LoadLaw
 from gridpeers.plant.inverters.gfl import Gfl
 from gridpeers.plant.inverters.gfm_droop import GfmDroop
 from gridpeers.plant.inverters.regfm_a1 import REGFM_A1
+from gridpeers.plant.plant_config import Method
 from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, GFM_D, S_B, V_B, Z_B, circuit, inverter, lone
 
 GFL_ON = changed(GFL_D, frequency_watt=True, volt_var=True)
+METHODS: tuple[Method, ...] = ("first-order", "second-order")
 LINE = 1.0 / ((0.02 + 0.05j) * Z_B)
 
 
@@ -32,6 +34,7 @@ def pair_of(phases: int, load: float) -> Circuit:
     return circuit(Y, terminals)
 
 
+@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize(
     ("gfm", "gfl", "phase"),
     [
@@ -42,11 +45,11 @@ def pair_of(phases: int, load: float) -> Circuit:
     ],
     ids=["GFM, GFL", "REGFM_A1, current source", "VFlag 0, balanced power", "current limit"],
 )
-def test_it_is_a_third_of_a_balanced_three_phase_inverter(gfm: GfmDroop, gfl: Gfl, phase: str) -> None:
+def test_it_is_a_third_of_a_balanced_three_phase_inverter(gfm: GfmDroop, gfl: Gfl, phase: str, method: Method) -> None:
     """On a third of the network it has a third of the power, and the same f and V, through a load step and a return."""
     runs = []
     for phases, units in ((3, (inverter(gfm), inverter(gfl))), (1, (single(gfm, phase), single(gfl, phase)))):
-        dynamics = Dynamics(pair_of(phases, 0.8), units, 0.002)
+        dynamics = Dynamics(pair_of(phases, 0.8), units, 0.002, method=method)
         dynamics.start(np.array([0.0, 0.4]), np.array([0.0, 0.1]))
         runs.append([dynamics.readings(), *dynamics.run(20)[:, :, :6]])
         dynamics.connect(pair_of(phases, 1.4))

@@ -16,7 +16,7 @@ from gridpeers.plant.feeder import Plant
 from gridpeers.plant.feeder.circuits import Circuits
 from gridpeers.plant.feeder.islands import Islands
 from gridpeers.plant.network import Network
-from gridpeers.plant.plant_config import PlantSettings, Protection, SwitchEvent
+from gridpeers.plant.plant_config import Method, PlantSettings, Protection, SwitchEvent
 from gridpeers.plant.tables import read_feeder
 from tests.unit.plant.networks import PAPER_ISLANDS, feeder, opened, three_phase_bus
 
@@ -96,14 +96,21 @@ def schedule(draw: random.Random) -> tuple[SwitchEvent, ...]:
     return first, *sorted(rest, key=lambda event: event.t)
 
 
-@pytest.mark.parametrize(("category", "seed"), [("off", 0), ("III", 0), ("III", 1)])
-def test_no_schedule_of_switchings_ends_the_plant(category: Literal["off", "III"], seed: int) -> None:
+@pytest.mark.parametrize(
+    ("category", "seed", "method"),
+    [
+        ("off", 0, "first-order"),
+        ("III", 0, "first-order"),
+        ("III", 1, "second-order"),
+    ],
+)
+def test_no_schedule_of_switchings_ends_the_plant(category: Literal["off", "III"], seed: int, method: Method) -> None:
     """Every row is finite; who delivers has a frequency within bounds, who does not has no power; trips are told."""
     draw = random.Random(f"switchings {seed}")
     factor = draw.uniform(0.8, 2.0)
     feeder = read_feeder("microgrid123")
     loads = tuple(replace(load, S=tuple(factor * S for S in load.S)) for load in feeder.loads)
-    settings = PlantSettings(events=schedule(draw), h=H, protection=Protection(category=category))
+    settings = PlantSettings(events=schedule(draw), h=H, method=method, protection=Protection(category=category))
     plant = Plant(Network(replace(feeder, loads=loads)), settings, T_C, T_C)
     low, high = BAND[category]
     causes = NO_SOLUTION if category == "off" else (*NO_SOLUTION, *PROTECTION)

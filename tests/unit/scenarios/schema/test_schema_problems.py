@@ -12,7 +12,7 @@ import pytest
 from gridpeers.plant.tables.read import DATA
 from gridpeers.scenarios.catalogue_files import CATALOGUE
 from gridpeers.scenarios.schema import ScenarioError, load_scenario
-from tests.scenario_files import problems
+from tests.scenario_files import problems, written
 
 ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
 
@@ -69,13 +69,18 @@ def test_each_problem_is_told_with_its_place_and_what_would_be_right(
     assert re.search(said, found[0]), found[0]
 
 
-def test_a_step_resolves_the_shortest_time_constant(tmp_path: Path) -> None:
-    longer = ISLANDING.replace("h_s = 0.002", "h_s = 0.0025") + "\n[plant.gfm]\nT_p_s = 0.008\n"
+def test_the_longest_step_depends_on_the_method(tmp_path: Path) -> None:
+    """10 ms, the shortest time constant, is a step of the second-order method, but not of the default."""
+    longer = ISLANDING.replace("h_s = 0.002", "h_s = 0.01")
+    second_order = longer.replace("h_s = 0.01", 'h_s = 0.01\nmethod = "second-order"')
 
     (problem,) = problems(tmp_path, longer)
+    (faster,) = problems(tmp_path, second_order + "\n[plant.gfm]\nT_p_s = 0.008\n")
 
-    assert "time.h_s: 0.0025 s is too long a step for T_p_s = 0.008 s of [plant.gfm], which it" in problem
-    assert problem.endswith("at most 0.0024 s, 0.3 of the shortest time constant")
+    assert "time.h_s: 0.01 s is too long a step for T_p_s = 0.01 s" in problem
+    assert "time.h_s: 0.01 s is too long a step for T_p_s = 0.008 s of [plant.gfm], which it" in faster
+    assert faster.endswith("at most 0.008 s, 1 of the shortest time constant")
+    assert load_scenario(written(tmp_path, second_order))[0].time.h_s == 0.01
 
 
 def test_all_problems_come_at_once_in_the_order_of_lines(tmp_path: Path) -> None:
