@@ -163,6 +163,15 @@ class Inverters:
         self.set_points[i, 0], self.set_points[i, 1] = P_set, V_set
         return P_set, V_set
 
+    def require_finite(self) -> None:
+        """Raise PlantError if the model of an inverter gave a current or a state that is no finite number."""
+        finite = np.isfinite(self.J).all(axis=1) & np.isfinite(self.state).all(axis=1)
+        for i in np.flatnonzero(~finite).tolist():
+            model = type(self.units[i].parameters).__name__
+            raise PlantError(
+                f"{self.units[i].name}: the inverter model {model} gives a current or a state that is no finite number"
+            )
+
     def limit_power(self, i: int, P_max: float) -> None:
         """Bound a GFL's P reference (W) from the next step on; ValueError for a GFM, which has none."""
         if self.forming[i]:

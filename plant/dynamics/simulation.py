@@ -29,7 +29,6 @@ class Trip(NamedTuple):
     inverters: tuple[int, ...]  # disconnected inverters
     substation: bool  # whether the substation was disconnected too
     V_min: float  # their lowest terminal voltage before (pu); inf where only the substation was left
-    unreal: tuple[int, ...] = ()  # those whose model gave a current or a state that is no finite number
 
 
 class Dynamics:
@@ -121,7 +120,7 @@ class Dynamics:
         for i, w in speed.items() if on else ():
             units.lock(i, w)  # a PLL has locked to the island's frequency before the contactor closes
 
-    def _trip(self, islands: Iterable[int], step: int, unreal: Flags | None = None) -> None:
+    def _trip(self, islands: Iterable[int], step: int) -> None:
         """Disconnect all inverters of these islands; where there are none, the substation, which stays off.
 
         An island with the substation thus first loses only its inverters: the grid may be able to feed it without them.
@@ -134,8 +133,7 @@ class Dynamics:
         if bare:
             self.network.substation_on = False
         lowest = float(np.min(v, initial=np.inf))
-        culprits = () if unreal is None else tuple(np.flatnonzero(lost & unreal).tolist())
-        self._trips.append(Trip(step, tuple(np.flatnonzero(lost).tolist()), bool(bare), lowest, culprits))
+        self._trips.append(Trip(step, tuple(np.flatnonzero(lost).tolist()), bool(bare), lowest))
 
     def _solve_without(self, away: Flags) -> None:
         """Find the voltages at the open terminals of inverters that are about to return.
@@ -180,35 +178,33 @@ class Dynamics:
         """Advance by `steps` steps; return steps x n_inv x `kernel.controller_pass.READING`, all finite.
 
         Where the frozen tangent leads to no solution it is renewed. An island without solution is de-energised before
-        the step, and the others take it. With 0 steps the inner loop is only compiled or loaded.
+        the step, and the others take it. PlantError if a model gives what is no finite number. With 0 steps the inner
+        loop is only compiled or loaded.
         """
-        network = self.network
+        units, network = self.inverters, self.network
         out = np.zeros((steps, len(self.inverters), READING))
         begin, renewed = 0, -1
         limited: list[Complex] = []
         """Injections (A) at which the tangent of one solution was renewed: they differ where currents are limited."""
         while (status := self._advance(begin, steps, out)) < 0:
+            units.require_finite()
             step, what = divmod(-1 - status, FAILURES)
             solution = 2 * step + what
-            if what == 2:
-                islands = set(network.reduction.inverter_island[~np.isfinite(out[step, :, 0])].tolist())
-            elif solution == renewed and (
-                len(limited) == MOST_RENEWALS or np.array_equal(limited[-1], self.inverters.J)
+            if solution == renewed and (
+                len(limited) == MOST_RENEWALS or np.array_equal(limited[-1], units.J)
             ):  # rounding at the largest load, or limited currents that do not settle
                 islands = {unsettled_island(network.net, self.arrays(), network.x, self._tolerance)}
             else:
                 try:
                     network.renew()
-                    limited = [*(limited if solution == renewed else ()), self.inverters.J.copy()]
+                    limited = [*(limited if solution == renewed else ()), units.J.copy()]
                     begin = renewed = solution
                     continue
                 except NoSolutionError as error:
                     islands = set(error.islands)
-            units = self.inverters  # go back to the start of the step that failed
-            finite = np.isfinite(units.J).all(axis=1) & np.isfinite(units.state).all(axis=1)
-            units.state[:], units.J[:] = units.start, units.J_0
+            units.state[:], units.J[:] = units.start, units.J_0  # go back to the start of the step that failed
             network.note()
-            self._trip(sorted(islands), step, np.asarray(~finite))
+            self._trip(sorted(islands), step)
             self.connect(network.circuit, step)
             begin, renewed = 2 * step, -1
         network.refresh(status, 2 * steps - begin)

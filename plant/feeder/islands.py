@@ -185,10 +185,7 @@ def trip_event(
         ),
         None,
     )
-    if trip.unreal:
-        units = ", ".join(network.inverters[i].name for i in trip.unreal)
-        cause = f"the model of {units} gives a current or a state that is no finite number"
-    elif culprit is not None:
+    if culprit is not None:
         switch = network.switches[culprit.switch].event_name
         cause = f"closed out of phase, {culprit.angle:.0f} deg across {switch} at t = {culprit.t:.3f} s"
     elif load > rating and not fed:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from copy import copy
+from dis import get_instructions
 from functools import cache
 from inspect import getattr_static
 from types import SimpleNamespace
@@ -54,6 +55,10 @@ def _objection(it: Any) -> str:
         return f"it has no static method {missing[0]}; docs/inverter-models.md has the contract"
     if it.kind not in OURS:
         return f'its kind must be "GFM" or "GFL", got {it.kind!r}'
+    if not isinstance(it.STATES, tuple) or len({*it.STATES, "theta", "w", "f"}) < len(it.STATES) + 3:
+        return f"its STATES must be a tuple of names, each one once and beside theta, w and f, got {it.STATES!r}"
+    if any(step.opname == "RAISE_VARARGS" for step in get_instructions(it.advance)):
+        return "its pass raises an error, which compiled code passes over; let it bound its values instead"
     try:
         it()
     except ANYTHING as error:
