@@ -101,6 +101,9 @@ def _run(configs: Sequence[AgentConfig], laws: Sequence[Law], make_links: MakeLi
                     _node(config, session.id, make_links, law, known) for config, law in zip(configs, laws, strict=True)
                 )
                 core = nodes[0] if len(nodes) == 1 else NodeGroup(nodes)
+            if credentials is not None:
+                for node in nodes:
+                    node.post.vouches = session.vouches
             take_part(core, nodes, session, logging.getLogger(first.name))
         finally:
             session.close()

@@ -79,6 +79,8 @@ def run_plant(
             return f"plant: cannot start: {error}"
         except ImportError as error:
             return f"plant: cannot start: {not_importable(error)}"
+        if config.credentials is not None:
+            node.post.vouches = session.vouches
         for key in node.publications:
             session.prepare(key)
         for name, agent_config in config.agent_configs.items():

@@ -33,6 +33,7 @@ KINDS = {
     "unknown": "of an unknown type",
     "implausible": "a value in it is NaN or beyond its physical bounds, or contradicts another",
     "foreign": "on a key of another run, or from another sender than the key names",
+    "impostor": "from a process whose link has a certificate of another name",
     "ghost": "from another epoch than the sender's valid one",
     "stale": "about a past tick or roster",
     "excess": "dropped unread, or unanswered: more came than this process takes at once",

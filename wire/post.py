@@ -53,6 +53,8 @@ class Post:
         """The plant that the node follows; None for the plant's own node."""
         self.on_nameplate: Callable[[str, Nameplate, bool, float], None] = _ignore
         """Takes an instance, its answer, whether that is the first of a process that counts, and the time."""
+        self.vouches: Callable[[str], bool] | None = None
+        """Says whether a link of this process has the certificate of a sender; None if links have no certificates."""
         self.journal: JournalBuffer | None = None
         self.traffic: Traffic | None = None
         """Notes messages and tokens in the journal; None if nobody records them here."""
@@ -184,12 +186,21 @@ class Post:
             for data, final in zip(parts, ends, strict=True)
         ]
 
+    def check_certificate(self, name: str) -> None:
+        """Raise RejectedError if no link has the certificate of a name whose epoch is to be learnt.
+
+        Access rules keep others off that name's keys; this check does not depend on them.
+        """
+        if self.vouches is not None and not self.vouches(name):
+            raise RejectedError("impostor", f"{name} says who it is, but no link has the certificate of {name}")
+
     def release(self) -> None:
         """Let go of the node after its end: in a cycle all that the run had would stay in memory."""
         self.routes.clear()
         self.on_nameplate, self.plant = _ignore, None
 
     def _on_nameplate(self, instance: str, nameplate: Nameplate, payload: bytes, now: float) -> None:
+        self.check_certificate(nameplate.sender)
         self.on_nameplate(instance, nameplate, self.members.meet(instance, nameplate), now)
 
     def _admit(self, route: Route, message: AnyMessage) -> None:
@@ -246,5 +257,6 @@ class FollowedPlant:
     def heard(self, epoch: int) -> None:
         """Follow a present plant that sends, if the node follows none."""
         if epoch in self.present and PLANT not in self._post.admission.epochs:
+            self._post.check_certificate(PLANT)
             self._post.admission.bind(PLANT, epoch)
             self._on_follow(epoch)

@@ -126,6 +126,8 @@ class TelemetryClient:
             inbox=self.inbox,
             credentials=self._credentials,
         )
+        if self._credentials is not None:
+            self._core.post.vouches = session.vouches
         session.watch(keys.alive_plant("*"))  # before it subscribes: so it knows the plant when the plant speaks
         for key in self._core.subscriptions:
             session.subscribe(key)

@@ -169,13 +169,13 @@ class RunClient:
         """Return why links without access bring nothing; empty if they have it, or there are no certificates."""
         if (credentials := self.where.credentials) is None:
             return ""
-        own = credentials.own
+        own, vouched = credentials.own, self._session.vouches(PLANT)  # it looks at new links, and notes their lines
         silent = (
             f"the plant at {', '.join(self.where.connect)} takes the link, but nothing passes on it: it is still being "
             f"built, or its members.json revokes or lacks the certificate of {own.name}, which its output says; "
             f"gridpeers keys issue {own.name} --role {own.role}, where the site was made, gives {own.name} a new one"
         )
-        return "; ".join(self._session.take_lines()) or ("" if self.runs else silent)
+        return "; ".join([*self._session.take_lines(), *([silent] if vouched and not self.runs else [])])
 
     def _failure(self, wait: float) -> str:
         where = self.where

@@ -35,6 +35,8 @@ def test_members_of_a_site_take_part_in_its_run(town: Town) -> None:
     """With certificates the agents find each other over TLS, and use each other's values."""
     assert town.plant_config.listen[0].startswith("tls/")
     assert {*town.status["inv1"].used} == {"inv2"}
+    assert {town.session.vouches(name) for name in ("plant", "inv1", "inv2")} == {True}
+    assert not town.session.vouches("inv3")
 
 
 def test_without_a_certificate_nobody_gets_a_link(town: Town) -> None:
@@ -191,3 +193,4 @@ def test_an_agent_whose_certificate_is_issued_later_joins_the_run(tmp_path: Path
         town.add("inv3", ["-m", "gridpeers.agents"], replace(town.agent_configs["inv3"], credentials=credentials))
 
         town.together(("inv1", "inv2", "inv3"))
+        assert town.session.vouches("inv3")

@@ -120,7 +120,9 @@ class Session:
         self._publishers: dict[str, zenoh.Publisher] = {}
         self._declared: list[Any] = []
         self._tokens: dict[str, zenoh.LivelinessToken] = {}
-        self._certificates = None if credentials is None else LinkCertificates(credentials)
+        self._certificates: LinkCertificates | None = None
+        if credentials is not None:
+            self._certificates = LinkCertificates(credentials, relayed=in_star)
         listening, gossips = () if in_star else listen, gossip and not in_star
         config = zenoh_settings(listening, connect, gossip=gossips, clock=clock, meets_all=meets_all)
         if star and rendezvous:
@@ -278,6 +280,13 @@ class Session:
     def take_lines(self) -> tuple[str, ...]:
         """Take out lines on links whose other end has a certificate and no access."""
         return () if self._certificates is None else self._certificates.take_lines()
+
+    def vouches(self, name: str) -> bool:
+        """Whether a link has had the certificate of a sender, the plant or an agent; True without certificates."""
+        if self._certificates is None or self._certificates.vouches(name):
+            return True
+        self._certificates.note(self._session.info.links())  # one may have just come
+        return self._certificates.vouches(name)
 
     def close(self) -> None:
         """Undeclare the tokens and close."""

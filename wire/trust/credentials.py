@@ -19,6 +19,7 @@ from typing import Any, Literal, NamedTuple
 import msgspec
 
 from gridpeers.wire.keys import ANY_TOKEN, KEY_SPECS, KeySpec, Role
+from gridpeers.wire.messages import PLANT
 from gridpeers.wire.wording import printable
 
 DATE_AND_TIME = "%Y-%m-%d %H:%M UTC"
@@ -148,6 +149,16 @@ class Credentials(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         later = tuple(SiteMember(name=name, role="agent") for name in dict.fromkeys(inverters) if name not in names)
         return msgspec.structs.replace(self, members=self.members + later)
 
+    def common_names(self, sender: str) -> frozenset[str]:
+        """Return the common names that a sender of messages may have, the plant or an agent."""
+        role = "plant" if sender == PLANT else "agent"
+        return frozenset(
+            accepted
+            for member in self.members
+            if member.role == role and (role == "plant" or member.name == sender)
+            for accepted in member.accepted
+        )
+
     def stranger(self, common_name: str) -> str:
         """Return why messages from the other end of a link are not believed, "" if it is a member."""
         if any(common_name in member.accepted for member in self.members):
@@ -177,10 +188,10 @@ class Credentials(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
 
 
 class LinkCertificates:
-    """The common names at the other ends of a session's links; tells of each that is no member's, once."""
+    """Note the certificates of a session's links."""
 
-    def __init__(self, credentials: Credentials) -> None:
-        self._credentials = credentials
+    def __init__(self, credentials: Credentials, *, relayed: bool) -> None:
+        self._credentials, self._relayed = credentials, relayed
         self._names: set[str] = set()
         self._lines: list[str] = []
 
@@ -196,3 +207,12 @@ class LinkCertificates:
     def take_lines(self) -> tuple[str, ...]:
         lines, self._lines = tuple(self._lines), []
         return lines
+
+    def vouches(self, name: str) -> bool:
+        """Return whether a link that was noted has had the certificate of a sender, the plant or an agent.
+
+        Behind a relay everybody but the plant counts as vouched for: the relay lets each use its own keys alone.
+        """
+        if self._relayed and name != PLANT:
+            return True
+        return not self._names.isdisjoint(self._credentials.common_names(name))

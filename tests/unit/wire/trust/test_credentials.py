@@ -151,8 +151,9 @@ def test_an_agent_whose_certificate_comes_later_has_its_rules_now() -> None:
 
 
 REVOKED = SiteMember(name="eve", role="operator", revoked=True)
+PLANTS = (SiteMember(name="plant", role="plant"), SiteMember(name="second", role="plant", generation=3))
 SHOWN = Credentials(
-    own=INV1, ca="ca.pem", certificate="inv1.pem", key="inv1.key", members=(INV1, REVOKED, PLANT)
+    own=INV1, ca="ca.pem", certificate="inv1.pem", key="inv1.key", members=(INV1, REVOKED, *PLANTS)
 ).knowing(("inv1", "inv2"))
 
 
@@ -168,15 +169,47 @@ def test_links_are_mutual_tls_alone_and_end_with_a_certificate() -> None:
     assert (rules["enabled"], rules["default_permission"]) == (True, "deny")
 
 
+def test_a_sender_has_the_certificate_of_its_own_name() -> None:
+    """An agent that of its inverter, in this generation or the next; the plant that of any plant of the site."""
+    assert SHOWN.common_names("inv1") == {"agent:inv1", "agent:inv1:2"}
+    assert SHOWN.common_names("inv2") == {"agent:inv2", "agent:inv2:2"}
+    assert SHOWN.common_names("eve") == SHOWN.common_names("second") == frozenset()
+    assert SHOWN.common_names("plant") == {"plant:plant", "plant:plant:2", "plant:second:3", "plant:second:4"}
+
+
 class _Link(NamedTuple):
     auth_identifier: str | None
     dst: str = "tls/127.0.0.1:1"
 
 
+def test_a_link_vouches_for_the_name_of_its_certificate_also_once_it_is_gone() -> None:
+    """Nobody else is vouched for, and a link without a certificate vouches for nobody."""
+    certificates = LinkCertificates(SHOWN, relayed=False)
+
+    certificates.note([_Link(None)])
+    assert not certificates.vouches("inv1")
+    certificates.note([_Link("agent:inv1:2")])
+    assert certificates.vouches("inv1")
+    certificates.note([])
+    assert certificates.vouches("inv1")
+    assert not certificates.vouches("inv2")
+    assert not certificates.vouches("plant")
+
+
+def test_behind_a_relay_only_the_plant_needs_a_certificate_of_its_own_link() -> None:
+    """No link shows an agent's certificate there; the relay keeps each to its own keys."""
+    certificates = LinkCertificates(SHOWN, relayed=True)
+
+    assert certificates.vouches("inv1")
+    assert not certificates.vouches("plant")
+    certificates.note([_Link("plant:plant")])
+    assert certificates.vouches("plant")
+
+
 def test_a_link_of_a_stranger_is_told_once() -> None:
     """The line names address and reason; a member's link has none, and links that stay are not told again."""
     links = [_Link("agent:inv1"), _Link("operator:eve", "tls/192.0.2.1:5")]
-    certificates = LinkCertificates(SHOWN)
+    certificates = LinkCertificates(SHOWN, relayed=False)
 
     certificates.note(links)
     certificates.note(links)
