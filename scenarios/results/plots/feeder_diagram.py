@@ -12,11 +12,12 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
-from numpy.typing import NDArray
+from matplotlib.text import Annotation
+from matplotlib.transforms import Bbox
 
 from gridpeers.plant.equipment import Switch, Tables
 from gridpeers.plant.equipment.connectivity import Connectivity
-from gridpeers.scenarios.results.plots.places import PlacedLabel, Places, has_coordinates, label_sides, places
+from gridpeers.scenarios.results.plots.places import Places, has_coordinates, places
 from gridpeers.wire.wording import counted
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
@@ -27,6 +28,10 @@ WIDTH = {1: 0.7, 2: 1.1, 3: 2.0}  # Width of a branch (pt) by its number of phas
 HALO: Any = [withStroke(linewidth=2.0, foreground="white")]  # Around labels, so that they can be read on branches
 MANY = 400  # Buses beyond which loads are not marked and branches are half as wide
 MOST_ZONES = 10  # Microgrids and other zones that the legend names
+MARK = 12.0  # Width of a mark (pixels)
+SIDES = ((1, 1), (1, -1), (-1, 1), (-1, -1), (1, 0), (-1, 0), (0, 1), (0, -1))
+"""Sides of a mark for its name, to the right and upwards, the preferred one first."""
+
 MOST_LABELS = 15  # Inverters beyond which their names are left out, which would cover each other
 
 
@@ -69,7 +74,7 @@ def feeder_diagram(feeder: Tables, V: Mapping[str, float] | None = None) -> Figu
     if not on_coordinates:
         picture.suptitle("The feeder has no coordinates: drawn as a tree, from the substation on the left", size=9)
     axes.set_axis_off()
-    _draw_labels(feeder, at, axes)
+    _write_names(feeder, at, axes)
     return picture
 
 
@@ -99,57 +104,31 @@ def _middle(switch: Switch, at: Places) -> tuple[float, float]:
     return (a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0
 
 
-def _draw_labels(feeder: Tables, at: Places, axes: Axes) -> None:
-    """Write the names of marks where they cover least, then those of buses where they cover nothing."""
-    marked: list[PlacedLabel] = []
-    if feeder.source is not None:
-        marked.append(PlacedLabel("substation", 10.0, at[feeder.source.bus], 9.0))
-    inverters = (*feeder.inverters, *feeder.spares)
+def _write_names(feeder: Tables, at: Places, axes: Axes) -> None:
+    """Write the names of marks, each on the side on which it covers fewest marks and other names."""
+    names: list[tuple[str, tuple[float, float], float]] = []
     if len(feeder.inverters) <= MOST_LABELS:
-        marked += [
-            PlacedLabel(f"{row.name}{' (spare)' * row.spare}", 10.0, at[row.bus], 8.0, bold=True) for row in inverters
-        ]
-    loads: list[str] = []
+        inverters = (*feeder.inverters, *feeder.spares)
+        names += [(f"{row.name}{' (spare)' * row.spare}", at[row.bus], 10.0) for row in inverters]
+    if feeder.source is not None:
+        names.append(("substation", at[feeder.source.bus], 10.0))
     if len(feeder.buses) <= MANY:
-        marked += [PlacedLabel(one.alias or one.name, 7.5, _middle(one, at), 6.0) for one in feeder.switches]
-        loads = list(feeder.load_by_bus())
-        taken = {row.bus for row in inverters} | ({feeder.source.bus} if feeder.source else set())
-        names = dict.fromkeys((*loads, *(bus.name for bus in feeder.buses)))
-        marked += [PlacedLabel(bus, 5.5, at[bus], 4.0, optional=True) for bus in names if bus not in taken]
+        names += [(one.alias or one.name, _middle(one, at), 7.5) for one in feeder.switches]
     axes.figure.draw_without_rendering()  # type: ignore[union-attr]  # lays the figure out; subfigures are not used
-    ends = [(a, b) for a, b, _ in feeder.branches()] + [(one.from_bus, one.to_bus) for one in feeder.switches]
-    lines = _on_paper(axes, [at[bus] for pair in ends for bus in pair]).reshape(-1, 4)
-    places_on_paper = _on_paper(axes, [one.place for one in marked])
-    labels = [one._replace(place=(x, y)) for one, (x, y) in zip(marked, places_on_paper.tolist(), strict=True)]
-    sure = [not one.optional for one in marked]
-    marks = np.vstack([_on_paper(axes, [at[row.bus] for row in inverters]), places_on_paper[sure]])
-    widths = [5.0] * len(inverters) + [0.6 * one.gap for one in marked if not one.optional]
-    dots = np.column_stack([_on_paper(axes, [at[bus] for bus in loads]), np.full(len(loads), 1.8)])
-    sides = label_sides(labels, lines, np.vstack([np.column_stack([marks, widths]), dots]))
-    for one, side in zip(marked, sides, strict=True):
-        if side is None:
-            continue
-        right, up = side
-        distance = one.gap if 0 in side else 0.7 * one.gap
-        axes.annotate(
-            one.text,
-            one.place,
-            (distance * right, distance * up),
-            textcoords="offset points",
-            ha=("center", "left", "right")[right],
-            va=("center", "bottom", "top")[up],
-            size=one.size,
-            color="#555555" if one.optional else "black",
-            weight="bold" if one.bold else "normal",
-            zorder=5,
-            path_effects=HALO,
-        )
+    centres = axes.transData.transform([place for _, place, _ in names]) if names else ()
+    covered = [Bbox.from_bounds(x - MARK / 2.0, y - MARK / 2.0, MARK, MARK) for x, y in centres]
+    for text, place, size in names:
+        name = axes.annotate(text, place, (0, 0), textcoords="offset points", size=size, zorder=5, path_effects=HALO)
+        boxes = [_box_beside(name, *side) for side in SIDES]
+        best = min(range(len(SIDES)), key=lambda side: boxes[side].count_overlaps(covered))
+        covered.append(_box_beside(name, *SIDES[best]))
 
 
-def _on_paper(axes: Axes, places: list[tuple[float, float]]) -> NDArray[np.float64]:
-    """Return places of the drawing on paper (pt)."""
-    scale = 72.0 / axes.figure.dpi
-    return np.asarray(axes.transData.transform(np.array(places, float).reshape(-1, 2)) * scale)
+def _box_beside(name: Annotation, right: int, up: int) -> Bbox:
+    """Put a name beside its mark, and return the box that it covers then (pixels)."""
+    name.set(ha=("center", "left", "right")[right], va=("center", "bottom", "top")[up])
+    name.xyann = (6.0 * right, 5.0 * up)
+    return name.get_window_extent()
 
 
 def _zone_handles(feeder: Tables, zones: Mapping[str, str], colours: Mapping[str, str]) -> list[Line2D]:
