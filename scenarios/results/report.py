@@ -6,7 +6,6 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 from rich.console import Console, RenderableType
 from rich.table import Table
@@ -22,43 +21,6 @@ from gridpeers.scenarios.results.recorded_events import LawFailure, first_of
 
 GAP = 2  # Spaces behind a column
 
-
-class Grid(NamedTuple):
-    """A table as text; the first column names the rows, the first line of each other header its event."""
-
-    title: str
-    header: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    legend: str = ""
-    """Lines below it; may be empty."""
-
-
-def folded(grid: Grid, width: int) -> Iterator[Grid]:
-    """Yield a table in parts that are at most so wide (characters), one below the other; no event is torn apart.
-
-    Each part begins with the first column and has the rows that say something in it. An event that is wider has a part
-    of its own.
-    """
-    widths = [
-        GAP + max(len(line) for cell in column for line in cell.split("\n"))
-        for column in zip(grid.header, *grid.rows, strict=True)
-    ]
-    parts: list[list[int]] = []
-    events: dict[str, list[int]] = {}  # a metric that only a later case has comes last in the header
-    for i, text in enumerate(grid.header[1:], 1):
-        events.setdefault(text.partition("\n")[0], []).append(i)
-    for columns in events.values():
-        if parts and sum(widths[i] for i in (0, *parts[-1], *columns)) <= width:
-            parts[-1] += columns
-        else:
-            parts.append(columns)
-    for columns in parts:
-        rows = (row for row in grid.rows if len(parts) == 1 or any(row[i] for i in columns))
-        header, *cells = (tuple(row[i] for i in (0, *columns)) for row in (grid.header, *rows))
-        yield Grid("", header, tuple(cells))
-
-
-_TABLE = 140  # Characters of a table in a file: with four events it would have 200 and more
 
 _COLOURS = {"PASS": "green", "FAIL": "bold red", "MISS": "yellow", "NOT RUN": "dim"}
 
@@ -82,17 +44,6 @@ class RunReport:
         return any(verdict.status == "failed" and check in ("", verdict.check) for verdict in verdicts)
 
 
-def grids(report: RunReport) -> tuple[Grid, ...]:
-    """Return the tables of our results, laid out as the paper's Tables I and II, with its numbers beside ours."""
-    if not any(report.findings.results.values()):
-        return ()  # without events there is no window to measure in
-    tables = (
-        _grid(report, "Frequency and power sharing", ("f_error_Hz", "MPSI")),
-        _grid(report, "Voltage and var sharing", ("V_error", "MQSI")),
-    )
-    return (*tables, _own_grid(report)) if report.findings.own else tables
-
-
 def plain(report: RunReport) -> str:
     return text_of(lambda console: _print(report, console))
 
@@ -108,7 +59,7 @@ def show(report: RunReport, console: Console) -> None:
 def _print(report: RunReport, console: Console) -> None:
     blocks: list[list[RenderableType]] = [
         [Text(f"FAILED  case {case}: {first_of(of)}", "bold red") for case, of in report.failures.items() if of],
-        *([*_rendered(grid, min(console.width, _TABLE))] for grid in grids(report)),
+        *_tables(report),
         [*_claims(report)],
         [_checks(case, verdicts) for case, verdicts in report.checks.items()],
     ]
@@ -147,69 +98,64 @@ def _checks(case: str, verdicts: tuple[CheckVerdict, ...]) -> Text:
     return Text.assemble(("CHECKS", "yellow" if failed else "green"), f"  case {case}: {summary(verdicts)}")
 
 
-def _rendered(grid: Grid, width: int) -> Iterator[RenderableType]:
-    yield Text(grid.title, style="bold")
-    for part in folded(grid, width):
-        table = Table(box=None, padding=(0, GAP, 0, 0))
-        for number, column in enumerate(part.header):
-            table.add_column(Text(column), justify="left" if number == 0 else "right", vertical="bottom")
-        for row in part.rows:
-            table.add_row(*(Text(cell, style="red" if cell.endswith("!") else "") for cell in row))
-        yield table
-    if grid.legend:
-        yield Text(grid.legend, style="dim")
+def _tables(report: RunReport) -> Iterator[list[RenderableType]]:
+    """Yield our results as the paper's Tables I and II have them, with its numbers beside ours, and own metrics."""
+    if any(report.findings.results.values()):  # without events there is no window to measure in
+        yield _table_of(report, "Frequency and power sharing", ("f_error_Hz", "MPSI"))
+        yield _table_of(report, "Voltage and var sharing", ("V_error", "MQSI"))
+        if report.findings.own:
+            yield _own_metrics(report)
 
 
-def _grid(report: RunReport, title: str, quantities: tuple[Quantity, ...]) -> Grid:
+def _rendered(
+    title: str, header: Sequence[str], rows: Sequence[Sequence[str]], legend: Sequence[str]
+) -> list[RenderableType]:
+    """Return a table whose first two columns name the rows; the lines below it say why a cell is no number."""
+    table = Table(box=None, padding=(0, GAP, 0, 0))
+    for number, column in enumerate(header):
+        table.add_column(Text(column), justify="left" if number < 2 else "right")
+    for row in rows:
+        table.add_row(*(Text(cell, style="red" if cell.endswith("!") else "") for cell in row))
+    return [Text(title, style="bold"), table, *(Text(line, style="dim") for line in legend)]
+
+
+def _table_of(report: RunReport, title: str, quantities: tuple[Quantity, ...]) -> list[RenderableType]:
     """Return a table of some quantities; what is shared means nothing over several islands, and is a dash there.
 
     A value that is not steady is no number: the first words of its reason stand there, and all of it below the table.
     """
-    found = report.findings
-    events = list(dict.fromkeys(event for steady in found.results.values() for event in steady))
-    columns = [heading(quantity, found.f_nom) for quantity in quantities]
-    columns += ["restored in"] if "f_error_Hz" in quantities else []
-    header = ("case", *(f"{event}\n{column}" for event in events for column in columns))
-    rows, legend = [], []
-    for case in found.results:
-        for island in ("", *dict.fromkeys(name for parts in found.islands.get(case, {}).values() for name in parts)):
-            words = f"  island of {island}" if island else _case(report, case)
-            cells = [cell for event in events for cell in _cells(report, case, event, island, quantities)]
-            rows.append((words, *(text for text, _ in cells)))
-            legend += [why for _, why in cells if why]
+    found, rows, legend = report.findings, list[list[str]](), list[str]()
+    timed = "f_error_Hz" in quantities
+    for event, case, island, values in _places(found):
+        dashes = SHARING if found.apart(case, event) and not island else ()
+        cells = ["-" if name in dashes else _cell(report, case, event, name, values, island) for name in quantities]
+        if timed:
+            restored = "never" if values.t_restore_s is None else f"{values.t_restore_s:.2f} s"
+            cells.append("-" if dashes or _nothing_shared(values, "MPSI") else restored)
+        rows.append([event, f"  island of {island}" if island else _case(report, case), *cells])
+        where = f"case {case}, {event}" + (f", island of {island}" if island else "")
+        unsteady = (name for name in quantities if name in values.reasons and name not in dashes)
+        legend += [f"{where}: {_why(values, name, found.f_nom)}" for name in unsteady]
     beside = [one for one in report.benchmark.numbers if one.quantity in quantities and found.has(one)]
     sources = dict.fromkeys(one.source for one in beside)
     against = f", ours | paper's {' and '.join(sources)}" if sources else ""
     if any(found.islands.values()):
         legend.insert(0, "-: where there are several islands, each shares for itself; see its own row")
-    return Grid(f"{title} after each event{against}", header, tuple(rows), "\n".join(legend))
+    header = ["event", "case", *(heading(quantity, found.f_nom) for quantity in quantities)]
+    header += ["restored in"] if timed else []
+    return _rendered(f"{title} after each event{against}", header, rows, legend)
+
+
+def _places(found: Findings) -> Iterator[tuple[str, str, str, Steady]]:
+    """Yield event, case, island ("" for all of it) and steady values of each row."""
+    for event in dict.fromkeys(event for steady in found.results.values() for event in steady):
+        for case in (case for case, steady in found.results.items() if event in steady):
+            yield event, case, "", found.results[case][event]
+            yield from ((event, case, island, values) for island, values in found.apart(case, event).items())
 
 
 def _case(report: RunReport, case: str) -> str:
     return f"{case} {report.titles.get(case, '')}".strip()
-
-
-def _cells(
-    report: RunReport, case: str, event: str, island: str, quantities: tuple[Quantity, ...]
-) -> Iterator[tuple[str, str]]:
-    """Yield the text of each cell of an event in a row, and for the legend why it is no number, or ""."""
-    found, timed = report.findings, "f_error_Hz" in quantities
-    islands = found.apart(case, event)
-    values = islands.get(island) if island else found.results[case].get(event)
-    if values is None:
-        yield from [("", "")] * (len(quantities) + timed)
-        return
-    mixed = bool(islands) and not island
-    where = f"{event}, island of {island}" if island else event
-    for name in quantities:
-        if mixed and name in SHARING:
-            yield "-", ""
-            continue
-        why = f"case {case}, {where}: {_why(values, name, found.f_nom)}" if name in values.reasons else ""
-        yield _cell(report, case, event, name, values, island), why
-    if timed:
-        restored = "never" if values.t_restore_s is None else f"{values.t_restore_s:.2f} s"
-        yield "-" if mixed or _nothing_shared(values, "MPSI") else restored, ""
 
 
 def _cell(report: RunReport, case: str, event: str, quantity: Quantity, values: Steady, island: str) -> str:
@@ -235,13 +181,12 @@ def _nothing_shared(values: Steady, name: str) -> bool:
     return values.reasons.get(name, "").startswith("nothing shared")
 
 
-def _own_grid(report: RunReport) -> Grid:
-    own = report.findings.own
-    places = dict.fromkeys((event, name) for of in own.values() for event in of for name in of[event].values)
-    rows, reasons = [], []
-    for case, of in own.items():
-        values = [of[event].values.get(name) if event in of else None for event, name in places]
-        rows.append((_case(report, case), *("-" if value is None else f"{value:.5g}" for value in values)))
-        reasons += [f"case {case}, {event}: {name} {text}" for event in of for name, text in of[event].reasons.items()]
-    header = ("case", *(f"{event}\n{name}" for event, name in places))
-    return Grid("Metrics of the scenario", header, tuple(rows), "\n".join(reasons))
+def _own_metrics(report: RunReport) -> list[RenderableType]:
+    own, rows, legend = report.findings.own, [], []
+    names = dict.fromkeys(name for of in own.values() for measured in of.values() for name in measured.values)
+    for event in dict.fromkeys(event for of in own.values() for event in of):
+        for case, measured in ((case, of[event]) for case, of in own.items() if event in of):
+            values = (measured.values.get(name) for name in names)
+            rows.append([event, _case(report, case), *("-" if value is None else f"{value:.5g}" for value in values)])
+            legend += [f"case {case}, {event}: {name} {text}" for name, text in measured.reasons.items()]
+    return _rendered("Metrics of the scenario", ["event", "case", *names], rows, legend)
