@@ -23,7 +23,6 @@ from gridpeers.plant.simulators import SIMULATORS
 from gridpeers.scenarios.checks.check_registry import ALWAYS, CHECKS
 from gridpeers.scenarios.drivers.free_endpoint import local_endpoint
 from gridpeers.scenarios.record.record_info import RecordInfo
-from gridpeers.scenarios.results.metrics_file import case_facts
 from gridpeers.scenarios.results.record import Recorded, Recorder, RecordError
 from gridpeers.scenarios.results.recorded_events import ended_by_a_law
 from gridpeers.scenarios.results.run_files import broken_if_ended, no_room, refusal, set_complete, shown, write_whole
@@ -102,7 +101,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
             flush=True,
         )
     from gridpeers.scenarios.checks.checked_case import CheckedCase
-    from gridpeers.scenarios.measured_run import write_measures
+    from gridpeers.scenarios.measured_run import case_facts, write_measures
 
     cases = {
         case: CheckedCase.of(scenario, request.feeder, case, record, folder / case) for case, record in recorded.items()

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from gridpeers.scenarios.results.metrics_file import RunMetrics
+from gridpeers.plant.equipment import Tables
+from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.wire.messages import Journal, LinkReport, LinkRequest, Pacing, PlantEvent
 
 
@@ -38,6 +39,8 @@ Other = LinkReport | Journal | LinkRequest
 Driver = Literal["processes", "inprocess"]
 """Driver of a case: one process per agent over Zenoh, or all in this process."""
 
+Clock = Literal["simulated", "wall"]  # Lock-step of plant and agents, or real time
+
 Progress = Callable[[str, float, float], None]
 """Takes the case, the time it has reached (s) and its end (s)."""
 
@@ -51,10 +54,18 @@ class LawStopError(BrokenRunError):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Request(RunMetrics):
-    """A run with its options; its folder is empty. Real time needs the driver "processes"."""
+class Request:
+    """A run with its options; its folder is empty at the start. Real time needs the driver "processes", or "live"."""
 
-    driver: Driver
+    scenario: ScenarioModel
+    """Checked; with the seed and the cases asked for."""
+    feeder: Tables
+    driver: Driver | Literal["live"]
+    """Live: a run that people start by hand."""
+    folder: Path
+    clock: Clock = "simulated"
+    speed: float = 1.0
+    """Real time: run time per wall time (s/s)."""
     keys: str | Path | None = None
     """Folder with the certificates of plant and agents; None: links are open, on the loopback."""
     processes: int = 0

@@ -9,8 +9,7 @@ from typing import TypedDict, get_args
 import msgspec
 
 from gridpeers.plant.simulators import SIMULATORS
-from gridpeers.scenarios.results.metrics_file import Clock
-from gridpeers.scenarios.run_request import SPEEDS, Driver
+from gridpeers.scenarios.run_request import SPEEDS, Clock, Driver
 from gridpeers.scenarios.schema import ScenarioError
 from gridpeers.scenarios.schema import scenario_model as model
 from gridpeers.wire.wording import suggestion

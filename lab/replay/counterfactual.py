@@ -25,10 +25,9 @@ from gridpeers.scenario import plain
 from gridpeers.scenarios.live.live_report import write_report
 from gridpeers.scenarios.record.record_info import LIVE, RecordInfo
 from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.scenarios.results.metrics_file import RunMetrics
 from gridpeers.scenarios.results.record import Recorded, Recorder, RecordError
 from gridpeers.scenarios.results.run_files import broken_if_ended, set_status, write_whole
-from gridpeers.scenarios.run_request import Other, Progress
+from gridpeers.scenarios.run_request import Other, Progress, Request
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.scenarios.schema.scenario_writing import to_toml
 from gridpeers.scenarios.versions import versions
@@ -211,7 +210,7 @@ def _write(
     figures: bool,
 ) -> None:
     write_whole(folder / "scenario.toml", text)
-    metrics = RunMetrics(
+    metrics = Request(
         scenario=scenario,
         feeder=rule.feeder,
         driver=LIVE,  # its windows are those of what happened

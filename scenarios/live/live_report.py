@@ -11,14 +11,14 @@ from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.console import terminal
 from gridpeers.scenarios.live.departures import Departures, compare, few
 from gridpeers.scenarios.live.live_processes import ProcessOutcome
-from gridpeers.scenarios.measured_run import write_measures
+from gridpeers.scenarios.measured_run import case_facts, write_measures
 from gridpeers.scenarios.results.history import as_they_came, late_moves
 from gridpeers.scenarios.results.island_membership import taken_part
-from gridpeers.scenarios.results.metrics_file import RunMetrics, case_facts
 from gridpeers.scenarios.results.plots.drawing import Drawing, Mark, drawing_of
 from gridpeers.scenarios.results.record import Recorded
 from gridpeers.scenarios.results.report import RunReport, show
 from gridpeers.scenarios.results.run_files import set_broken, set_complete, shown
+from gridpeers.scenarios.run_request import Request
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.wire.driver.drive import StoppedError
 from gridpeers.wire.messages import Pacing, PlantEvent
@@ -43,7 +43,7 @@ def _marks(departures: Iterable[PlantEvent]) -> Iterator[Mark]:
         yield Mark(label, t, ", ".join(dict.fromkeys(event.subject for event in of)))
 
 
-def write_report(metrics: RunMetrics, recorded: Recorded, pacing: Pacing | None, *, figures: bool = True) -> RunReport:
+def write_report(metrics: Request, recorded: Recorded, pacing: Pacing | None, *, figures: bool = True) -> RunReport:
     """Measure the record of a live run of one case; write metrics.json, report.txt and figures into its folder.
 
     It judges no claim of the paper, as people may have changed the run. StoppedError or KeyboardInterrupt if a signal
@@ -105,7 +105,7 @@ def _notes(scenario: ScenarioModel, recorded: Recorded, departures: Departures) 
         yield departures.note
 
 
-def conclude(outcome: ProcessOutcome, metrics: RunMetrics) -> ProcessOutcome:
+def conclude(outcome: ProcessOutcome, metrics: Request) -> ProcessOutcome:
     """Write and show the report of a run that has ended, and note in its folder how it ended.
 
     Ctrl-C and SIGTERM are good ends of a live run. Only a second one leaves it without numbers.

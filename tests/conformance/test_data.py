@@ -13,10 +13,11 @@ from gridpeers.runs.result import Result
 from gridpeers.scenarios.catalogue_files import CATALOGUE
 from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.scenarios.measured_run import metrics_json
 from gridpeers.scenarios.results.findings import find
 from gridpeers.scenarios.results.history import Nameplates
-from gridpeers.scenarios.results.metrics_file import RunMetrics, metrics_json
 from gridpeers.scenarios.results.record import Recorded, Recorder
+from gridpeers.scenarios.run_request import Request
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.schema.configs import configs
 from tests.command_line import invoke
@@ -76,7 +77,7 @@ def test_an_inverter_without_agent_keeps_its_set_points_and_is_left_out_of_the_s
     case = CheckedCase.of(scenario, feeder, "IV", recorded(path, "IV"))
     found, history = find({"IV": case}), case.history
     steady = found.results["IV"]["event1"]
-    ran = RunMetrics(scenario=scenario, feeder=feeder, driver="inprocess", folder=tmp_path)
+    ran = Request(scenario=scenario, feeder=feeder, driver="inprocess", folder=tmp_path)
 
     assert np.ptp(history.P_set[:, 1]) == 0.0
     assert steady.p["inv2"] == pytest.approx(0.647, abs=2e-3)

@@ -76,8 +76,8 @@ def _start(start: Start, *, agents: bool) -> None:
     from gridpeers.scenarios.live.live_processes import all_here, plant_here, say
     from gridpeers.scenarios.live.live_report import conclude
     from gridpeers.scenarios.record.record_info import LIVE
-    from gridpeers.scenarios.results.metrics_file import RunMetrics
     from gridpeers.scenarios.results.recorded_events import ended_by_a_law, first_of, law_failures
+    from gridpeers.scenarios.run_request import Request
     from gridpeers.scenarios.schema.configs import secured
     from gridpeers.scenarios.schema.plugin_keys import judges_laws
 
@@ -115,7 +115,7 @@ def _start(start: Start, *, agents: bool) -> None:
         else:
             outcome = plant_here(config, kept.record, info)
         if kept.whole is not None:
-            metrics = RunMetrics(
+            metrics = Request(
                 scenario=spec, feeder=feeder, driver=LIVE, folder=kept.whole, clock="wall", speed=start.speed
             )
             outcome = conclude(outcome, metrics)

@@ -18,11 +18,12 @@ from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.live.departures import compare
 from gridpeers.scenarios.live.live_report import live_drawing, write_report
+from gridpeers.scenarios.measured_run import metrics_json
 from gridpeers.scenarios.results.findings import find
 from gridpeers.scenarios.results.history import History, Window, windows
-from gridpeers.scenarios.results.metrics_file import RunMetrics, metrics_json
 from gridpeers.scenarios.results.record import Recorded, Recorder, canonical
 from gridpeers.scenarios.results.report import plain
+from gridpeers.scenarios.run_request import Request
 from gridpeers.scenarios.schema import ScenarioModel, load_scenario
 from gridpeers.scenarios.schema.configs import configs
 from gridpeers.scenarios.schema.scenario_model import Event, LoadChange
@@ -186,7 +187,7 @@ def case_of(history: History, opened: Sequence[Window], events: Sequence[PlantEv
 def account(folder: Path, recorded: Recorded, until: float) -> tuple[dict[str, Any], str]:
     """metrics.json and report of a live run that ended then (s)."""
     scenario, feeder = one_case("islanding")
-    ran = RunMetrics(scenario=scenario, feeder=feeder, driver="live", folder=folder, clock="wall")
+    ran = Request(scenario=scenario, feeder=feeder, driver="live", folder=folder, clock="wall")
     rows = [row for row in recorded.history.table.tolist() if row[0] <= until]
     events = tuple(event for event in recorded.events if event.t <= until)
     whole = replace(recorded, table=canonical(rows), ended=rows[-1][0], events=events)
@@ -203,7 +204,7 @@ def test_a_live_run_that_was_left_alone_has_the_numbers_of_its_case(tmp_path: Pa
     history = recorder.finish(7.0, plant.record_step).history
     came = windows([("event1", 1.0), ("event2", 4.0)], 7.0)
     found = find({"IV": case_of(history, came, recorder.case.events)})
-    ran = RunMetrics(scenario=scenario, feeder=feeder, driver="inprocess", folder=tmp_path)
+    ran = Request(scenario=scenario, feeder=feeder, driver="inprocess", folder=tmp_path)
     expected = json.loads(metrics_json(ran, found, {"IV": {}}))["cases"]["IV"]
     metrics, report = account(tmp_path, recorded, 8.0)
 
@@ -279,7 +280,7 @@ def test_what_people_switched_is_measured_as_a_scenario_with_the_same_events_is(
     scenario, feeder = one_case("islanding")
     came = [("event1", 1.0), ("live at 2.5 s", 2.5), ("event2", 4.0), ("live at 7.5 s", 7.5)]
     whole = case_of(switched.history, windows(came, 8.5), switched.events)
-    ran = RunMetrics(scenario=scenario, feeder=feeder, driver="inprocess", folder=tmp_path)
+    ran = Request(scenario=scenario, feeder=feeder, driver="inprocess", folder=tmp_path)
     expected = json.loads(metrics_json(ran, find({"IV": whole}), {"IV": {}}))["cases"]["IV"]
     metrics, report = account(tmp_path, switched, 8.5)
     case = metrics["cases"]["IV"]

@@ -21,8 +21,8 @@ from gridpeers.scenarios.live.live_files import folders
 from gridpeers.scenarios.live.live_processes import UNHEARD, LiveRecorder, ProcessOutcome, _followed, meaning
 from gridpeers.scenarios.live.run_address import RunAddress, UsageError
 from gridpeers.scenarios.live.run_requests import own_code
-from gridpeers.scenarios.results.metrics_file import RunMetrics
 from gridpeers.scenarios.results.record import Recorded
+from gridpeers.scenarios.run_request import Request
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.wire.plugins.plugin import Plugin
 from tests.toy.toy_configs import agent_config, toy_configs
@@ -119,7 +119,7 @@ def test_a_run_that_is_interrupted_while_it_is_judged_has_its_scenario(
     outcome = ProcessOutcome(recorded=cast(Recorded, SimpleNamespace(ended=2.01)))
     with folders(tmp_path / "live", scenario) as kept:
         assert kept.whole == tmp_path / "live"
-        ended = live_report.conclude(outcome, cast(RunMetrics, SimpleNamespace(scenario=scenario, folder=kept.whole)))
+        ended = live_report.conclude(outcome, cast(Request, SimpleNamespace(scenario=scenario, folder=kept.whole)))
 
     assert load_scenario(tmp_path / "live" / "scenario.toml")[0] == scenario
     assert ended.interrupted == "SIGINT"

@@ -10,11 +10,12 @@ import pytest
 from gridpeers.papers.singhal2022.paper_benchmarks import CLAIMS, ISLANDING
 from gridpeers.papers.singhal2022.tables import tables_of
 from gridpeers.scenarios.console import terminal
+from gridpeers.scenarios.measured_run import metrics_json
 from gridpeers.scenarios.results.claims import NO_BENCHMARK, judge
 from gridpeers.scenarios.results.findings import Findings
 from gridpeers.scenarios.results.metrics import Steady
-from gridpeers.scenarios.results.metrics_file import RunMetrics, metrics_json
 from gridpeers.scenarios.results.report import RunReport, plain, show
+from gridpeers.scenarios.run_request import Request
 from gridpeers.scenarios.schema import load_scenario
 
 
@@ -108,7 +109,7 @@ def test_metrics_of_several_islands_together_are_null() -> None:
     """metrics.json has no number either that means nothing; what the islands share is beside it."""
     whole = Steady(f_error_Hz=0.027, MPSI=0.093, V_error=0.01, MQSI=0.492, t_restore_s=2.0, p={})
     scenario, feeder = load_scenario("microgrid-switching")
-    ran = RunMetrics(scenario=scenario, feeder=feeder, driver="inprocess", folder=Path("here"))
+    ran = Request(scenario=scenario, feeder=feeder, driver="inprocess", folder=Path("here"))
     found = Findings(
         results={"IV": {"event1": whole, "event2": whole}}, islands={"IV": {"event2": {"inv1": whole, "inv4": whole}}}
     )

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from gridpeers.papers.singhal2022.paper_benchmarks import CLAIMS, ISLANDING
+from gridpeers.scenarios.measured_run import metrics_json
 from gridpeers.scenarios.results.claims import judge
 from gridpeers.scenarios.results.findings import Findings
 from gridpeers.scenarios.results.history import History, Nameplates, Window
 from gridpeers.scenarios.results.metrics import Steady, measure
-from gridpeers.scenarios.results.metrics_file import RunMetrics, metrics_json
 from gridpeers.scenarios.results.report import RunReport, plain
+from gridpeers.scenarios.run_request import Request
 from gridpeers.scenarios.schema import load_scenario
 
 PLATES = Nameplates(
@@ -176,7 +177,7 @@ def test_metrics_json_has_null_and_the_reason(tmp_path: Path) -> None:
     """A program that reads the file meets no number that is not one."""
     found, _ = ramping()
     spec, feeder = load_scenario("islanding")
-    ran = RunMetrics(scenario=spec, feeder=feeder, driver="inprocess", folder=tmp_path)
+    ran = Request(scenario=spec, feeder=feeder, driver="inprocess", folder=tmp_path)
 
     cases = json.loads(metrics_json(ran, found, {case: {} for case in spec.cases}))["cases"]
 
