@@ -23,7 +23,6 @@ from gridpeers.lab.chaos.chaos_run import (
     REPEATS,
     SAME_IN_PROCESSES,
     ChaosRow,
-    MachineError,
     compared,
     run_schedule,
 )
@@ -83,10 +82,7 @@ class Campaign:
     """By the check that is violated."""
 
     def run(self, stage: Stage) -> None:
-        """Do the runs, shrink what fails, and write all of it, also after an interruption.
-
-        MachineError if the machine lacks what a run needs: that is no failure of the scenario, and nothing is shrunk.
-        """
+        """Do the runs, shrink what fails, and write all of it, also after an interruption."""
         try:
             with TemporaryDirectory(prefix="gridpeers-chaos-", ignore_cleanup_errors=True) as temporary:
                 self._do_runs(stage, Path(temporary))
@@ -253,25 +249,12 @@ def shrink_number(
     """Return the check that a run violates, and the run of the simplest schedule found that violates it, too."""
     base = base_of(text)
     rows: dict[bytes, ChaosRow] = {}
-    lacks: list[MachineError] = []
 
     def row_of(schedule: Schedule) -> ChaosRow:
         repeats = violated == REPEATS
         row = run_schedule(base, schedule, seed_of(seed, number), number, driver, again=repeats, within=within)
         return rows.setdefault(msgspec.json.encode(schedule), row)
 
-    def fails(schedule: Schedule) -> bool:
-        try:
-            return violated in row_of(schedule).violated
-        except MachineError as error:
-            lacks.append(error)
-            raise KeyboardInterrupt from error  # hypothesis would take an `Exception` for a failure, and shrink it
-
-    try:
-        simplest = shrunk(base, seed, number, fails)
-    except KeyboardInterrupt:
-        if lacks:
-            raise lacks[0] from None
-        raise
+    simplest = shrunk(base, seed, number, lambda schedule: violated in row_of(schedule).violated)
     # that of the run itself is not run to shrink it
     return violated, rows.get(msgspec.json.encode(simplest)) or row_of(simplest)

@@ -127,14 +127,13 @@ def _try_undisturbed(console: Console, campaign: Campaign) -> None:
 def _told_if_ended(campaign: Campaign) -> Iterator[None]:
     """Say what is kept of a campaign that ends early."""
     from gridpeers.cli.usage import exit_code, interruptible
-    from gridpeers.lab.chaos.chaos_run import MachineError, machine_error
     from gridpeers.scenarios.results.run_files import refusal, shown
     from gridpeers.scenarios.sweep.workers import WorkersError
 
     try:
         with interruptible():
             yield
-    except (KeyboardInterrupt, OSError, MemoryError, MachineError, WorkersError) as error:
+    except (KeyboardInterrupt, OSError, MemoryError, WorkersError) as error:
         kept, path = len(campaign.rows), campaign.path
         where = "and no folder was made"
         if path and not path.is_dir():
@@ -146,4 +145,4 @@ def _told_if_ended(campaign: Campaign) -> Iterator[None]:
             fail(f"interrupted; {left}", code=exit_code(error))
         if isinstance(error, OSError) and path:
             fail(refusal(path, error), left, code=BROKEN)
-        fail(str(machine_error(error) or error), left, code=BROKEN)
+        fail(str(error) or "no memory is left", left, code=BROKEN)

@@ -5,10 +5,8 @@ A collapse that no control can prevent excuses violations of its inverters. Noth
 
 from __future__ import annotations
 
-import errno
-import re
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from time import monotonic
 from typing import NamedTuple
@@ -77,7 +75,7 @@ def run_schedule(
     again: bool = False,
     within: Path | None = None,
 ) -> ChaosRow:
-    """Run a scenario with a schedule and a seed of its own, and judge it; MachineError if the machine is to blame.
+    """Run a scenario with a schedule and a seed of its own, and judge it.
 
     With processes it runs in one process too, and with `again` once more: both must give the same bytes. Temporary
     folders are made `within` that of the campaign.
@@ -174,27 +172,17 @@ class JudgedRun(NamedTuple):
 def judged(
     base: ChaosBase, scenario: ScenarioModel, row: ChaosRow, driver: Driver, within: Path | None = None
 ) -> JudgedRun:
-    try:
-        temporary = tempfile.TemporaryDirectory(prefix="gridpeers-chaos-", dir=within, ignore_cleanup_errors=True)
-    except OSError as error:
-        raise MachineError(str(error)) from None
-    with temporary as name:
+    with tempfile.TemporaryDirectory(prefix="gridpeers-chaos-", dir=within, ignore_cleanup_errors=True) as name:
         folder = Path(name)
         request = Request(scenario=scenario, feeder=base.feeder, driver=driver, folder=folder, lasting=False)
         at_start = plant_at_start if scenario.plant.simulator == "gridpeers" and driver == "inprocess" else None
         try:
-            recorded, outcome = run_case(request, base.case, "", lambda case, t, end: None, at_start)
+            recorded, _ = run_case(request, base.case, "", lambda case, t, end: None, at_start)
             case = CheckedCase.of(scenario, base.feeder, base.case, recorded, folder / base.case)
             verdicts = judge_case(case)
-            told = [event.text for event in recorded.events if event.kind == "law"]
-            told += [*outcome.notes, *(it.reason for it in verdicts if it.status == "failed")]
-            if lack := machine_error(*told):  # an agent may die, a law or a check fail, and the run goes on
-                raise lack
-        except MachineError:
+        except (OSError, MemoryError):  # the machine lacks room or memory, which is no failure of the scenario
             raise
         except Exception as error:
-            if lack := machine_error(error):
-                raise lack from error
             violated = {ERROR: f"{type(error).__name__}: {error}"}
             if isinstance(error, BrokenRunError):
                 violated = {LAW_FAILED if isinstance(error, LawStopError) else ENDS: str(error)}
@@ -271,53 +259,3 @@ def unexcused(verdicts: Iterable[CheckVerdict], excused: frozenset[str]) -> dict
             of_others = msgspec.structs.replace(verdict, violations=rest, count=count, reason=reason)
             found[verdict.check] = of_others.sentence if count or verdict.reason else ""
     return found
-
-
-# -------------------------------------------------------------------- what the machine lacks
-
-
-_ERRORS = (
-    *(errno.ENOMEM, errno.EAGAIN, errno.EMFILE, errno.ENFILE),
-    *(errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO, errno.ESTALE),
-)
-_NUMBER = f"(?:{'|'.join(map(str, _ERRORS))})"
-
-_WORDS = re.compile(
-    rf"MemoryError|\[Errno {_NUMBER}\]|os error {_NUMBER}\)|Os {{ code: {_NUMBER},|memory allocation of \d+ bytes"
-    r"|failed to map segment from|can't start new thread|Zenoh cannot start its threads|may have \d+ files open at once"
-    r"|was killed by SIGKILL"
-)
-"""Words of Python, Rust and the loader for a lack, in an error or in the last lines of a process that ended. In
-simulated time a run sends SIGKILL to no process of its own before it has its verdict: a system without memory does."""
-
-
-class MachineError(Exception):
-    """The machine lacks what a run needs, as room on a disk; made from the line that tells of it."""
-
-    def __init__(self, line: str) -> None:
-        super().__init__(
-            f"the machine lacks what a run needs ({line}); end other programs, do fewer runs at a time (--jobs), make "
-            f"room in {tempfile.gettempdir()} or set TMPDIR to another folder, or raise the limit (ulimit)"
-        )
-
-
-def machine_error(*told: BaseException | str) -> MachineError | None:
-    r"""Return the lack that errors of a run, or texts on its processes, laws and checks, name; None if they name none.
-
-    Examples
-    --------
-    >>> str(machine_error("inv1 exited with status 1.\n  OSError: [Errno 24] Too many open files")).partition(";")[0]
-    'the machine lacks what a run needs (OSError: [Errno 24] Too many open files)'
-    >>> machine_error(FileNotFoundError(errno.ENOENT, "No such file", "mine.csv"))
-    """
-    for text in (text for it in told for text in ([it] if isinstance(it, str) else _texts(it))):
-        if lines := [line for line in text.splitlines() if _WORDS.search(line)]:
-            return MachineError(lines[-1].strip())  # an error ends its traceback
-    return None
-
-
-def _texts(error: BaseException | None) -> Iterator[str]:
-    """Yield the text of an error, and of those that led to it, also where `raise ... from None` hides them."""
-    while error is not None:
-        yield f"{type(error).__name__}: {error}".rstrip(": ")
-        error = error.__cause__ or error.__context__
