@@ -17,29 +17,6 @@ from gridpeers.wire.schema.table_reading import read_parameters, read_table
 from gridpeers.wire.schema.table_schema import Problem
 from gridpeers.wire.wording import is_no_path
 
-
-def executable_problem(file: Path) -> str:
-    """Return why the system cannot run a script, as the end of a sentence; "" if it may."""
-    try:
-        with file.open("rb") as opened:
-            first = opened.readline(256)
-    except OSError:  # a program that may be run but not read
-        return ""
-    if not first.startswith(b"#!"):
-        if b"\0" in first:  # a compiled program
-            return ""
-        return "has no first line such as #!/usr/bin/env python3, and is no compiled program; write one"
-    if first.endswith(b"\r\n"):
-        return "has lines that end as those of Windows, which #! cannot have; write it with Unix line ends"
-    line = first[2:].decode(errors="replace").strip().replace("\t", " ")
-    program, _, argument = line.partition(" ")
-    found = Path(program).is_file()
-    if found and Path(program).name == "env" and not argument.strip().startswith("-"):
-        program = argument.strip()  # the system hands it on as one, blanks included
-        found = shutil.which(program) is not None
-    return "" if found else f"asks in its first line for {program or 'nothing'}, which is not there"
-
-
 PAPER = LawChoice().use
 
 OF_PLANT = ("t", "f", "P", "Q", "V", "P_set", "V_set")  # a record has these beside what laws share
@@ -104,9 +81,7 @@ def _program_problems(choice: LawChoice, parameters: Mapping[str, Any]) -> list[
     if not folder.is_dir():
         return [Problem("folder", f"there is no folder {folder}")]
     place = folder / program
-    if found := shutil.which(str(place.resolve())) or ("/" not in program and shutil.which(program)):
-        if text := executable_problem(Path(found)):
-            return [Problem("command", f"{program} {text}")]
+    if shutil.which(str(place.resolve())) or ("/" not in program and shutil.which(program)):
         return read_parameters(Law, limits_in(parameters))[1]
     if place.is_file():
         return [Problem("command", f"{program} cannot be executed; chmod +x it, or name its interpreter first")]

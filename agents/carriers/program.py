@@ -122,8 +122,10 @@ class ProgramLaw(Law):
         try:
             self._group = ProcessGroup(command, choice.folder, litter)
         except OSError as error:
-            text = f"{choice.command[0]}: {error.strerror}; write the path of a program that can be run"
-            raise ValueError(f"law program {text}") from None
+            text = (
+                f"{choice.command[0]}: {error.strerror}; write the path of a program that can be run, and in the first"
+            )
+            raise ValueError(f"law program {text} line of a script the path of its interpreter") from None
         assert self._group.program.stdin is not None
         os.set_blocking(self._group.program.stdin.fileno(), False)
         self._patience = FIRST * choice.time_limit
