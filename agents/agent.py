@@ -15,7 +15,7 @@ from msgspec.structs import replace
 from gridpeers.agents.agent_config import AgentConfig, nameplate_of
 from gridpeers.agents.degraded_communication import IslandDetector, SaturationDetector, StalenessWeights, law_in_force
 from gridpeers.agents.graphs import GraphError, in_neighbours, rule_of
-from gridpeers.agents.laws.call import LawError, decide, failed_at, objection_to, start_law
+from gridpeers.agents.laws.call import LawError, decide, failed_at, misnamed, objection_to, start_law
 from gridpeers.agents.laws.law import NOTHING_SHARED, Law, Neighbour, Own
 from gridpeers.wire.codec import RejectedMessages
 from gridpeers.wire.messages import OFF, Measurement, Nameplate, State
@@ -267,7 +267,7 @@ class Agent:
                     start_law(self._law, own)
                     self._law_runs = True
                 P_set, V_set, shared, send, _ = decide(self._law, own, around, config.T_c)
-                if shared and (wrong := objection_to(shared, self._declared)):
+                if shared and (wrong := misnamed(shared, self._declared) or objection_to(shared, self._declared)):
                     raise LawError(f"step at t = {own.t:.6g} s shares {wrong}")
             except LawError as error:
                 law = config.control.law

@@ -12,7 +12,7 @@ from gridpeers.agents.laws.law import NOTHING_SHARED, Law, Neighbour, Own, SetPo
 from gridpeers.wire.messages import MOST_SHARED, SHARED_LIMIT
 from gridpeers.wire.plugins.registry import ANYTHING, line_of, named
 from gridpeers.wire.schema.table_schema import Range
-from gridpeers.wire.wording import printable
+from gridpeers.wire.wording import printable, suggestion
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,31}")
 
@@ -122,6 +122,12 @@ def objection_to(shared: Mapping[str, float], declared: Mapping[str, SharedQuant
         if it is not None and not it.low <= value <= it.high:
             return f"{name}, which {Range(it.low, it.high).objection(value, it.unit)}"
     return ""
+
+
+def misnamed(shared: Mapping[str, float], declared: Mapping[str, SharedQuantity]) -> str:
+    """Return the first value that is none of those that a law declares, if it declares any, and what may be meant."""
+    wrong = next((name for name in shared if name not in declared), "") if declared else ""
+    return wrong and f"{wrong}, which it does not declare; {suggestion(wrong, declared, 'quantities')}"
 
 
 def _shown(value: Any) -> str:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated
 
 import pytest
@@ -26,17 +27,19 @@ PROGRAM = {"command": ["cat"], "shared": [{"name": "Omega", "unit": "pu", "low":
 
 
 class Shares(Law):
-    """Shares Omega: 0, and 0.1 from the second step on."""
+    """Shares Omega: 0 at first, and another value from the second step on."""
+
+    then: Mapping[str, float] = MappingProxyType({"Omega": 0.1})
 
     Omega: Annotated[float, gp.SHARED, gp.Unit("pu"), gp.Range(-0.05, 0.05), "Integral."]
     rest: Annotated[float, gp.SHARED, "What is left."]
 
     def start(self, own: Own) -> None:
-        self.Omega = 0.0
+        self.steps = 0
 
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
-        before, self.Omega = self.Omega, 0.1
-        return SetPoints(own.P_set, own.V_set, {"Omega": before})
+        self.steps += 1
+        return SetPoints(own.P_set, own.V_set, {"Omega": 0.0} if self.steps == 1 else self.then)
 
 
 class Taken(Shares):
@@ -45,9 +48,9 @@ class Taken(Shares):
     V: Annotated[float, gp.SHARED, "Voltage."]
 
 
-def agent() -> Agent:
+def agent(law: Law | None = None) -> Agent:
     control = replace(ALL_FULL, law=LawChoice(use=f"{__name__}:Shares", shared=(OMEGA,)))
-    made = Agent(agent_config("inv1", control), Shares())
+    made = Agent(agent_config("inv1", control), law or Shares())
     made.meet(Agent(agent_config("inv2", control)).nameplate)
     return made
 
@@ -119,14 +122,23 @@ def test_an_fmu_declares_by_its_outputs(tmp_path: Path) -> None:
     assert shared_by(LawChoice(fmu="none.fmu", folder=str(tmp_path))) == ()
 
 
-def test_a_law_that_shares_a_value_beyond_its_range_fails() -> None:
-    it = agent()
+@pytest.mark.parametrize(
+    ("then", "said"),
+    [
+        ({"Omega": 0.1}, "Omega, which must be from -0.05 to 0.05 pu, got 0.1"),
+        ({"Omga": 0.0}, 'Omga, which it does not declare; did you mean "Omega"? The quantities are Omega'),
+    ],
+)
+def test_a_law_that_shares_a_value_beyond_its_range_or_another_name_fails(then: dict[str, float], said: str) -> None:
+    law = Shares()
+    law.then = then
+    it = agent(law)
 
     first, second = it.tick(measurement(0)), it.tick(measurement(1))
 
     assert first.shared == {"Omega": 0.0}
     assert second.idle
-    assert "step at t = 0.02 s shares Omega, which must be from -0.05 to 0.05 pu, got 0.1" in it.fault
+    assert f"step at t = 0.02 s shares {said}" in it.fault
 
 
 def test_a_state_with_a_value_beyond_its_range_is_dropped_and_counted() -> None:
