@@ -22,7 +22,7 @@ from gridpeers.agents.roster_meeting import KnownAgents, RosterMeeting
 from gridpeers.agents.tick_barrier import AgentBarrier
 from gridpeers.agents.tick_timer import AgentTimer
 from gridpeers.wire.codec import RejectedError, encode
-from gridpeers.wire.journal import JournalBuffer, TimedTraffic
+from gridpeers.wire.journal import JournalBuffer, Traffic
 from gridpeers.wire.links import Links
 from gridpeers.wire.messages import PLANT, Measurement, Prepare, State, Stop, Waiting
 from gridpeers.wire.phases import Phases, PhaseTable
@@ -148,13 +148,13 @@ class AgentNode:
         reports = self._reports = AgentReports(post, heard, instance, empty=links is not None and not realtime)
         self._reason = ""
         """Why it leaves."""
-        self._timed: TimedTraffic | None = None
+        self._timed: Traffic | None = None
         self._decisions: DecisionJournal | None = None
         if config.record != "physics":
             post.journal = JournalBuffer()
             self._decisions = DecisionJournal(agent, post.journal)
             if realtime:
-                self._timed = post.traffic = TimedTraffic(keys, post.journal, arrivals=config.record == "all")
+                self._timed = post.traffic = Traffic(keys, post.journal, arrivals=config.record == "all")
 
         self.policy: AgentTickPolicy
         if realtime:
@@ -325,7 +325,7 @@ class AgentNode:
     def leave(self, reason: str) -> None:
         """Leave in real time, as somebody outside of the run asks for it; noted, because a replay must do the same."""
         if self._timed is not None and not self.finished and self.phases.now != "leaving":
-            self._timed.process("leave", reason, self._timed.now)
+            self._timed.process("leave", reason)
         self._leave(reason, 0.0)
 
     def _leave(self, reason: str, now: float) -> None:

@@ -29,7 +29,7 @@ from gridpeers.agents.agent_reports import AgentReports
 from gridpeers.agents.decision_journal import DecisionJournal
 from gridpeers.agents.hearing import Hearing, OpenMeeting
 from gridpeers.agents.upkeep import Upkeep
-from gridpeers.wire.journal import TimedTraffic
+from gridpeers.wire.journal import Traffic
 from gridpeers.wire.links import REPORT_TICKS
 from gridpeers.wire.messages import PLANT, Leave, Measurement, Prepare, State, Stop, Waiting
 from gridpeers.wire.node import CLOCK_ALONE
@@ -96,7 +96,7 @@ class AgentTimer:
         heard: Hearing,
         meeting: OpenMeeting,
         reports: AgentReports,
-        timed: TimedTraffic | None,
+        timed: Traffic | None,
     ) -> None:
         if config.speed <= 0.0:
             raise ValueError(f"speed: must be positive, got {config.speed:g} s/s; 1 is real time")
@@ -244,7 +244,7 @@ class AgentTimer:
         state = replace(agent.tick(measurement, tuple(ages), ages), seq=upkeep.sent)
         if decisions is not None and self._timed is not None:
             all_ages = {name: heard.age(name, at) for name in neighbours}
-            decisions.realtime_tick(state.seq, measurement.seq, all_ages, limit, self._timed.now, before)
+            decisions.realtime_tick(state.seq, measurement.seq, all_ages, limit, now, before)
         upkeep.used = tuple(name for name in ages if agent.shares_island(name))
         upkeep.ticks += 1
         upkeep.sent += 1

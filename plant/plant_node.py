@@ -30,7 +30,7 @@ from gridpeers.plant.realtime.realtime import RealtimeRoster, RealtimeTimer
 from gridpeers.plant.realtime.run_commands import RunCommands
 from gridpeers.plant.recorder_feed import KEPT_BYTES, KEPT_BYTES_RECORDED, RecorderFeed, RunReports
 from gridpeers.wire.codec import RejectedError, encode
-from gridpeers.wire.journal import JournalBuffer, TickTraffic, TimedTraffic
+from gridpeers.wire.journal import JournalBuffer, TickTraffic, Traffic
 from gridpeers.wire.links import Links
 from gridpeers.wire.messages import PLANT, Answer, Command, Journal, LinkReport, Nameplate, State, Waiting
 from gridpeers.wire.phases import Phases, PhaseTable
@@ -107,7 +107,7 @@ class PlantNode:
         self.roster: LockstepRoster | RealtimeRoster
         self._states: dict[str, State] = {}  # states that the links let through and that are not held yet
         self._tick_traffic: TickTraffic | None = None
-        self._timed: TimedTraffic | None = None
+        self._timed: Traffic | None = None
         if realtime:
             self.ticks = timer = RealtimeTimer(post, stepper, phases)
             self.reports = RunReports(post, stepper, feed, timer.report_ticks, live=True)
@@ -115,7 +115,7 @@ class PlantNode:
             RunCommands(self, cast(LivePlant, plant), timer, roster.link_commands)
             if post.journal is not None:
                 arrivals = config.record == "all"
-                post.traffic = self._timed = TimedTraffic(keys, post.journal, arrivals=arrivals, whole=True)
+                post.traffic = self._timed = Traffic(keys, post.journal, arrivals=arrivals, whole=True)
         else:
             self.ticks = barrier = LockstepBarrier(post, stepper, phases, feed)
             self.reports = RunReports(post, stepper, feed, barrier.report_ticks, live=False)

@@ -17,7 +17,7 @@ Three rules keep it small, because in simulated time a tick must not wait for it
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import msgspec
 from msgspec.structs import astuple, replace
@@ -39,10 +39,6 @@ ROOM = 1_000_000
 NOTED_REJECTED = 200
 """Rejected messages that are noted between two times at which a journal is taken; the others are counted only."""
 
-COUNTED_KEYS = 200
-"""Keys and kinds of which a part counts messages, all further ones by their kind alone: whoever sends on keys with
-wildcards has any number of them."""
-
 AT_ONCE = 64
 """Most messages in one entry: of the longest there are, they fit into a part."""
 
@@ -55,7 +51,7 @@ class KeyEntry(Entry, frozen=True, array_like=True):
     at: float | None
     """Time on the own clock (s, monotonic), of a message its arrival; None in simulated time."""
     key: str
-    """Key, without `gridpeers/<run>/`; empty for all others, where there are too many to count each."""
+    """Key, without `gridpeers/<run>/`."""
 
 
 class Exchange(Entry, frozen=True, array_like=True, tag="exchange"):
@@ -205,12 +201,9 @@ class JournalBuffer:
 
     def count(self, rejected: RejectedCount) -> None:
         """Add to the entry about one key and kind; these come after all others, whatever room there is."""
-        if len(self._counts) >= COUNTED_KEYS and (rejected.key, rejected.kind) not in self._counts:
-            rejected = replace(rejected, key="")
         before = self._counts.get((rejected.key, rejected.kind))
-        if before is not None:
-            rejected = replace(rejected, count=before.count + rejected.count)
-        self._counts[rejected.key, rejected.kind] = rejected
+        number = rejected.count + (0 if before is None else before.count)
+        self._counts[rejected.key, rejected.kind] = replace(rejected, count=number)
 
     def take_parts(self) -> list[bytes]:
         for rejected in self._counts.values():
@@ -261,65 +254,102 @@ SHOWN_PAYLOAD = 1_000
 _IN_TELEMETRY = ("telemetry", "journal", "report")
 """Kinds of keys whose messages the record has anyway: the plant publishes them for recorders."""
 
-_CONDITION = ("status", "answer")
-"""Kinds of keys by which a node says how it does; a status decides what events the plant tells."""
-
-_NOT_NOTED = _IN_TELEMETRY + _CONDITION
-"""Kinds of keys whose messages a sender does not note."""
+_NOT_NOTED = (*_IN_TELEMETRY, "status", "answer")
+"""Kinds of keys whose messages a sender does not note: also those by which it says how it does. What the plant hears of
+a status is noted, because it decides what events the plant tells."""
 
 
-class Traffic(Protocol):
-    """Takes all messages and tokens of a node; `at` is the driver's clock (s)."""
+class Traffic:
+    """Notes all messages and tokens of a node, each with its time, in the order in which they came.
 
-    def sent(self, key: str, payload: bytes) -> None: ...
-    def received(self, key: str, payload: bytes, at: float, rejected: str) -> None: ...
-    def lost(self, key: str, kind: str, count: int, at: float) -> None: ...
-    def token(self, key: str, at: float, *, appeared: bool) -> None: ...
-    def line(self, text: str) -> None: ...
-
-
-class TickTraffic:
-    """The plant's messages in simulated time: what makes a tick is one entry, all else is noted one by one.
-
-    No time is noted, because none of them counts: so the record is the same from every driver.
+    What went into the core is noted call by call, so that the core can be given the same again.
+    Without `arrivals` only what the node sends is noted. With `whole` states are noted with their bytes, as by the
+    plant, which hears all of them: a killed agent takes the end of its own journal with it, and an agent of others
+    keeps none. In simulated time no time is noted, because none counts: so the record is the same from every driver.
     """
 
+    def __init__(
+        self, keys: Keys, journal: JournalBuffer, *, arrivals: bool = True, whole: bool = False, timed: bool = True
+    ) -> None:
+        self._journal, self._cut, self._timed = journal, len(keys.prefix), timed
+        self._arrivals, self._hears = arrivals, arrivals or whole
+        self._whole = whole
+        self.now = 0.0 if timed else None
+        """Time of the last call of the node (s, monotonic)."""
+
+    def sent(self, key: str, payload: bytes) -> None:
+        name = key[self._cut :]
+        if kind_of(name) not in _NOT_NOTED:
+            self._journal.add(SentMessage(self.now, name, payload))
+
+    def received(self, key: str, payload: bytes, at: float, rejected: str) -> None:
+        """Note a message; `rejected` is the kind of its rejection, empty if it was used."""
+        self._go_on(at)
+        name = key[self._cut :]
+        kind = kind_of(name)
+        needless = _IN_TELEMETRY if self._arrivals else _NOT_NOTED
+        if not self._hears or (kind in needless and not rejected):
+            return
+        shown = payload[:SHOWN_PAYLOAD] if rejected else payload
+        entry: MessageReference | ReceivedMessage = ReceivedMessage(self.now, name, shown, rejected)
+        # its sender has noted it; any other reject may be of somebody who keeps no journal
+        noted = kind in EACH_TICK and not self._whole and rejected in ("", "stale")
+        if noted and (message := sound(payload)):
+            entry = MessageReference(self.now, name, message.epoch, message.seq, rejected)
+        (self._journal.add_rejected if rejected else self._journal.add)(entry)
+
+    def lost(self, key: str, kind: str, count: int, at: float) -> None:
+        self._go_on(at)
+        if self._hears:
+            self._journal.count(RejectedCount(self.now, key[self._cut :], kind, count))
+
+    def token(self, key: str, at: float, *, appeared: bool) -> None:
+        self._go_on(at)
+        if self._arrivals:
+            self._journal.add(Token(self.now, key[self._cut :], appeared))
+
+    def woken(self, at: float, *, work: bool = False) -> None:
+        self._go_on(at)
+        if self._arrivals:
+            self._journal.add(WakeUp(at, work))
+
+    def process(self, kind: str, text: str, at: float | None = None) -> None:
+        """Note an event of the process, at the time of the last call if there is no time."""
+        if at is not None:
+            self._go_on(at)
+        self._journal.add(ProcessEvent(self.now, kind, text))
+
+    def _go_on(self, at: float) -> None:
+        if self._timed:
+            self.now = at
+
+
+class TickTraffic(Traffic):
+    """The plant's messages in simulated time: what makes a tick is one entry, all else is noted one by one."""
+
     def __init__(self, keys: Keys, names: Collection[str], journal: JournalBuffer) -> None:
-        self._journal, self._cut = journal, len(keys.prefix)
-        self._of_tick: dict[str, list[Any]] = {}
-        """The list of a tick to which messages on a key belong."""
+        super().__init__(keys, journal, whole=True, timed=False)
         self._measurements: list[Any] = []
         self._states: list[Any] = []
-        for name in names:
-            self._of_tick[keys.measurement(name)] = self._measurements
-            self._of_tick[keys.state(name)] = self._states
-        self._elsewhere = {keys.telemetry, keys.request, *map(keys.report, names), *map(keys.journal, names)}
-        """Keys whose messages the record has anyway, or, of recorders, has no use for."""
+        self._of_tick = {keys.measurement(name): self._measurements for name in names}
+        self._of_tick |= {keys.state(name): self._states for name in names}
+        """The list of a tick to which messages on a key belong."""
+        self._questions = keys.request
+        """Key of recorders' questions: how many come is a matter of the machine."""
 
     def sent(self, key: str, payload: bytes) -> None:
         of_tick = self._of_tick.get(key)
-        if of_tick is not None:
+        if of_tick is None:
+            super().sent(key, payload)
+        else:
             of_tick.append(payload)
-        elif key not in self._elsewhere:
-            self._journal.add(SentMessage(None, key[self._cut :], payload))
 
     def received(self, key: str, payload: bytes, at: float, rejected: str) -> None:
         of_tick = self._of_tick.get(key)
-        if of_tick is not None and not rejected:
+        if rejected or (of_tick is None and key != self._questions):
+            super().received(key, payload, at, rejected)
+        elif of_tick is not None:
             of_tick.append(payload)
-        elif rejected:
-            self._journal.add_rejected(ReceivedMessage(None, key[self._cut :], payload[:SHOWN_PAYLOAD], rejected))
-        elif key not in self._elsewhere:
-            self._journal.add(ReceivedMessage(None, key[self._cut :], payload))
-
-    def lost(self, key: str, kind: str, count: int, at: float) -> None:
-        self._journal.count(RejectedCount(None, key[self._cut :], kind, count))
-
-    def token(self, key: str, at: float, *, appeared: bool) -> None:
-        self._journal.add(Token(None, key[self._cut :], appeared))
-
-    def line(self, text: str) -> None:
-        self._journal.add(ProcessEvent(None, "line", text))
 
     def exchanged(self, tick: int, measurements: Sequence[Measurement], states: Sequence[State]) -> None:
         """Note a tick in which plant and agents share a process, and send nothing."""
@@ -333,61 +363,3 @@ class TickTraffic:
     def _add_exchange(self, tick: int, measurements: list[Any], states: list[Any]) -> None:
         for i in range(0, max(len(measurements), len(states)), AT_ONCE):
             self._journal.add(Exchange(tick, measurements[i : i + AT_ONCE], states[i : i + AT_ONCE]))
-
-
-class TimedTraffic:
-    """The messages and tokens of a node in real time, each with its time, in the order in which they came.
-
-    What went into the core is noted call by call, so that the core can be given the same again.
-    Without `arrivals` only what the node sends is noted. With `whole` states are noted with their bytes, as by the
-    plant, which hears all of them: a killed agent takes the end of its own journal with it, and an agent of others
-    keeps none.
-    """
-
-    def __init__(self, keys: Keys, journal: JournalBuffer, *, arrivals: bool = True, whole: bool = False) -> None:
-        self._journal, self._cut, self._arrivals = journal, len(keys.prefix), arrivals
-        self._whole = whole
-        self.now = 0.0
-        """Time of the last call of the node (s, monotonic)."""
-
-    def sent(self, key: str, payload: bytes) -> None:
-        name = key[self._cut :]
-        if kind_of(name) not in _NOT_NOTED:
-            self._journal.add(SentMessage(self.now, name, payload))
-
-    def received(self, key: str, payload: bytes, at: float, rejected: str) -> None:
-        self.now = at
-        name = key[self._cut :]
-        kind = kind_of(name)
-        needless = _IN_TELEMETRY if self._arrivals else _NOT_NOTED
-        if not (self._arrivals or self._whole) or (kind in needless and not rejected):
-            return
-        shown = payload[:SHOWN_PAYLOAD] if rejected else payload
-        entry: MessageReference | ReceivedMessage = ReceivedMessage(at, name, shown, rejected)
-        # its sender has noted it; any other reject may be of somebody who keeps no journal
-        noted = kind in EACH_TICK and not self._whole and rejected in ("", "stale")
-        if noted and (message := sound(payload)):
-            entry = MessageReference(at, name, message.epoch, message.seq, rejected)
-        (self._journal.add_rejected if rejected else self._journal.add)(entry)
-
-    def lost(self, key: str, kind: str, count: int, at: float) -> None:
-        self.now = at
-        if self._arrivals or self._whole:
-            self._journal.count(RejectedCount(at, key[self._cut :], kind, count))
-
-    def token(self, key: str, at: float, *, appeared: bool) -> None:
-        self.now = at
-        if self._arrivals:
-            self._journal.add(Token(at, key[self._cut :], appeared))
-
-    def woken(self, at: float, *, work: bool = False) -> None:
-        self.now = at
-        if self._arrivals:
-            self._journal.add(WakeUp(at, work))
-
-    def process(self, kind: str, text: str, at: float) -> None:
-        self.now = at
-        self._journal.add(ProcessEvent(at, kind, text))
-
-    def line(self, text: str) -> None:
-        self._journal.add(ProcessEvent(self.now, "line", text))

@@ -162,7 +162,7 @@ class Post:
     def say(self, text: str) -> None:
         """Have a line logged."""
         if self.traffic is not None:
-            self.traffic.line(text)
+            self.traffic.process("line", text)
         self.actions.append(Log(f"{self.name}: {text}"))
 
     def take_journal(self, t: float, *, empty: bool = False) -> list[Journal]:

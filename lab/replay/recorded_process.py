@@ -26,6 +26,7 @@ from gridpeers.wire.codec import KINDS, encode, sound
 from gridpeers.wire.journal import (
     EACH_TICK,
     Entry,
+    JournalBuffer,
     MessageReference,
     ProcessEvent,
     ReceivedMessage,
@@ -36,6 +37,7 @@ from gridpeers.wire.journal import (
     WakeUp,
     kind_of,
 )
+from gridpeers.wire.keys import Keys
 from gridpeers.wire.links import Links
 from gridpeers.wire.messages import PLANT, Journal, Measurement, State
 from gridpeers.wire.node import Loss
@@ -194,8 +196,8 @@ MakePlant = Callable[[PlantConfig], LivePlant]
 
 
 class _Outbox(Traffic):
-    def __init__(self, cut: int) -> None:
-        self._cut = cut
+    def __init__(self, keys: Keys) -> None:
+        super().__init__(keys, JournalBuffer(), arrivals=False)
         self.messages: list[KeyedMessage] = []
 
     def sent(self, key: str, payload: bytes) -> None:
@@ -206,7 +208,7 @@ class ReplayedProcess:
     def __init__(self, node: AgentNode | PlantNode, links: Links | None) -> None:
         self.node, self.links = node, links
         self._root = node.keys.prefix
-        self._sent = _Outbox(len(self._root))  # type: ignore[abstract]  # methods of the protocol do nothing
+        self._sent = _Outbox(node.keys)
         node.post.traffic = self._sent
 
     def use_links(self, links: Links) -> None:

@@ -10,7 +10,6 @@ from gridpeers.scenarios.record.journal_reader import entries_of
 from gridpeers.wire.codec import encode
 from gridpeers.wire.journal import (
     AT_ONCE,
-    COUNTED_KEYS,
     LOT,
     NOTED_REJECTED,
     ROOM,
@@ -24,8 +23,8 @@ from gridpeers.wire.journal import (
     RejectedCount,
     SentMessage,
     TickTraffic,
-    TimedTraffic,
     Token,
+    Traffic,
     WakeUp,
 )
 from gridpeers.wire.keys import Keys
@@ -89,9 +88,9 @@ def noted(journal: JournalBuffer) -> list[Entry]:
     return [entry for part in journal.take_parts() for entry in entries_of(part)]
 
 
-def timed(**options: Any) -> tuple[TimedTraffic, JournalBuffer]:
+def timed(**options: Any) -> tuple[Traffic, JournalBuffer]:
     journal = JournalBuffer()
-    return TimedTraffic(KEYS, journal, **options), journal
+    return Traffic(KEYS, journal, **options), journal
 
 
 def test_in_real_time_each_call_has_its_time() -> None:
@@ -102,7 +101,7 @@ def test_in_real_time_each_call_has_its_time() -> None:
     traffic.received(KEYS.state("inv2"), STATE, 10.0, "")
     traffic.sent(KEYS.state("inv1"), STATE)
     traffic.woken(10.5)
-    traffic.line("joins")
+    traffic.process("line", "joins")
     traffic.woken(11.0, work=True)
     traffic.sent(KEYS.leave("inv1"), LEAVE)
     traffic.token(KEYS.alive_agent("inv2", "b"), 11.5, appeared=False)
@@ -177,7 +176,7 @@ def test_in_ticks_the_plant_notes_a_tick_as_one_entry() -> None:
     traffic.received(KEYS.journal("inv1"), b"part", 0.0, "")
     traffic.received(KEYS.ready("inv1"), b"ready", 0.0, "")
     traffic.token(KEYS.alive_agent("inv2", "b"), 0.0, appeared=True)
-    traffic.line("all are there")
+    traffic.process("line", "all are there")
     traffic.ticked(4)
     traffic.ticked(5)
 
@@ -211,7 +210,7 @@ def test_the_messages_of_many_agents_are_several_entries(count: int) -> None:
 def test_a_flood_of_rejected_messages_does_not_fill_the_journal() -> None:
     """The first since the journal was taken are noted with their bytes, the number of the others by key and kind."""
     journal = JournalBuffer()
-    for traffic, at in ((TimedTraffic(KEYS, journal), 10.0), (TickTraffic(KEYS, ("inv2",), journal), None)):
+    for traffic, at in ((Traffic(KEYS, journal), 10.0), (TickTraffic(KEYS, ("inv2",), journal), None)):
         for _ in range(2):
             for _ in range(1_000):
                 traffic.received(KEYS.state("inv2"), NOISE, 10.0, "garbled")
@@ -220,15 +219,3 @@ def test_a_flood_of_rejected_messages_does_not_fill_the_journal() -> None:
 
             assert sum(isinstance(entry, ReceivedMessage) for entry in entries) == 1_000 + NOTED_REJECTED
             assert entries[-1] == RejectedCount(at, "state/inv2", "garbled", 1_000 - NOTED_REJECTED)
-
-
-def test_messages_on_keys_without_number_are_counted_by_kind_alone() -> None:
-    """A stranger's keys with wildcards reach every subscriber, and there are as many as he likes."""
-    journal = JournalBuffer()
-    traffic = TickTraffic(KEYS, ("inv2",), journal)
-    for number in range(3 * COUNTED_KEYS):
-        traffic.lost(f"{KEYS.prefix}state/{number}*", "excess", 2, 0.0)
-    *by_key, others = noted(journal)
-
-    assert len(by_key) == COUNTED_KEYS
-    assert others == RejectedCount(None, "", "excess", 4 * COUNTED_KEYS)
