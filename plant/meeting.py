@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from math import inf
 from typing import NamedTuple
 
 from gridpeers.plant.plant_config import PlantConfig
@@ -58,6 +59,7 @@ class Meeting:
         self._tokens: set[str] = set()
         """Tokens of agents and recorders that take part; while the run ends, also of agents that were told to stop."""
         self._refusal_limit = RateLimit(REFUSALS, REFUSAL_INTERVAL)
+        self._log_limit = RateLimit(burst=1, interval=inf)
 
     @property
     def has_agents(self) -> bool:
@@ -131,5 +133,6 @@ class Meeting:
             self._tokens.add(key)
             self.stop(self.post.keys.stop_request(name, instance), self.stepper.outcome or "the run has ended")
         else:
-            self.post.say(f"refused {reason}")
+            if self._log_limit.admit(reason.partition(": ")[2], now) is not None:
+                self.post.say(f"refused {reason}; further ones of this kind are only told so themselves")
             self.stop(self.post.keys.stop_request(name, instance), reason, refused=True)

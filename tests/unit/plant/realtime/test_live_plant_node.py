@@ -9,6 +9,7 @@ from gridpeers.agents.agent import Agent
 from gridpeers.plant.meeting import REFUSALS
 from gridpeers.plant.plant_config import ScheduledAction
 from gridpeers.wire.messages import Measurement, Stop, Telemetry
+from gridpeers.wire.node import Log
 from tests.toy.toy_configs import agent_config
 from tests.unit.plant.realtime.realtime_lab import KEYS, Lab, running
 
@@ -133,12 +134,13 @@ def test_an_agent_that_comes_while_the_run_ends_is_told_so() -> None:
 
 
 def test_of_thousands_that_are_refused_some_are_told() -> None:
-    """Anybody may hold tokens: the first are told, then ten a second; the others are counted."""
+    """Anybody may hold tokens: the first are told, then ten a second; the log has one line for each kind."""
     lab = running(3)
     lab.take(Stop)
     for i in range(5_000):
         lab.side.appeared(KEYS.alive_agent("inv2", f"x{i}"), lab.now)
         lab.side.appeared(KEYS.alive_agent(f"who{i}", "x"), lab.now)
+    logged = [action.text for action in lab.side.post.actions if isinstance(action, Log)]
     lab.do()
     told = lab.take(Stop)
     lab.now += 1.0
@@ -146,6 +148,7 @@ def test_of_thousands_that_are_refused_some_are_told() -> None:
     lab.do()
 
     assert len(told) == REFUSALS
+    assert [line.split(": ")[1] for line in logged] == ["refused inv2", "refused who0"]
     assert all(stop.refused for stop in told)
     assert lab.side.rejects.counts["excess"] == 10_000 - REFUSALS
     assert len(lab.take(Stop)) == 1
