@@ -5,8 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from importlib.util import find_spec
-from traceback import walk_tb
 
 UNPRINTABLE = (
     "\x00-\x1f\x7f-\x9f\xad\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb\U000e0000-\U000e007f"
@@ -104,24 +102,11 @@ def damaged(module: str, reason: str, user: str) -> str:
 
 def not_importable(error: ImportError) -> str:
     """Return one line on the package that an import of ours did not find or could not load, and what to install."""
-    module = ""
-    for frame, _ in walk_tb(error.__traceback__):  # the first that ours imports; what that imports is its own affair
-        root = str(frame.f_globals.get("__name__", "")).partition(".")[0]
-        if root == "gridpeers":
-            module = ""
-        elif not module and root not in ("importlib", "runpy", "__main__"):
-            module = root
-    module = module or (error.name or "").partition(".")[0]
-    if not module:
-        return f"a package cannot be imported ({error})"
-    try:
-        missing = find_spec(module) is None
-    except (ImportError, ValueError):
-        missing = True
-    if not missing:
-        return damaged(module, f"{type(error).__name__}: {error}", "gridpeers")
-    package = DISTRIBUTIONS.get(module, module)
-    return f"{package} is not installed; gridpeers needs it: pip install {requirement(module)}"
+    module = (error.name or "").partition(".")[0]
+    if isinstance(error, ModuleNotFoundError):
+        package = DISTRIBUTIONS.get(module, module)
+        return f"{package} is not installed; gridpeers needs it: pip install {requirement(module)}"
+    return damaged(module or "a package", f"{type(error).__name__}: {error}", "gridpeers")
 
 
 def requirement(module: str) -> str:

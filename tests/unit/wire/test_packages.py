@@ -31,25 +31,9 @@ def test_a_missing_package_is_named_with_what_to_install(
     assert "\n" not in text
 
 
-@pytest.mark.parametrize(
-    ("text", "reason"),
-    [
-        (
-            "raise ImportError('libz.so.1: cannot open\\nshared object file')",
-            "ImportError: libz.so.1: cannot open shared",
-        ),
-        ("import a_part_of_it_that_is_gone", "ModuleNotFoundError: No module named 'a_part_of_it_that_is_gone'"),
-        ("from json import no_such_name", "ImportError: cannot import name 'no_such_name' from 'json'"),
-    ],
-)
-def test_a_package_that_does_not_load_is_named_with_its_reason(
-    text: str, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_package_that_does_not_load_is_named_with_its_reason(tmp_path: Path) -> None:
     """A library of the system is missing, or half of an installation: to install it once more is what helps."""
-    (tmp_path / "broken_package.py").write_text(text)
-    monkeypatch.syspath_prepend(tmp_path)
+    said = not_importable(error_of(tmp_path, "from json import no_such_name"))
 
-    said = not_importable(error_of(tmp_path, "from broken_package import anything"))
-
-    assert said.startswith(f"broken_package is installed, but cannot be imported ({reason}")
-    assert said.endswith("gridpeers needs it: pip install --force-reinstall broken_package")
+    assert said.startswith("json is installed, but cannot be imported (ImportError: cannot import name")
+    assert said.endswith("gridpeers needs it: pip install --force-reinstall json")
