@@ -135,7 +135,7 @@ class SessionDeadline:
 
 
 MOST_KINDS = 200
-"""Kinds of lines that a limit tells apart at once."""
+"""Kinds of lines that a limit tells apart."""
 
 _NUMBER = re.compile(r"[0-9]+(?:\.[0-9]+)?")
 
@@ -143,8 +143,7 @@ _NUMBER = re.compile(r"[0-9]+(?:\.[0-9]+)?")
 class RateLimit:
     """Pass the first lines of a kind, then one at each interval (s) with the number of omitted ones.
 
-    Lines that differ only in numbers are of one kind. All lines beyond 200 kinds are of one kind, too; a kind counts
-    until it may pass its whole burst again.
+    Lines that differ only in numbers are of one kind. All lines beyond 200 kinds are of one kind, too.
     """
 
     def __init__(self, burst: int = 20, interval: float = 10.0) -> None:
@@ -157,8 +156,7 @@ class RateLimit:
         """Return a line as it is, or with the number of omitted ones before it, or None to omit it."""
         kind = _NUMBER.sub("0", text)
         if kind not in self._allowed and len(self._allowed) >= MOST_KINDS:
-            self._forget(now)
-            kind = kind if len(self._allowed) < MOST_KINDS else ""
+            kind = ""
         allowed, since = self._allowed.get(kind, (float(self._burst), now))
         allowed = min(float(self._burst), allowed + (now - since) / self._interval)
         left, _ = self._left.pop(kind, (0, ""))
@@ -168,14 +166,6 @@ class RateLimit:
             return None
         self._allowed[kind] = allowed - 1.0, now
         return f"{text} ({left} more of this kind left out)" if left else text
-
-    def _forget(self, now: float) -> None:
-        """Forget the kinds that may pass their whole burst again, and of which no line was left out."""
-        self._allowed = {
-            kind: (allowed, since)
-            for kind, (allowed, since) in self._allowed.items()
-            if kind in self._left or allowed + (now - since) / self._interval < self._burst
-        }
 
     def left_out(self) -> list[str]:
         """Take out one line per kind on its omitted lines, e.g. at the end."""

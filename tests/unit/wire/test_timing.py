@@ -60,17 +60,6 @@ def test_a_flood_is_thinned_out_and_every_line_is_counted() -> None:
     assert len(many) < 250
 
 
-def test_lines_of_long_ago_leave_room_for_new_kinds() -> None:
-    """Else whoever makes up 200 names would silence the first line of every later kind for good."""
-    limit = RateLimit(burst=3, interval=10.0)
-    for i in range(5000):
-        limit.admit(f"recorder {'x' * (i + 1)} is there", now=0.0)
-
-    assert limit.admit("oversized", now=1.0) is None
-    assert limit.admit("oversized", now=40.0) == "oversized"
-    assert [limit.admit("corrupt", now=40.0) for _ in range(4)] == ["corrupt"] * 3 + [None]
-
-
 def test_a_log_leaves_out_what_repeats_itself(caplog: pytest.LogCaptureFixture) -> None:
     """Whoever writes to it; a second limit on the same log changes nothing."""
     log = logging.getLogger("test_rate_limit")
