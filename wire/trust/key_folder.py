@@ -221,17 +221,6 @@ def _read(path: Path) -> bytes:
         raise KeysError(f"{path}: cannot be read: {error.strerror}") from None
 
 
-def key_warnings(folder: Path) -> dict[str, str]:
-    """Return a sentence for each private key, by its file, that is not private, or not of the certificate beside it."""
-    found = {}
-    for path in sorted(folder.glob("*.key")):
-        try:
-            load_pair(path)
-        except KeysError as error:
-            found[path.name] = str(error)
-    return found
-
-
 def tls_refusal(host: str, port: int, credentials: Credentials | None, timeout: float) -> str:
     """Return why the other end and this one do not agree on a link; empty if they do, or if it is not known.
 

@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import base64
-import fcntl
 import os
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -50,7 +46,7 @@ FIRST: tuple[tuple[str, Role], ...] = (("plant", "plant"), ("operator", "operato
 
 
 def make_site(folder: Path, *, days: float = LIFE_DAYS, now: datetime | None = None) -> MemberList:
-    """Make a site's authority and its first certificates in a new folder, which is there whole or not at all."""
+    """Make a site's authority and its first certificates in a new folder."""
     from cryptography.hazmat.primitives.asymmetric import ec
 
     now = now or datetime.now(UTC)
@@ -60,22 +56,17 @@ def make_site(folder: Path, *, days: float = LIFE_DAYS, now: datetime | None = N
     try:
         if folder.exists() or folder.is_symlink():
             raise KeysError(f"{folder}: is there already; gridpeers keys show --keys {folder} shows it")
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix=f".{site}-", dir=folder.absolute().parent) as made:
-            new = Path(made) / site
-            new.mkdir(0o700)
-            key = ec.generate_private_key(ec.SECP256R1())
-            _write_key(new / CA_KEY, key)
-            _write_pem(new / CA, _certificate(f"gridpeers site {site}", key, key, None, now, LIFE_OF_CA))
-            (new / ".gitignore").write_text("*\n", encoding="utf-8")  # no key gets into a repository by `git add`
-            _write_list(new, MemberList(site=site, version=0), key)
-            for name, role in FIRST:
-                issue(new, name, role, days=days, now=now)
-            known = read_list(new)
-            new.rename(folder)
+        folder.mkdir(0o700, parents=True)
+        key = ec.generate_private_key(ec.SECP256R1())
+        _write_key(folder / CA_KEY, key)
+        _write_pem(folder / CA, _certificate(f"gridpeers site {site}", key, key, None, now, LIFE_OF_CA))
+        (folder / ".gitignore").write_text("*\n", encoding="utf-8")  # no key gets into a repository by `git add`
+        _write_list(folder, MemberList(site=site, version=0), key)
+        for name, role in FIRST:
+            issue(folder, name, role, days=days, now=now)
     except OSError as error:
         raise KeysError(f"{folder}: cannot be made: {error.strerror}") from None
-    return known
+    return read_list(folder)
 
 
 def issue(
@@ -88,25 +79,23 @@ def issue(
     from cryptography.hazmat.primitives.asymmetric import ec
 
     now = now or datetime.now(UTC)
-    with _changing(folder):
-        known, ca, ca_key = _authority(folder)
-        before = known.of(name)
-        role = role or ("agent" if before is None else before.role)
-        if problem := objection(known, name, role):
-            raise KeysError(problem)
-        if now >= ca.not_valid_after_utc:
-            raise KeysError(
-                f"{folder / CA}: expired on {ca.not_valid_after_utc:{DATE_AND_TIME}}; gridpeers keys init makes a "
-                "new site"
-            )
-        generation = 1 if before is None else before.generation + before.revoked
-        ends = min(now + timedelta(days=days), ca.not_valid_after_utc)
-        member = SiteMember(name=name, role=role, generation=generation, expires=f"{ends:{DATE_AND_TIME}}")
-        key = ec.generate_private_key(ec.SECP256R1())
-        certificate = _certificate(member.common_name, key, ca_key, ca, now, ends - now)
-        _write_key(folder / f"{name}.key", key)
-        _write_pem(folder / f"{name}.pem", certificate)
-        _write_list(folder, _with(known, member), ca_key)
+    known, ca, ca_key = _authority(folder)
+    before = known.of(name)
+    role = role or ("agent" if before is None else before.role)
+    if problem := objection(known, name, role):
+        raise KeysError(problem)
+    if now >= ca.not_valid_after_utc:
+        raise KeysError(
+            f"{folder / CA}: expired on {ca.not_valid_after_utc:{DATE_AND_TIME}}; gridpeers keys init makes a new site"
+        )
+    generation = 1 if before is None else before.generation + before.revoked
+    ends = min(now + timedelta(days=days), ca.not_valid_after_utc)
+    member = SiteMember(name=name, role=role, generation=generation, expires=f"{ends:{DATE_AND_TIME}}")
+    key = ec.generate_private_key(ec.SECP256R1())
+    certificate = _certificate(member.common_name, key, ca_key, ca, now, ends - now)
+    _write_key(folder / f"{name}.key", key)
+    _write_pem(folder / f"{name}.pem", certificate)
+    _write_list(folder, _with(known, member), ca_key)
     return member
 
 
@@ -130,36 +119,20 @@ def objection(known: MemberList, name: str, role: Role | None) -> str:
 
 def revoke(folder: Path, name: str) -> SiteMember:
     """Revoke the certificate of a name, and delete its key here; return the member."""
-    with _changing(folder):
-        known, _, ca_key = _authority(folder)
-        member = known.of(name)
-        if member is None:
-            have = ", ".join(each.name for each in known.members)
-            raise KeysError(f'{folder}: no certificate was issued to "{printable(name)}"; there are those of {have}')
-        if member.revoked:
-            raise KeysError(f"{name}: its certificate is revoked already")
-        revoked = msgspec.structs.replace(member, revoked=True)
-        _write_list(folder, _with(known, revoked), ca_key)
-        try:
-            (folder / f"{name}.key").unlink(missing_ok=True)
-        except OSError as error:
-            raise KeysError(f"{name}: is revoked; remove its key from {folder}: {error.strerror}") from None
-    return revoked
-
-
-@contextmanager
-def _changing(folder: Path) -> Iterator[None]:
-    """Keep other commands from changing a site meanwhile: the list of one would lack the members of another."""
+    known, _, ca_key = _authority(folder)
+    member = known.of(name)
+    if member is None:
+        have = ", ".join(each.name for each in known.members)
+        raise KeysError(f'{folder}: no certificate was issued to "{printable(name)}"; there are those of {have}')
+    if member.revoked:
+        raise KeysError(f"{name}: its certificate is revoked already")
+    revoked = msgspec.structs.replace(member, revoked=True)
+    _write_list(folder, _with(known, revoked), ca_key)
     try:
-        handle = os.open(folder, os.O_RDONLY)
+        (folder / f"{name}.key").unlink(missing_ok=True)
     except OSError as error:
-        read_list(folder)  # says what is wrong with most folders
-        raise KeysError(f"{folder}: cannot be read: {error.strerror}") from None
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(handle)
+        raise KeysError(f"{name}: is revoked; remove its key from {folder}: {error.strerror}") from None
+    return revoked
 
 
 def _with(known: MemberList, member: SiteMember) -> MemberList:

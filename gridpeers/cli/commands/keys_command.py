@@ -13,7 +13,7 @@ from gridpeers.cli.usage import argument, fail, flag, option, require
 from gridpeers.wire.keys import Role
 from gridpeers.wire.trust import site_authority
 from gridpeers.wire.trust.credentials import DATE_AND_TIME
-from gridpeers.wire.trust.key_folder import CA_KEY, LIST, KeysError, key_warnings, read_list
+from gridpeers.wire.trust.key_folder import CA_KEY, LIST, KeysError, read_list
 
 app = typer.Typer(
     cls=Commands,
@@ -91,27 +91,19 @@ def revoke(
 def show(keys: _Keys = Path()) -> None:
     """Show the members of a site: role, until when its certificate is valid, whether its key is here.
 
-    A private key that others may read, or that is not that of the certificate beside it, is warned of.
-
     Example:  gridpeers keys show --keys lab
     """
     _check()
-    known, now, warnings = read_list(keys), f"{datetime.now(UTC):{DATE_AND_TIME}}", key_warnings(keys)
+    known, now = read_list(keys), f"{datetime.now(UTC):{DATE_AND_TIME}}"
     authority = f"; {CA_KEY} is here: certificates are issued in this folder" if (keys / CA_KEY).is_file() else ""
-    if CA_KEY in warnings:
-        authority = f"; {CA_KEY} is here, but cannot be used: no certificates can be issued here"
     typer.echo(f"site {known.site}, {LIST} is version {known.version}{authority}")
     width = max(len(member.name) for member in known.members)
     for member in sorted(known.members, key=lambda member: (member.role, member.name)):
         state, here = "revoked", ""
         if not member.revoked:
             state = f"{'expired ' if member.expires < now else 'valid    until'} {member.expires}"
-            key = f"{member.name}.key"
-            if (keys / key).is_file():
-                here = ", key here, but see below" if key in warnings else ", key here"
+            here = ", key here" if (keys / f"{member.name}.key").is_file() else ""
         typer.echo(f"{member.role:9} {member.name:{width}}  {state}{here}")
-    for warning in warnings.values():
-        typer.echo(f"WARNING  {warning}")
 
 
 def _check(days: float = 1.0) -> None:

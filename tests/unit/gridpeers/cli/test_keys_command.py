@@ -74,47 +74,6 @@ def test_show_says_to_the_minute_until_when_certificates_are_valid(elsewhere: Pa
     assert rows["inv2"] == f"valid    until {now + timedelta(hours=6):%Y-%m-%d %H:%M} UTC, key here"
 
 
-def test_show_warns_of_a_key_that_is_not_that_of_the_certificate_beside_it(elsewhere: Path) -> None:
-    """No process can use the two together: one of another member or of a former issue, one that is none, and ca.key."""
-    lab = elsewhere / "lab"
-    assert invoke("keys", "init", "lab")[0] == 0
-    for name in ("inv1", "inv2"):
-        assert invoke("keys", "issue", name, "--keys", "lab")[0] == 0
-    (lab / "inv1.key").write_bytes((lab / "inv2.key").read_bytes())
-    (lab / "viewer.key").write_text("no PEM")
-    (lab / "operator.pem").unlink()
-    (lab / "ca.key").write_bytes((lab / "plant.key").read_bytes())
-
-    code, text = invoke("keys", "show", "--keys", "lab")
-    rows = text.splitlines()
-
-    assert code == 0, text
-    assert rows[0].endswith("; ca.key is here, but cannot be used: no certificates can be issued here")
-    ends = {row.split()[1]: row.rpartition("UTC")[2] for row in rows[1:6]}
-    here, wrong = ", key here", ", key here, but see below"
-    assert ends == {"inv1": wrong, "inv2": here, "operator": wrong, "plant": here, "viewer": wrong}
-    assert sorted(rows[6:]) == [
-        "WARNING  lab/ca.key: is not the key of ca.pem; copy both from the same site",
-        "WARNING  lab/inv1.key: is not the key of inv1.pem; copy both from the same site",
-        next(row for row in rows if row.startswith("WARNING  lab/operator.pem: is missing; copy it ")),
-        next(row for row in rows if row.startswith("WARNING  lab/viewer.key: is no private key: ")),
-    ]
-
-
-def test_show_warns_of_every_key_that_others_may_read(elsewhere: Path) -> None:
-    """Each such file gives a warning, that of the authority first."""
-    assert invoke("keys", "init", "lab")[0] == 0
-    (elsewhere / "lab" / "ca.key").chmod(0o644)
-    (elsewhere / "lab" / "viewer.key").chmod(0o620)
-    code, text = invoke("keys", "show", "--keys", "lab")
-
-    assert code == 0
-    assert [row for row in text.splitlines() if "WARNING" in row] == [
-        "WARNING  lab/ca.key: others may read or change it (mode 0644); chmod 600 lab/ca.key",
-        "WARNING  lab/viewer.key: others may read or change it (mode 0620); chmod 600 lab/viewer.key",
-    ]
-
-
 def test_a_viewer_is_told_who_may_command(elsewhere: Path) -> None:
     """With the files of a viewer alone, by name or not: the role that may, and how to get it."""
     assert invoke("keys", "init", "lab")[0] == 0

@@ -6,10 +6,8 @@ import socket
 import ssl
 import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime, timedelta
-from functools import partial
 from pathlib import Path
 
 import pytest
@@ -134,15 +132,6 @@ WRONG: dict[str, tuple[Callable[[Path], object], str]] = {
         r"inv1.pem: was revoked; gridpeers keys issue inv1 gives inv1 a new one",
     ),
 }
-
-
-def test_certificates_that_are_issued_at_the_same_time_are_all_listed(lab: Path) -> None:
-    """Each command waits for the one before: the list of one would lack the names of the others."""
-    names = [f"inv{k}" for k in range(10, 18)]
-    with ThreadPoolExecutor(len(names)) as threads:
-        list(threads.map(partial(issue, lab), names))
-
-    assert {member.name for member in read_list(lab).members} >= {*names}
 
 
 @pytest.mark.parametrize("what", WRONG)
