@@ -11,7 +11,6 @@ from scipy.sparse.csgraph import connected_components
 
 from gridpeers.plant.dynamics import Dynamics, PlantError, Trip
 from gridpeers.plant.dynamics.reduction import Reduction
-from gridpeers.plant.equipment.imported_equipment import is_behind
 from gridpeers.plant.known_names import SUBSTATION
 from gridpeers.plant.network import Network
 from gridpeers.wire.messages import PlantEvent
@@ -81,50 +80,29 @@ class Islands:
         return [PlantEvent(t=t, kind="dead", subject=new[0], text=text)]
 
 
-TOUCHABLE = 50.0  # voltage to earth (V) that may last on what people touch (IEC 60364-4-41)
-
-
 class NeutralEvents:
     """Report the neutrals of a feeder when its network has changed; each once, until it is as before."""
 
     def __init__(self, network: Network) -> None:
         self._network = network
-        self._all = np.array([network.index(*node) for node in network.neutrals.items()], np.int64)
-        self._neutrals = [node for node in network.neutrals.items() if not is_behind(node[0])]
-        self._nodes = np.array([network.index(*node) for node in self._neutrals], np.int64)
-        self._earthing: set[int] = set()
-        self._tied: set[int] = set()
-        self._off: set[int] = set()
+        self._nodes = np.array([network.index(*node) for node in network.neutrals.items()], np.int64)
+        self._reported: set[str] = set()
 
     def report(self, t: float, closed: frozenset[str], dynamics: Dynamics) -> list[PlantEvent]:
-        if not self._neutrals:
+        if not self._nodes.size:
             return []
-        earthing, tied = set(dynamics.network.reduction.earthing), set(self._tied_alone(closed, dynamics))
         events = []
-        for row in (self._network.inverters[i] for i in sorted(earthing - self._earthing)):
+        for i in sorted(dynamics.network.reduction.earthing):
+            row = self._network.inverters[i]
             text = f"{row.name} earths its neutral, node {row.neutral} of bus {row.bus}: nothing else does"
             events.append(PlantEvent(t=t, kind="island", subject=row.name, text=text))
-        for row in (self._network.inverters[i] for i in sorted(tied - self._tied)):
-            text = (
-                f"{row.name}: the neutral alone ties its part to the grid, so it counts as fed by the grid; let "
-                "the switch open the neutral, too"
-            )
-            events.append(PlantEvent(t=t, kind="warning", subject=row.name, text=text))
-        self._earthing, self._tied = earthing, tied
-        V = np.abs(self._network.merge(closed).expand(dynamics.voltages())[self._nodes])
-        off = set(np.flatnonzero(V > TOUCHABLE).tolist())
-        new, self._off = off - self._off, off
-        if new:
-            worst = max(new, key=lambda k: V[k])
-            bus, letter = self._neutrals[worst]
-            others = f" (and of {counted(len(new) - 1, 'bus', 'buses')} more)" if len(new) > 1 else ""
-            text = (
-                f"the neutral of bus {bus}{others}, node {letter}, has {V[worst]:.0f} V to earth, more than the "
-                f"{TOUCHABLE:.0f} V that may last: nothing earths it well enough; let the grid-forming inverter return "
-                "to it, or earth it"
-            )
-            events.append(PlantEvent(t=t, kind="warning", subject=bus, text=text))
-        return events
+        for i in self._tied_alone(closed, dynamics):
+            name = self._network.inverters[i].name
+            text = f"{name}: the neutral alone ties its part to the grid, so it counts as fed by the grid; "
+            text += "let the switch open the neutral, too"
+            events.append(PlantEvent(t=t, kind="warning", subject=name, text=text))
+        before, self._reported = self._reported, {event.text for event in events}
+        return [event for event in events if event.text not in before]
 
     def _tied_alone(self, closed: frozenset[str], dynamics: Dynamics) -> list[int]:
         """Return the grid-forming inverters that nothing but a neutral connects with the substation."""
@@ -135,7 +113,7 @@ class NeutralEvents:
             return []
         merge = network.merge(closed)
         keep = np.ones(len(network.nodes))
-        keep[merge.representative[self._all]] = 0.0
+        keep[merge.representative[self._nodes]] = 0.0
         phases = sp.diags_array(keep)
         _, label = connected_components(phases @ abs(network.admittance(closed)) @ phases, directed=False)
         first = [merge.representative[network.index(*network.inverters[i].node)] for i in forming.tolist()]

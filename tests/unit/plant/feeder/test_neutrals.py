@@ -197,17 +197,6 @@ def test_a_street_that_is_cut_off_keeps_its_loads_and_its_star_point_is_earthed(
     assert all(226.0 < reading.V < 232.0 for reading in now.values())
 
 
-def test_a_neutral_that_floats_beside_an_earthed_star_point_is_told(tmp_path: Path) -> None:
-    """An island whose grid-forming inverter returns through earth, as loads do not, has its neutral off earth."""
-    feeder, _ = imported(tmp_path, KINDS["earthed at the transformer"])
-    feeder = feeder.add_inverter("bat", "b1", "GFM", 6e4, neutral="earth")
-    told = [text for text in events_of(feeder, 0.2)[1] if "earth" in text]
-
-    assert len(told) == 1
-    assert "the neutral of bus b" in told[0]
-    assert "V to earth, more than the 50 V that may last" in told[0]
-
-
 @pytest.mark.parametrize(("kind", "begins"), [
     ("earthed at the transformer", "cut off"),
     ("loads to ground beside", "an island"),
