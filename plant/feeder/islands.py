@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -11,6 +10,7 @@ from scipy.sparse.csgraph import connected_components
 
 from gridpeers.plant.dynamics import Dynamics, PlantError, Trip
 from gridpeers.plant.dynamics.reduction import Reduction
+from gridpeers.plant.feeder.synchronism import Difference
 from gridpeers.plant.known_names import SUBSTATION
 from gridpeers.plant.network import Network
 from gridpeers.wire.messages import PlantEvent
@@ -125,13 +125,6 @@ RECENT = 1.0  # time (s) after a closing out of phase within which a collapse co
 BEYOND = 10.0  # voltage (pu) that no network has: where there is no solution, it says nothing
 
 
-class Closing(NamedTuple):
-    t: float
-    switch: str
-    angle: float  # angle between the two sides before (deg, 0 to 180)
-    in_phase: bool  # whether the angle was within the window of a synchronism check
-
-
 def raise_for_trip(events: Iterable[PlantEvent]) -> None:
     """Raise PlantError if a trip is among these events, for callers that need a plant without trips."""
     for event in events:
@@ -140,9 +133,12 @@ def raise_for_trip(events: Iterable[PlantEvent]) -> None:
 
 
 def trip_event(
-    t: float, trip: Trip, network: Network, closed: frozenset[str], closings: Iterable[Closing]
+    t: float, trip: Trip, network: Network, closed: frozenset[str], joined: Iterable[tuple[float, Difference]]
 ) -> PlantEvent:
-    """Return the event of a trip: the tripped units, and the cause (overload, collapse or closing out of phase)."""
+    """Return the event of a trip: the tripped units, and the cause (overload, collapse or closing out of phase).
+
+    `joined`: closings of switches that joined live islands before, each with its time (s).
+    """
     names = [network.inverters[i].name for i in trip.inverters]
     buses = {network.inverters[i].bus for i in trip.inverters}
     if trip.substation:
@@ -155,17 +151,18 @@ def trip_event(
     fed = network.feeder.source is not None and any(network.feeder.source.bus in of for of in own)
     culprit = next(
         (
-            closing
-            for closing in closings
-            if not closing.in_phase
-            and t - closing.t <= RECENT
+            (at, closing)
+            for at, closing in joined
+            if closing.angle > closing.limits.angle
+            and t - at <= RECENT
             and any(network.switches[closing.switch].from_bus in of for of in own)
         ),
         None,
     )
     if culprit is not None:
-        switch = network.switches[culprit.switch].event_name
-        cause = f"closed out of phase, {culprit.angle:.0f} deg across {switch} at t = {culprit.t:.3f} s"
+        at, closing = culprit
+        switch = network.switches[closing.switch].event_name
+        cause = f"closed out of phase, {closing.angle:.0f} deg across {switch} at t = {at:.3f} s"
     elif load > rating and not fed:
         cause = f"overload, {load / 1e3:.0f} kW of load on inverters of {rating / 1e3:.0f} kVA"
     elif load < 0.0:

@@ -5,8 +5,8 @@ The limits are those of IEEE Std 1547-2018, Table 5, by the aggregate rating of 
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable
-from dataclasses import dataclass
 from itertools import compress
 from math import degrees
 from typing import NamedTuple
@@ -15,7 +15,6 @@ import numpy as np
 
 from gridpeers.plant.dynamics import Dynamics
 from gridpeers.plant.dynamics.kernel.compiled import Flags
-from gridpeers.plant.feeder.islands import Closing
 from gridpeers.plant.feeder.switchboard import Switchboard
 from gridpeers.plant.known_names import F_BASE
 from gridpeers.plant.network import Network
@@ -31,8 +30,18 @@ LOCKED = 0.01  # difference of frequency (Hz) below which two islands count as h
 LEAST = 0.1  # voltage without load (pu) below which a pole of a switch is a neutral's
 
 
-@dataclass(frozen=True, kw_only=True)
-class Difference:
+class SynchronizationLimits(NamedTuple):
+    """Largest differences at which a switch may close."""
+
+    angle: float
+    f: float
+    V: float
+
+    def __str__(self) -> str:
+        return f"at most {self.angle:g} deg, {self.f:g} Hz and {100.0 * self.V:g} %"
+
+
+class Difference(NamedTuple):
     """Difference across an open switch between two separate live islands."""
 
     switch: str
@@ -58,18 +67,6 @@ class Difference:
         return f"{self.angle:.1f} deg, {self.f:.3f} Hz and {100.0 * self.V:.1f} % of voltage apart"
 
 
-@dataclass(frozen=True, kw_only=True)
-class SynchronizationLimits:
-    """Largest differences at which a switch may close."""
-
-    angle: float
-    f: float
-    V: float
-
-    def __str__(self) -> str:
-        return f"at most {self.angle:g} deg, {self.f:g} Hz and {100.0 * self.V:g} %"
-
-
 def limits_for(rating: float, check: SyncCheck, f_nom: float = F_BASE) -> SynchronizationLimits:
     """Return the limits of Table 5 for an aggregate rating (VA); limits set in `check` replace them.
 
@@ -79,25 +76,20 @@ def limits_for(rating: float, check: SyncCheck, f_nom: float = F_BASE) -> Synchr
     ('at most 15 deg, 0.2 Hz and 5 %', 'at most 5 deg, 0.1 Hz and 3 %')
     """
     f, V, angle = next(row[1:] for row in _TABLE_5 if rating <= row[0])
-    return SynchronizationLimits(angle=check.angle or angle, f=check.f or f * (f_nom / F_BASE), V=check.V or V)
-
-
-class _Pending(NamedTuple):
-    since: int  # step of its scheduled closing
-    last: int  # step at which it gives up
+    return SynchronizationLimits(check.angle or angle, check.f or f * (f_nom / F_BASE), check.V or V)
 
 
 class Closings:
     """Measure the differences across open switches, and judge their closings, which may wait for synchronism.
 
-    `joined`: closings that have joined live islands, the latest last.
+    `joined`: the latest closings that have joined live islands, each with its time (s).
     """
 
     def __init__(self, switches: Switchboard, network: Network, dynamics: Dynamics, check: SyncCheck, h: float) -> None:
         self._switches, self._network, self._dynamics, self._check = switches, network, dynamics, check
         self._timeout, self._h = round(check.timeout / h), h
-        self._waiting: dict[str, _Pending] = {}
-        self.joined: list[Closing] = []
+        self._waiting: dict[str, int] = {}  # by switch, the step of its scheduled closing
+        self.joined: deque[tuple[float, Difference]] = deque(maxlen=20)
 
     def difference(self, name: str) -> Difference | None:
         return self._across(name, self._switches.closed)
@@ -115,14 +107,14 @@ class Closings:
     def check_waiting(self, step: int) -> list[PlantEvent]:
         """Close the waiting switches that are in step now; return the events of those that give up."""
         events = []
-        for name, waiting in list(self._waiting.items()):
+        for name, since in list(self._waiting.items()):
             difference = self._across(name, self._switches.closed)
             if difference is None or difference.within:
                 del self._waiting[name]
                 self._switches.put(step, name, "close", synchronised=True)
-            elif step >= waiting.last:
+            elif step >= since + self._timeout:
                 del self._waiting[name]
-                waited = (step - waiting.since) * self._h
+                waited = (step - since) * self._h
                 text = f"not closed: not in step within {waited:g} s, now {difference}; allowed are {difference.limits}"
                 events.append(self._warning(step, name, text))
         return events
@@ -144,21 +136,16 @@ class Closings:
                 continue
             if operation.synchronised and not difference.within:
                 self._switches.drop(step, operation)
-                self._waiting[name] = _Pending(step, step + self._timeout)
+                self._waiting[name] = step
                 text = f"waits for synchronism: its sides are {difference}; allowed are {difference.limits}"
                 events.append(self._warning(step, name, text))
             elif operation.synchronised:
                 notes[name] = f" in step: {difference}"
-                self._note(step, difference)
+                self.joined.append((time_of(step, self._h), difference))
             else:
                 events.append(self._warning(step, name, f"joins two live islands: its sides are {difference}"))
-                self._note(step, difference)
+                self.joined.append((time_of(step, self._h), difference))
         return notes, events
-
-    def _note(self, step: int, difference: Difference) -> None:
-        t = time_of(step, self._h)
-        self.joined.append(Closing(t, difference.switch, difference.angle, difference.angle <= difference.limits.angle))
-        del self.joined[:-20]
 
     def _warning(self, step: int, name: str, text: str) -> PlantEvent:
         switch = self._switches.switch(name)
