@@ -22,7 +22,7 @@ from math import inf
 from gridpeers.plant.meeting import AGAIN, STAYS, Meeting, TickActions, agent_schedule
 from gridpeers.plant.plant_stepper import TELEMETRY_TICKS, PlantStepper
 from gridpeers.plant.recorder_feed import RecorderFeed, RunReports
-from gridpeers.wire.codec import RejectedError, encode
+from gridpeers.wire.codec import RejectedError
 from gridpeers.wire.links import REPORT_TICKS
 from gridpeers.wire.messages import PLANT, Prepare, Ready, State
 from gridpeers.wire.phases import Phases
@@ -199,7 +199,7 @@ class LockstepRoster:
         self._prepare = Prepare(
             sender=PLANT, epoch=epoch, seq=self._number, t=t, roster=self.names, instances=instances
         )
-        self._post.publish(self._post.keys.control, encode(self._prepare))
+        self._post.send(self._post.keys.control, self._prepare)
 
     def _move(self, actions: TickActions, now: float) -> None:
         when = f"at t = {self._stepper.t:g} s, as the scenario says"

@@ -9,7 +9,6 @@ from typing import NamedTuple
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_stepper import PlantStepper
 from gridpeers.plant.recorder_feed import RecorderFeed
-from gridpeers.wire.codec import encode
 from gridpeers.wire.messages import PLANT, Stop
 from gridpeers.wire.phases import Phases
 from gridpeers.wire.post import Post
@@ -109,7 +108,7 @@ class Meeting:
         """Ask the agents that listen to a key to stop."""
         tick, t = self.stepper.tick, self.stepper.t
         stop = Stop(sender=PLANT, epoch=self.post.epoch, seq=tick, t=t, reason=printable(reason), refused=refused)
-        self.post.publish(key, encode(stop))
+        self.post.send(key, stop)
 
     def _recorder_came(self, key: str, name: str) -> None:
         if not (name in self.recorders or name in self._needed or len(self.recorders) < MOST_RECORDERS):

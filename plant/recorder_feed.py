@@ -14,7 +14,7 @@ from math import inf
 from gridpeers.plant.plant_stepper import PlantStepper
 from gridpeers.wire.codec import encode
 from gridpeers.wire.links import Links
-from gridpeers.wire.messages import Message, Pacing
+from gridpeers.wire.messages import AnyMessage, Pacing
 from gridpeers.wire.node import Publish
 from gridpeers.wire.post import Post
 
@@ -155,10 +155,10 @@ class RunReports:
         """Publish a message for recorders, and keep it for those that miss it."""
         self._feed.publish(self._stepper.telemetry_number, payload)
 
-    def publish_aside(self, key: str, message: Message) -> None:
+    def publish_aside(self, key: str, message: AnyMessage) -> None:
         """Publish what depends on the time that others take: in simulated time the record is without it."""
         if self._live:
-            self._post.publish(key, encode(message))
+            self._post.send(key, message)
         else:
             self._post.actions.append(Publish(key, encode(message)))
 

@@ -19,6 +19,7 @@ from gridpeers.bridges.gridlabd.glm_text import messages
 from gridpeers.plant.dynamics.reduction import Reduction
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.feeder.circuits import Circuits
+from gridpeers.plant.feeder.islands import Islands
 from gridpeers.plant.feeder.limit_events import SetPointLimits
 from gridpeers.plant.feeder.protection import Relays
 from gridpeers.plant.feeder.switchboard import Switchboard
@@ -27,7 +28,6 @@ from gridpeers.plant.plant_config import PlantSettings, PowerLimit
 from gridpeers.plant.plant_interface import Reading, RecordedPlant, SimulatedPlant
 from gridpeers.plant.request_process import ProcessEndedError, RequestProcess
 from gridpeers.plant.tables.read import DATA
-from gridpeers.scenarios.results.island_membership import Islands
 from gridpeers.wire.messages import PlantEvent
 from gridpeers.wire.timing import time_of
 from gridpeers.wire.wording import damaged

@@ -14,7 +14,7 @@ from gridpeers.plant.dynamics.circuit import NoPowerFlowError
 from gridpeers.plant.dynamics.equilibrium import require_within_limits
 from gridpeers.plant.dynamics.live_network import KEPT
 from gridpeers.plant.feeder.circuits import Circuits
-from gridpeers.plant.feeder.islands import NeutralEvents, trip_event
+from gridpeers.plant.feeder.islands import Islands, NeutralEvents, trip_event
 from gridpeers.plant.feeder.limit_events import CurrentLimits, SetPointLimits
 from gridpeers.plant.feeder.protection import InService
 from gridpeers.plant.feeder.switchboard import LoadBoard, Switchboard
@@ -22,7 +22,6 @@ from gridpeers.plant.feeder.synchronism import Closings, Difference
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings, PowerLimit
 from gridpeers.plant.plant_interface import Reading, RecordedPlant
-from gridpeers.scenarios.results.island_membership import Islands
 from gridpeers.wire.messages import OFF, LoadSetting, PlantEvent
 from gridpeers.wire.timing import time_of
 

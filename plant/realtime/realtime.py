@@ -128,7 +128,9 @@ class RealtimeRoster:
         self._post, self._stepper, self._phases = post, stepper, meeting.phases
         self._meeting, self._timer, self._reports = meeting, timer, reports
         link_commands = self.link_commands = LinkCommandSender(post, links, reports.publish)
-        reports.pacing, reports.impaired = timer.pacing, lambda: link_commands.impaired(stepper.t)
+        reports.pacing = timer.pacing
+        if links is not None:
+            reports.impaired = lambda: links.impaired(stepper.t)
         reports.omitted = timer.warnings.left_out
         self.state_keys = post.keys.state, post.keys.set_points
         self.publications = tuple(map(post.keys.link_request, stepper.inverters))

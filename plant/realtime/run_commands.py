@@ -34,7 +34,7 @@ class LinkCommandSender:
     """`report`: publishes for recorders."""
 
     def __init__(self, post: Post, links: Links | None, report: Callable[[bytes], None]) -> None:
-        self._epoch, self._keys, self._publish = post.epoch, post.keys, post.publish
+        self._post, self._keys = post, post.keys
         self._links, self._report = links, report
         self._given: list[LinkRequest] = []
         self._acknowledged: dict[str, int] = {}  # number of the last command that each agent has acknowledged
@@ -73,14 +73,14 @@ class LinkCommandSender:
                 continue
             self._sent[name] = last, now
             for request in self._given[acknowledged if again else max(acknowledged, sent) :]:
-                self._publish(self._keys.link_request(name), encode(request))
+                self._post.send(self._keys.link_request(name), request)
 
     def ask(self, names: Iterable[str], t: float, reply_to: str) -> None:
         """Have these agents report the status of the links to them at t (s of run time), and report the plant's own."""
-        question = encode(self._request(0, {}, t, reply_to))
+        question = self._request(0, {}, t, reply_to)
         for name in names:
-            self._publish(self._keys.link_request(name), question)
-        own, epoch = self.links.status(t), self._epoch
+            self._post.send(self._keys.link_request(name), question)
+        own, epoch = self.links.status(t), self._post.epoch
         self._pass_on(
             LinkAcknowledgement(sender=PLANT, epoch=epoch, seq=0, t=t, ok=True, text="", reply_to=reply_to, data=own)
         )
@@ -96,15 +96,11 @@ class LinkCommandSender:
         self._acknowledged.pop(name, None)
         self._sent.pop(name, None)
 
-    def impaired(self, t: float) -> tuple[str, ...]:
-        """Return the agents whose link to or from the plant has a fault at t (s of run time)."""
-        return () if self._links is None else self._links.impaired(t)
-
     def _request(self, number: int, tree: dict[str, Any], t: float, reply_to: str) -> LinkRequest:
-        return LinkRequest(sender=PLANT, epoch=self._epoch, seq=number, t=t, link_command=tree, reply_to=reply_to)
+        return LinkRequest(sender=PLANT, epoch=self._post.epoch, seq=number, t=t, link_command=tree, reply_to=reply_to)
 
     def _pass_on(self, answer: LinkAcknowledgement) -> None:
-        self._publish(self._keys.answer(answer.reply_to), encode(answer))
+        self._post.send(self._keys.answer(answer.reply_to), answer)
 
 
 class RunCommands:
@@ -127,7 +123,7 @@ class RunCommands:
         if self._limit.admit(command.verb, now) is None:
             raise RejectedError("excess", f'more than {COMMANDS} commands "{command.verb}" at once')
         answer = self._carry_out(command, now)
-        self._node.post.publish(self._node.keys.answer(command.reply_to), encode(answer))
+        self._node.post.send(self._node.keys.answer(command.reply_to), answer)
         if answer.ok:
             self._follow_up(command, now)
         if command.verb == "telemetry" and self._node.phase != "running":
@@ -228,6 +224,6 @@ class RunCommands:
             "events": msgspec.to_builtins(tuple(stepper.latest)),
             "switches": dict(islice(plant.switches.items(), MOST_SWITCHES)),
             "loads": {name: [S.real, S.imag] for name, S in islice(plant.loads.items(), MOST_LOADS)},
-            "impaired": list(self._link_commands.impaired(stepper.t)),
+            "impaired": list(node.reports.impaired()),
             "rejected": sum(node.rejects.counts.values()),
         }

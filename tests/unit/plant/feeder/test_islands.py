@@ -14,10 +14,10 @@ from gridpeers.plant.dynamics.reduction import Reduction
 from gridpeers.plant.equipment import InverterRow, Load, Regulator, Switch
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.feeder.circuits import Circuits
+from gridpeers.plant.feeder.islands import Islands
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import Method, PlantSettings, Protection, SwitchEvent
 from gridpeers.plant.tables import read_feeder
-from gridpeers.scenarios.results.island_membership import Islands
 from tests.unit.plant.networks import PAPER_ISLANDS, feeder, opened, three_phase_bus
 
 
