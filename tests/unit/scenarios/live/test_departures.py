@@ -293,7 +293,7 @@ def test_what_people_switched_is_measured_as_a_scenario_with_the_same_events_is(
         "live at 7.5 s": {"t_s": 7.5, "end_s": 8.5, "what": "switch sw1_2 (67s-67) closed"},
     }
     assert metrics["live"]["disturbed"] == ["event1", "event2"]
-    assert "live at 2.5 s" in report.splitlines()[1]
+    assert "\nlive at 2.5 s  IV" in report
     assert "live at 2.5 s: switch sw1_2 (67s-67) opened; live at 7.5 s: switch sw1_2 (67s-67) closed" in report
     assert "paper's Table" not in report
 
