@@ -10,7 +10,7 @@ from tests.command_line import invoke
 
 
 def assert_commands_read(record: RunRecord, agent: str = "inv4") -> None:
-    """`metrics`, `why`, `trace`, and `replay` where there is one, do their work, and tell the cut.
+    """`export`, `why`, `trace`, and `replay` where there is one, do their work, and tell the cut.
 
     Of a run that was killed in its first moments there may be no decision yet: then `why`, and `replay`, say so. There
     may not even be a row: then they say so too, or have nothing to show.
@@ -19,7 +19,7 @@ def assert_commands_read(record: RunRecord, agent: str = "inv4") -> None:
     decided = next(record.decisions(agent), None) is not None
     file, folder, t = str(record.path), record.path.parent, f"{record.t_end:.3f}"
     commands = {
-        "metrics": (file,),
+        "export": (file, "--to", "csv", "--out", str(folder / "tables")),
         "why": (file, agent, t),
         "trace": (file, "--out", str(folder / "trace.pftrace")),
         "replay": (file,),

@@ -1,4 +1,4 @@
-"""Commands that show what there is: `list`, `check`, `doc`, `compare`, `metrics`; each imports what it needs on use."""
+"""Commands that show what there is: `list`, `check`, `doc`, `compare`; each imports what it needs on use."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Annotated, Literal, get_args
 
 import typer
 
-from gridpeers.cli.usage import argument, fail, load, option, terminal
+from gridpeers.cli.usage import argument, fail, load, option
 from gridpeers.wire.wording import counted, printable
 
 Topic = Literal[
@@ -111,21 +111,3 @@ def _names(first: Path, second: Path) -> tuple[str, str]:
         if a != b:
             return printable(a), printable(b)
     return "first", "second"
-
-
-def metrics(
-    run: Annotated[Path, argument("RUN", "Folder of a case, e.g. runs/islanding/latest/IV, or its run.mcap.")],
-    case: Annotated[str, option("NAME", "Case of the run, if RUN has several.")] = "",
-) -> None:
-    """Measure a run from its record, also one that was killed.
-
-    It shows what the report of a run shows, up to the end of the record, and says what is not measured. A run that came
-    to its end has the same numbers in its report.txt.
-
-    Example:  gridpeers metrics runs/islanding/latest/IV
-    """
-    from gridpeers.scenarios.record.record_metrics import report_of
-    from gridpeers.scenarios.record.record_reader import RunRecord
-    from gridpeers.scenarios.results.report import show
-
-    show(report_of(RunRecord.open(run, case)), terminal())
