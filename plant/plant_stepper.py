@@ -99,7 +99,7 @@ class PlantStepper:
         for name, text in () if links is None else links.node_events(self.t):
             self.note("link", name, text)
 
-    def note(self, kind: Literal["law", "link", "roster", "warning"], subject: str, text: str) -> None:
+    def note(self, kind: Literal["command", "law", "link", "roster", "warning"], subject: str, text: str) -> None:
         self._note(PlantEvent(t=self.t, kind=kind, subject=subject, text=text))
 
     @property

@@ -471,8 +471,10 @@ class PlantEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 
     t: Time
     """Run time (s)."""
-    kind: Literal["switch", "island", "dead", "trip", "inverter", "limit", "load", "roster", "link", "law", "warning"]
-    """Kind of the event."""
+    kind: Literal[
+        "switch", "island", "dead", "trip", "inverter", "limit", "load", "roster", "link", "law", "warning", "command"
+    ]  # fmt: skip
+    """Kind of the event; a command is one that a person gave to the run."""
     subject: Label
     """The switch, load, island or agent concerned."""
     text: Text

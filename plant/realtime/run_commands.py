@@ -27,6 +27,9 @@ COMMANDS, COMMAND_INTERVAL = 100, 0.02
 """Commands of one verb that are carried out at once, and time (s) after which one more is: a step must not wait for
 those who ask without end."""
 
+NOTED = ("open", "close", "synchronise", "load", "stop")
+"""Verbs that change a run: each command is an event of it. Those to links are events of kind "command" too."""
+
 MOST_SWITCHES, MOST_LOADS = 500, 150  # most of them in a status, which must fit into an answer
 
 
@@ -142,6 +145,8 @@ class RunCommands:
                 text, data = self._command_links(command, now)
             else:
                 text = self._say(command)
+                if command.verb in NOTED:
+                    node.stepper.note("command", command.argument, text)
             ok = True
         except ValueError as error:
             text, ok = str(error), False
@@ -201,7 +206,7 @@ class RunCommands:
         t = time_of(stepper.tick + 1 + overdue, stepper.config.T_c) if runs else stepper.t
         request, text, receivers = self._link_commands.give(command.link_command, t, command.reply_to)
         start = f", from t = {t:.2f} s on" if receivers else ""
-        stepper.note("link", "links", f"link command {request.seq}: {text}{start}")
+        stepper.note("command", "links", f"link command {request.seq}: {text}{start}")
         return text, {"number": request.seq, "t": request.t, "asked": agents, "receivers": receivers}
 
     def _agents(self, *, present: bool) -> list[str]:

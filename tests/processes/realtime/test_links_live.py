@@ -109,7 +109,7 @@ def test_orders_act_at_the_next_tick_on_every_link_and_on_who_comes_later(tmp_pa
         assert [town.until_ended(name) for name in (*FOUR, "plant")] == [0] * 5
         traces = by_link(town.link_record)
 
-    heard_at = [event.t for event in town.events if event.kind == "link"]
+    heard_at = [event.t for event in town.events if event.kind == "command"]
     cut = [*verdicts(traces["inv3", "inv4"]), *verdicts(traces["inv4", "inv3"])]
     assert town.telemetry is not None
     assert town.telemetry.pacing is not None
@@ -171,4 +171,4 @@ def test_live_links_from_set_to_heal(desk: Desk) -> None:
         "run.mcap",
     ]
     events = (case / "events.csv").read_text()
-    assert events.count(',link,links,"link command ') == 3
+    assert events.count(',command,links,"link command ') == 3

@@ -252,7 +252,7 @@ def test_who_watches_hears_of_an_event_at_once() -> None:
     lab.ask("close", "sw1")
     lab.step()
 
-    assert [event.text for message in first for event in message.events] == ["sw1: open"]
+    assert [event.kind for message in first for event in message.events] == ["command", "switch"]
     assert lab.take(Telemetry) == []
     lab.step(10)
     assert "sw1: close" in [event.text for message in lab.take(Telemetry) for event in message.events]

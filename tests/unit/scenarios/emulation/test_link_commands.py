@@ -125,7 +125,7 @@ def test_a_command_holds_from_one_control_period_later_on_and_is_sent_before_the
     assert [(m.seq, m.t, m.link_command) for m in requests] == [(1, 0.08, CUT)] * len(requests) != []
     assert again == [(plant_side.KEYS.link_request("inv2"), 1)]
     assert not lab.ask("link", LinkCommand(fault=Fault(on="inv2 -> inv1", loss=20.0)).to_tree()).ok
-    assert [event.text for event in lab.events("link")] == ["link command 1: inv2 -> inv1: cut, from t = 0.08 s on"]
+    assert [event.text for event in lab.events("command")] == ["link command 1: inv2 -> inv1: cut, from t = 0.08 s on"]
 
 
 def test_a_heal_counts_the_links_that_have_a_fault_and_says_so_if_there_is_none() -> None:
@@ -148,7 +148,7 @@ def test_a_heal_counts_the_links_that_have_a_fault_and_says_so_if_there_is_none(
 
     assert (first.text, first.data["receivers"]) == ("all links: 1 link healed", ["inv1"])
     assert (again.text, again.data["receivers"]) == ("all links: no link has a fault", [])
-    assert [event.text.partition(", from")[0] for event in lab.events("link")[1:]] == [
+    assert [event.text.partition(", from")[0] for event in lab.events("command")[1:]] == [
         "link command 2: all links: 1 link healed",
         "link command 3: all links: no link has a fault",
     ]
