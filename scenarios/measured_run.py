@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
-from types import MappingProxyType
 from typing import Any
 
 import msgspec
@@ -16,8 +15,10 @@ from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.checks.judging import judge_case
 from gridpeers.scenarios.results.claims import NO_BENCHMARK, benchmark_of, judge, judged
 from gridpeers.scenarios.results.findings import Findings, find
+from gridpeers.scenarios.results.history import late_moves
 from gridpeers.scenarios.results.metric import UNITS
 from gridpeers.scenarios.results.metrics import SHARING_OF_ISLANDS, Steady
+from gridpeers.scenarios.results.plots.drawing import Drawing, drawing_of
 from gridpeers.scenarios.results.record import Recorded
 from gridpeers.scenarios.results.recorded_events import law_failures
 from gridpeers.scenarios.results.report import RunReport, plain
@@ -25,29 +26,40 @@ from gridpeers.scenarios.results.run_files import write_whole
 from gridpeers.scenarios.run_request import Request
 from gridpeers.scenarios.schema.plugin_keys import claims_of
 from gridpeers.wire.messages import Pacing
+from gridpeers.wire.wording import counted
 
 
 def write_measures(
     run: Request,
-    cases: Mapping[str, CheckedCase],
-    facts: Mapping[str, Mapping[str, Any]],
+    recorded: Mapping[str, Recorded],
+    pacing: Mapping[str, Pacing],
     notes: Sequence[str],
     *,
     place: str,
-    disturbed: bool = False,
-    live: Mapping[str, Any] = MappingProxyType({}),
     claims: bool = False,
-) -> RunReport:
-    """Measure and judge the cases, and write the files.
+) -> tuple[RunReport, Drawing]:
+    """Measure and judge the cases, and write the files; return the report, and the data of the figures.
 
-    `facts` and `live` are further entries of metrics.json, `place` is the folder as the report names it. A run that was
-    `disturbed` has no published numbers beside its own; of others `claims` says whether they are judged.
+    `place` is the folder as the report names it. Where people changed the run, or rows are missing, no published
+    numbers stand beside the own; of other runs `claims` says whether they are judged.
     """
-    scenario, findings = run.scenario, find(cases)
-    benchmark, own = (NO_BENCHMARK, []) if disturbed else (benchmark_of(scenario.paper), claims_of(scenario))
-    write_whole(run.folder / "metrics.json", metrics_json(run, findings, facts, live))
+    scenario = run.scenario
+    cases = {
+        name: CheckedCase.of(scenario, run.feeder, name, record, run.folder / name) for name, record in recorded.items()
+    }
+    findings, facts = find(cases), {name: _facts(cases[name], record) for name, record in recorded.items()}
+    for name, pace in pacing.items():
+        facts[name]["pacing"] = msgspec.to_builtins(pace)
+    changed = any({"commands", "missing"} & of.keys() for of in facts.values())
+    benchmark, own = (NO_BENCHMARK, []) if changed else (benchmark_of(scenario.paper), claims_of(scenario))
+    write_whole(run.folder / "metrics.json", metrics_json(run, findings, facts))
     checks = {name: judge_case(case) for name, case in cases.items()}
     write_whole(run.folder / FILE, verdicts_json(checks))
+    told = [
+        f"case {name}: {note}"
+        for name, record in recorded.items()
+        for note in _notes(cases[name], record, wall=run.clock == "wall")
+    ]
     report = RunReport(
         scenario=scenario.name,
         titles={case: rule.title for case, rule in scenario.cases.items()},
@@ -56,25 +68,54 @@ def write_measures(
         benchmark=benchmark,
         checks=checks,
         failures={name: law_failures(case.events) for name, case in cases.items()},
-        notes=notes,
+        notes=[*notes, *told],
         folder=place,
     )
     write_whole(run.folder / "report.txt", plain(report))
-    return report
+    return report, drawing_of(scenario, cases)
 
 
-def case_facts(recorded: Recorded, pacing: Pacing | None = None, **more: Any) -> dict[str, Any]:
-    """Return the other entries of a case in metrics.json: hashes, `more`, and the pacing (s of wall time)."""
-    links = {"links_sha256": recorded.links.sha256} if recorded.links.sha256 else {}
-    paced = {} if pacing is None else {"pacing": msgspec.to_builtins(pacing)}
-    return {"history_sha256": recorded.sha256} | links | more | paced
+def _facts(case: CheckedCase, recorded: Recorded) -> dict[str, Any]:
+    """Return the other entries of a case in metrics.json; but for the hashes only those that there are."""
+    facts = {
+        "links_sha256": recorded.links.sha256,
+        "commands": sum(event.kind == "command" for event in recorded.events),
+        "unmeasured": case.unmeasured,
+        "missing": [{"after_s": a, "before_s": b} for a, b in recorded.missing],
+    }
+    return {"history_sha256": recorded.sha256} | {name: value for name, value in facts.items() if value}
+
+
+def _notes(case: CheckedCase, recorded: Recorded, *, wall: bool) -> Iterator[str]:
+    """Yield sentences on what the scenario does not have, and on what of it is not measured."""
+    ended, end_s = recorded.ended, case.scenario.time.end_s
+    if wall and not case.scenario.events:
+        yield "the scenario has no event, so there is no window to measure in"
+    if ended > end_s + 1e-9:
+        yield f"measured up to {end_s:g} s, where the scenario ends; the history goes on to {ended:.2f} s"
+    elif ended < end_s - 1e-9:
+        yield f"ended at {ended:.2f} s of {end_s:g} s; what is measured ends there"
+    if case.unmeasured:
+        yield f"not reached, too short, or without rows, so without numbers: {', '.join(case.unmeasured)}"
+    if recorded.missing:
+        spans = ", ".join(f"{before:.2f} and {after:.2f} s" for before, after in recorded.missing)
+        yield f"rows are missing between {spans}, as the record was out of the plant's reach"
+    yield from late_moves(case.scenario, recorded.events)
+    if commands := [event.text for event in recorded.events if event.kind == "command"]:
+        count = counted(len(commands), "command")
+        yield f"people gave {count} that may change the run (events.csv), first: {commands[0]}"
+    if wall and (moves := [each for each in recorded.events if each.kind == "roster" and each.t > 0.0]):
+        times = counted(len(moves), "time")
+        yield f"agents came, left or were silent {times} after the start (events.csv), first: {moves[0].text}"
+    if shares := case.messages_saved:
+        text = ", ".join(f"{100.0 * share:.0f} % in {window}" for window, share in shares.items())
+        yield f"states not sent to neighbours: {text}"
 
 
 def metrics_json(
     run: Request,
     findings: Findings,
     facts: Mapping[str, Mapping[str, Any]],
-    live: Mapping[str, Any] = MappingProxyType({}),
 ) -> str:
     """Return the text of metrics.json; a measure that is no number or not steady is null."""
     cases: dict[str, dict[str, Any]] = {}
@@ -97,8 +138,7 @@ def metrics_json(
         cases[case] |= facts[case]
     scenario = run.scenario
     clock = {"clock": run.clock, "speed": run.speed} if run.clock == "wall" else {}
-    table = {"live": dict(live)} if live else {}
-    text = {"scenario": scenario.name, "seed": scenario.seed, "driver": run.driver, **clock, **table, "cases": cases}
+    text = {"scenario": scenario.name, "seed": scenario.seed, "driver": run.driver, **clock, "cases": cases}
     return json.dumps(text, indent=2, allow_nan=False) + "\n"
 
 

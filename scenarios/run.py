@@ -12,7 +12,7 @@ from collections.abc import Callable
 from datetime import datetime
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, TextIO
 
 from msgspec.structs import replace
 
@@ -38,7 +38,6 @@ from gridpeers.wire.wording import not_importable
 
 if TYPE_CHECKING:
     from gridpeers.plant.plant_interface import PlantLike
-    from gridpeers.scenarios.live.departures import Departures
     from gridpeers.scenarios.results.report import RunReport
 
 _AFTER_RUN = ("record.record_reader", "measured_run", "results.plots.run_figures")
@@ -85,14 +84,11 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
     pacing: dict[str, Pacing] = {}
     for case in scenario.cases:
         recorded[case], outcome = run_case(request, case, text, progress)
-        from gridpeers.scenarios.results.history import late_moves
-
         notes += [f"case {case}: {note}" for note in (*outcome.notes, *recorded[case].links.lines())]
         if outcome.pacing is not None:
             pacing[case] = outcome.pacing
             pace = sentence(outcome.pacing, scenario.time.T_c_s / request.speed)
             notes.append(f"case {case}, real time at speed {request.speed:g}: {pace}")
-        notes += [f"case {case}: {note}" for note in late_moves(scenario, recorded[case].events)]
         print(
             f"case {case}: start {outcome.start_s:.2f} s, run {outcome.run_s:.2f} s, {outcome.ticks} ticks",
             *outcome.notes,
@@ -100,43 +96,22 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
             file=log,
             flush=True,
         )
-    from gridpeers.scenarios.checks.checked_case import CheckedCase
-    from gridpeers.scenarios.measured_run import case_facts, write_measures
+    from gridpeers.scenarios.measured_run import write_measures
 
-    cases = {
-        case: CheckedCase.of(scenario, request.feeder, case, record, folder / case) for case, record in recorded.items()
-    }
-    compared: dict[str, Departures] = {}
     if request.clock == "wall":
-        from gridpeers.scenarios.live.departures import compare
-
-        for case, record in recorded.items():
-            one_case = replace(scenario, cases={case: scenario.cases[case]})
-            compared[case] = compare(one_case, request.feeder, record.events, record.ended)
-        notes += [f"case {case}: {one.note}" for case, one in compared.items() if one.note]
         notes.append("in real time no two runs are the same: each has its own delays")
-    facts = {}
-    for case, record in recorded.items():
-        unlike: dict[str, Any] = {}
-        if (one := compared.get(case)) and one.events:
-            unlike = {"disturbed": [window.label for window in one.disturbed], "departures": one.lines}
-        if saved := cases[case].messages_saved:
-            shares = ", ".join(f"{100.0 * share:.0f} % in {window}" for window, share in saved.items())
-            notes.append(f"case {case}: states not sent to neighbours: {shares}")
-        if request.clock == "simulated" and not record.reproducible:
-            notes.append(f"case {case} cannot be reproduced: something happened in it that the scenario does not have")
-        facts[case] = case_facts(record, pacing.get(case), **unlike)
-
-    disturbed = any(one.disturbed for one in compared.values())
+    else:
+        notes += [
+            f"case {case} cannot be reproduced: something happened in it that the scenario does not have"
+            for case, record in recorded.items()
+            if not record.reproducible
+        ]
     where = place + "/" if request.lasting else ""
-    report = write_measures(request, cases, facts, notes, place=where, disturbed=disturbed, claims=True)
+    report, drawing = write_measures(request, recorded, pacing, notes, place=where, claims=True)
     if request.lasting:
-        from gridpeers.scenarios.results.history import as_they_came
-        from gridpeers.scenarios.results.plots.drawing import drawing_of
         from gridpeers.scenarios.results.plots.run_figures import draw_all
 
-        last = recorded[list(recorded)[-1]]  # in real time each case has its own events
-        draw_all(drawing_of(scenario, cases, as_they_came(scenario, last.events)), folder / "plots")
+        draw_all(drawing, folder / "plots")
     set_complete(folder)
     return report
 

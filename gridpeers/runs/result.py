@@ -6,7 +6,6 @@ import re
 import shutil
 import sys
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from functools import cached_property
 from io import BytesIO
 from pathlib import Path
@@ -23,12 +22,11 @@ from gridpeers.scenarios.checks import check_verdict
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict
 from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.checks.judging import judge_case
-from gridpeers.scenarios.live.departures import compare
-from gridpeers.scenarios.live.live_report import live_drawing
 from gridpeers.scenarios.record.record_info import LIVE
 from gridpeers.scenarios.results.claims import Verdict, benchmark_of, judge, judged
 from gridpeers.scenarios.results.findings import Findings, find
 from gridpeers.scenarios.results.history import UNITS, History, as_they_came, windows
+from gridpeers.scenarios.results.island_membership import taken_part
 from gridpeers.scenarios.results.plots.drawing import Drawing, drawing_of
 from gridpeers.scenarios.results.recorded_events import law_failures
 from gridpeers.scenarios.results.run_files import FolderError, refusal, shown, write_whole
@@ -141,15 +139,13 @@ class Results(_FromFolder, Mapping[str, "Result"]):
 
     @cached_property
     def findings(self) -> Findings:
-        """The measures as claims judge them; ValueError of a live run, whose windows people made."""
-        if self.driver == LIVE:
-            raise ValueError("this was a live run: its windows are those that people made, see metrics")
+        """The measures as claims judge them."""
         return find({case: result.checked_case for case, result in self.items()})
 
     @property
     def verdicts(self) -> tuple[Verdict, ...]:
-        """Claims of the scenario's benchmark, and its own, judged; none in a run that was disturbed."""
-        if any(result.disturbed for result in self.values()):
+        """Claims of the scenario's benchmark, and its own, judged; none in a live run, or one that people changed."""
+        if self.driver == LIVE or any(self._folder.numbers_of(case).get("commands") for case in self):
             return ()
         claims = benchmark_of(self.spec.paper).claims
         return (*judge(self.findings, claims), *judged(self.findings, claims_of(self.spec)))
@@ -157,12 +153,7 @@ class Results(_FromFolder, Mapping[str, "Result"]):
     def drawing(self, cases: Mapping[str, Result]) -> Drawing:
         """Return the data of the figures of some cases (`gridpeers.scenarios.results.plots`)."""
         spec = msgspec.structs.replace(self.spec, cases={case: self.spec.cases[case] for case in cases})
-        *_, last = cases.values()  # in real time each case has its own events
-        if self.driver == LIVE:
-            departures = compare(spec, self._feeder, self._folder.events(last.case), float(last.record.t[-1]))
-            return live_drawing(departures, replace(last.checked_case, scenario=spec))
-        recorded = {case: result.checked_case for case, result in cases.items()}
-        return drawing_of(spec, recorded, as_they_came(spec, self._folder.events(last.case)))
+        return drawing_of(spec, {case: result.checked_case for case, result in cases.items()})
 
     def __repr__(self) -> str:
         return f"<Results {self.spec.name}: cases {', '.join(self)}; {self.driver}>"
@@ -249,11 +240,6 @@ class Result(_FromFolder):
         """SHA-256 of all fates of messages on emulated links; "" without such links."""
         return str(self._folder.numbers_of(self.case).get("links_sha256", ""))
 
-    @property
-    def disturbed(self) -> list[str]:
-        """Windows of a run in real time in which something happened that the scenario does not tell."""
-        return list(self._folder.numbers_of(self.case).get("disturbed", ()))
-
     @cached_property
     def checked_case(self) -> CheckedCase:
         """The case as metrics and checks see it: what a check of one's own is called with."""
@@ -263,7 +249,7 @@ class Result(_FromFolder):
             scenario=self.spec,
             feeder=self._feeder,
             case=self.case,
-            history=self.record,
+            history=taken_part(self.spec, self._feeder, self.record),
             windows=[window for window in came if window.label in measured],
             events=self._folder.events(self.case),
             messages_saved={label: of["messages_saved"] for label, of in measured.items() if of.get("messages_saved")},

@@ -22,11 +22,11 @@ from gridpeers.runs.result import Result
 from gridpeers.runs.run_folder import RunFolder, new_home
 from gridpeers.runs.running import read, warn_of_laws
 from gridpeers.scenario import plain
-from gridpeers.scenarios.live.live_report import write_report
+from gridpeers.scenarios.measured_run import write_measures
 from gridpeers.scenarios.record.record_info import LIVE, RecordInfo
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.results.record import Recorded, Recorder, RecordError
-from gridpeers.scenarios.results.run_files import broken_if_ended, set_status, write_whole
+from gridpeers.scenarios.results.run_files import broken_if_ended, set_status, shown, write_whole
 from gridpeers.scenarios.run_request import Other, Progress, Request
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.scenarios.schema.scenario_writing import to_toml
@@ -213,10 +213,14 @@ def _write(
     metrics = Request(
         scenario=scenario,
         feeder=rule.feeder,
-        driver=LIVE,  # its windows are those of what happened
+        driver=LIVE,  # no claim is judged
         folder=folder,
         clock=record.info.clock,
         speed=record.info.plant.speed,
     )
-    write_report(metrics, recorded, None, figures=figures)
+    _, drawing = write_measures(metrics, {rule.case: recorded}, {}, (), place=f"{shown(folder)}/")
+    if figures:
+        from gridpeers.scenarios.results.plots.run_figures import draw_all  # imports matplotlib
+
+        draw_all(drawing, folder / "plots")
     set_status(folder, "complete")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -23,7 +23,14 @@ from gridpeers.scenarios.results.history import (
     read_only,
     windows,
 )
-from gridpeers.scenarios.results.island_membership import IslandInterval, island_intervals, islands_at_end, part_of
+from gridpeers.scenarios.results.island_membership import (
+    IslandInterval,
+    island_intervals,
+    islands_at_end,
+    part_of,
+    taken_part,
+)
+from gridpeers.scenarios.results.metrics import STEADY
 from gridpeers.scenarios.results.record import Recorded
 from gridpeers.scenarios.schema.configs import limits_of
 from gridpeers.scenarios.schema.participants import netem_of, without_agent
@@ -86,17 +93,14 @@ class CheckedCase:
         case: str,
         recorded: Recorded,
         folder: Path | None = None,
-        measured: Sequence[Window] | None = None,
     ) -> CheckedCase:
-        """Return a case as recorded, and windows to measure in, by default those of the events as they came."""
-        came = measured
-        if came is None:
-            came = windows(as_they_came(scenario, recorded.events), scenario.time.end_s)
+        """Return a case as recorded, with the windows that can be measured."""
+        came = _measurable(scenario, recorded)
         return cls(
             scenario=scenario,
             feeder=feeder,
             case=case,
-            history=recorded.history,
+            history=taken_part(scenario, feeder, recorded.history),
             windows=came,
             events=recorded.events,
             messages_saved=messages_saved(scenario, feeder, case, recorded.quiet, came),
@@ -172,6 +176,12 @@ class CheckedCase:
             found.append(IslandWindow(window, label, island.fed, *part_of(rows, self.nameplates, island.inverters)))
         return found
 
+    @property
+    def unmeasured(self) -> list[str]:
+        """The events whose windows have no numbers."""
+        measured = {window.label for window in self.windows}
+        return [event.label for event in self.scenario.events if event.label not in measured]
+
     def killed(self, history: History) -> Flags:
         """Return which inverters of a history have an agent that the scenario has killed, by row; shape (T, N)."""
         names = history.inverters
@@ -191,3 +201,20 @@ class CheckedCase:
                 since = part.history.t >= limit.t - 1e-9
                 found[since, i] = part.history.P[since, i] >= (1.0 - NEAR) * limit.P_max
         return found
+
+
+def _measurable(scenario: ScenarioModel, recorded: Recorded) -> list[Window]:
+    """Return the windows of the events as they came, up to the end of the record.
+
+    One that the record ends within 0.2 s of its start is left out, and one without rows at its end.
+    """
+    came = windows(as_they_came(scenario, recorded.events), scenario.time.end_s)
+    least, found = max(STEADY, 2.0 * scenario.time.record_s), list[Window]()
+    for window in came:
+        if window.end > recorded.ended + 1e-9:
+            window = replace(window, end=recorded.ended)
+            if window.end - window.start < least - 1e-9:
+                continue
+        if not any(a < window.end and b > window.end - STEADY - 1e-9 for a, b in recorded.missing):
+            found.append(window)
+    return found

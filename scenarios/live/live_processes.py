@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 import logging
 import re
 import sys
 import threading
 from collections.abc import Callable, Collection, Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic
 
@@ -19,6 +19,7 @@ from gridpeers.plant.known_names import COMPILING, READY
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_process import run_plant
 from gridpeers.plant.realtime.pacer import sentence
+from gridpeers.scenarios.console import terminal
 from gridpeers.scenarios.drivers.children import Child
 from gridpeers.scenarios.drivers.forking import release
 from gridpeers.scenarios.drivers.supervisor import Supervisor
@@ -31,6 +32,8 @@ from gridpeers.scenarios.live.run_monitor import line_of
 from gridpeers.scenarios.live.run_requests import ANSWER, free_configurations, own_code
 from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.scenarios.results.record import Recorded, Recorder, RecordError
+from gridpeers.scenarios.results.run_files import set_broken, set_complete, shown
+from gridpeers.scenarios.run_request import Request
 from gridpeers.scenarios.short_texts import short
 from gridpeers.wire.driver.drive import StoppedError
 from gridpeers.wire.driver.ending import stop_at_signals
@@ -64,7 +67,7 @@ def _say_all(lines: Iterable[str]) -> None:
         say(line)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class ProcessOutcome:
     broke: str = ""
     interrupted: str = ""
@@ -309,6 +312,37 @@ def _say_end(recorder: LiveRecorder, config: PlantConfig) -> None:
         say("the run ended before it began")
     else:
         say(f"ended at t = {recorder.client.t:.2f} s; {sentence(pacing, config.T_c / config.speed)}")
+
+
+def conclude(outcome: ProcessOutcome, metrics: Request) -> ProcessOutcome:
+    """Measure a run that has ended, show its report, draw its figures, and note in its folder how it ended.
+
+    Ctrl-C and SIGTERM are good ends of a live run. Only a second one leaves it without numbers. It judges no claim of
+    the paper, as people may have changed the run.
+    """
+    folder, recorded = metrics.folder, outcome.recorded
+    if outcome.broke or recorded is None:
+        set_broken(folder, outcome.broke or "no whole record")
+        return outcome
+    from gridpeers.scenarios.measured_run import write_measures  # it takes longer to import than a run to start
+    from gridpeers.scenarios.results.plots.run_figures import draw_all
+    from gridpeers.scenarios.results.report import show
+
+    (case,) = metrics.scenario.cases
+    pacing = {} if outcome.pacing is None else {case: outcome.pacing}
+    try:
+        report, drawing = write_measures(metrics, {case: recorded}, pacing, (), place=f"{shown(folder)}/")
+        draw_all(drawing, folder / "plots")
+        show(report, terminal())
+        set_complete(folder)
+    except (StoppedError, KeyboardInterrupt) as stop:
+        set_broken(folder, "interrupted while its numbers were made")
+        return dataclasses.replace(outcome, interrupted=_signal_of(stop))
+    except OSError as error:
+        broke = f"its numbers cannot be written: {error.strerror or error}"
+        set_broken(folder, broke)
+        return dataclasses.replace(outcome, broke=broke)
+    return outcome
 
 
 def _signal_of(stop: BaseException) -> str:

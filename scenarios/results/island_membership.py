@@ -132,7 +132,10 @@ def part_of(history: History, nameplates: Nameplates, names: tuple[str, ...]) ->
 
 def taken_part(scenario: ScenarioModel, feeder: Tables, history: History) -> History:
     """Return the history of a live run without the spare inverters that nobody ever started."""
-    own, present = {row.name for row in inverters_of(scenario, feeder)}, history.present
+    own = {row.name for row in inverters_of(scenario, feeder)}
+    if own.issuperset(history.inverters):
+        return history
+    present = history.present
     names = tuple(name for i, name in enumerate(history.inverters) if name in own or bool(present[:, i].any()))
     return part_of(history, Nameplates.of_columns(history.inverters, feeder), names)[0]
 

@@ -73,8 +73,7 @@ def _start(start: Start, *, agents: bool) -> None:
     check_alone(run, beyond, credentials, access)
 
     from gridpeers.scenarios.live.live_files import folders, live_record
-    from gridpeers.scenarios.live.live_processes import all_here, plant_here, say
-    from gridpeers.scenarios.live.live_report import conclude
+    from gridpeers.scenarios.live.live_processes import all_here, conclude, plant_here, say
     from gridpeers.scenarios.record.record_info import LIVE
     from gridpeers.scenarios.results.recorded_events import ended_by_a_law, first_of, law_failures
     from gridpeers.scenarios.run_request import Request

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
-from gridpeers.scenarios.results.history import History, Nameplates
+from gridpeers.scenarios.results.history import History, Nameplates, as_they_came
 from gridpeers.scenarios.results.island_membership import IslandInterval, Islands, RecordedIsland
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.scenarios.schema.configs import limits_of
@@ -72,25 +72,26 @@ class Drawing:
         return f"island of {island.inverters[0]}"
 
 
-def drawing_of(
-    scenario: ScenarioModel, cases: Mapping[str, CheckedCase], events: Sequence[tuple[str, float]]
-) -> Drawing:
+def drawing_of(scenario: ScenarioModel, cases: Mapping[str, CheckedCase]) -> Drawing:
     """Return the data of the figures of some cases, which are all that their scenario has."""
-    first = next(iter(cases.values()))
+    *_, last = cases.values()  # in real time each case has its own events
+    came = [(label, t) for label, t in as_they_came(scenario, last.events) if t < last.history.t[-1]]
+    commands = [Mark("", event.t, event.subject) for event in last.events if event.kind == "command"]
     what = {event.label: happening(event, scenario) for event in scenario.events}
     limited = dict.fromkeys(limit.inverter for case in scenario.cases for limit in limits_of(scenario, case))
     several = {name: [it for it in case.islands if len(it.islands) > 1] for name, case in cases.items()}
     return Drawing(
         histories={name: case.history for name, case in cases.items()},
         titles={case: rule.title for case, rule in scenario.cases.items()},
-        nameplates=Nameplates.of_columns(first.history.inverters, first.feeder),
-        events=[Mark(label, t, what.get(label, "")) for label, t in events],
-        f_nom=first.f_nom,
+        nameplates=Nameplates.of_columns(last.history.inverters, last.feeder),
+        events=[*(Mark(label, t, what.get(label, "")) for label, t in came), *commands],
+        f_nom=last.f_nom,
         without_agent={case: without_agent(scenario, case) for case in scenario.cases},
-        moves=any(event.leave or event.join for event in scenario.events),
+        moves=any(event.leave or event.join for event in scenario.events)
+        or any(mark.what in last.history.inverters for mark in commands),
         limited=tuple(limited),
         island_intervals={case: of for case, of in several.items() if of},
-        microgrid_of={row.name: row.microgrid for row in (*first.feeder.inverters, *first.feeder.spares)},
+        microgrid_of={row.name: row.microgrid for row in (*last.feeder.inverters, *last.feeder.spares)},
         shared=_shared(cases),
     )
 

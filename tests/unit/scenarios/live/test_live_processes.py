@@ -15,8 +15,9 @@ from gridpeers.agents.agent_config import Control, LawChoice
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.plant.known_names import COMPILING, LISTENING
+from gridpeers.scenarios import measured_run
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
-from gridpeers.scenarios.live import live_processes, live_report
+from gridpeers.scenarios.live import live_processes
 from gridpeers.scenarios.live.live_files import folders
 from gridpeers.scenarios.live.live_processes import UNHEARD, LiveRecorder, ProcessOutcome, _followed, meaning
 from gridpeers.scenarios.live.run_address import RunAddress, UsageError
@@ -110,16 +111,16 @@ def test_a_run_that_is_interrupted_while_it_is_judged_has_its_scenario(
 ) -> None:
     """Its numbers are missing; the scenario that it began with can be run again."""
 
-    def interrupted(*words: Any) -> None:
+    def interrupted(*_: Any, **__: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(live_report, "write_report", interrupted)
+    monkeypatch.setattr(measured_run, "write_measures", interrupted)
     scenario, _ = load_scenario("islanding")
     scenario = msgspec.structs.replace(scenario, cases={"IV": scenario.cases["IV"]})
     outcome = ProcessOutcome(recorded=cast(Recorded, SimpleNamespace(ended=2.01)))
     with folders(tmp_path / "live", scenario) as kept:
         assert kept.whole == tmp_path / "live"
-        ended = live_report.conclude(outcome, cast(Request, SimpleNamespace(scenario=scenario, folder=kept.whole)))
+        ended = live_processes.conclude(outcome, cast(Request, SimpleNamespace(scenario=scenario, folder=kept.whole)))
 
     assert load_scenario(tmp_path / "live" / "scenario.toml")[0] == scenario
     assert ended.interrupted == "SIGINT"
