@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -14,6 +13,7 @@ from gridpeers.plant.equipment.imported_equipment import is_behind
 from gridpeers.plant.equipment.neutrals import neutral_for, neutrals_of
 from gridpeers.plant.inverters.inverter_model import InverterModel
 from gridpeers.rooms import READERS
+from gridpeers.wire.wording import InputError, suggestion
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -45,37 +45,41 @@ class Feeder(Tables, frozen=True, kw_only=True):
         return f"<Feeder {self.name}: {counts}, loads {loads}>"
 
     @classmethod
-    def read(cls, name: str | Path, load_set: str = "main") -> Feeder:
-        """Return a feeder that comes with gridpeers, by its name, or that of a folder of tables, by its path.
-
-        `gridpeers.plant.tables.FeederError` has every problem of its tables.
-        """
-        from gridpeers.plant.tables import read_feeder
-
-        return _of_tables(read_feeder(str(name), load_set))
-
-    @classmethod
-    def from_opendss(
-        cls, path: str | Path, f_nom: float | None = None, *, leave_out: Names = (), switches: Names = ()
+    def read(
+        cls,
+        name: str | Path,
+        load_set: str | None = None,
+        f_nom: float | None = None,
+        *,
+        leave_out: Names = (),
+        switches: Names = (),
     ) -> Feeder:
-        """Return the feeder of a script for OpenDSS, often Master.dss; needs the extra `opendss`.
+        """Return a feeder that comes with gridpeers, by its name, that of a folder of tables, or of another program.
 
-        The nominal frequency (Hz) is the script's if left out. Elements to leave out are written `Class.name`, with
-        `*` for any: "PVSystem.*". The `switches` are lines that can be opened, beside those that the script calls so.
-        `gridpeers.plant.tables.FeederError` has all that the engine refuses, and all that cannot be represented.
+        A folder has its load set `main`, or another one. Of another program is a script for OpenDSS (.dss), often
+        Master.dss, which needs the extra `opendss`; a model for GridLAB-D (.glm) as it is once its controls rest, which
+        needs the extra `gridlabd`; or a file with a reader of your own. The nominal frequency (Hz) is the file's if
+        left out. Elements to leave out are written `Class.name`, with `*` for any: "PVSystem.*". The `switches` are
+        lines that can be opened, beside those that the file calls so.
+        `gridpeers.plant.tables.FeederError` has every problem of the tables, all that the other program refuses, and
+        all that cannot be represented.
         """
-        return _imported("dss", path, f_nom, leave_out=leave_out, switches=switches)
+        if is_foreign(name):
+            if load_set is not None:
+                raise InputError(
+                    f"load_set is for a folder of tables; {name} has the one set of loads that it describes"
+                )
+            read = READERS.resolve(_ending(name))
+            tables = read(name, f_nom, leave_out=_listed(leave_out), switches=_listed(switches))
+        else:
+            from gridpeers.plant.tables import read_feeder
 
-    @classmethod
-    def from_glm(
-        cls, path: str | Path, f_nom: float | None = None, *, leave_out: Names = (), switches: Names = ()
-    ) -> Feeder:
-        """Return the feeder of a model for GridLAB-D, once its controls rest; needs the extra `gridlabd`.
-
-        Its arguments are those of `from_opendss`, with objects as `class.name`, and lines that can be opened beside
-        the model's switches, reclosers and sectionalizers.
-        """
-        return _imported("glm", path, f_nom, leave_out=leave_out, switches=switches)
+            if leave_out or switches or f_nom is not None:
+                raise InputError(
+                    "switches, leave_out and f_nom are for .dss and .glm files; a folder's tables can be edited"
+                )
+            tables = read_feeder(str(name), load_set or "main")
+        return cls(**{name: getattr(tables, name) for name in tables.__struct_fields__})
 
     def add_inverter(
         self,
@@ -101,7 +105,6 @@ class Feeder(Tables, frozen=True, kw_only=True):
         """
         from gridpeers.plant.tables.parameter_sets import as_set
         from gridpeers.plant.tables.shunts import problems_of
-        from gridpeers.wire.wording import suggestion
 
         bus = str(bus)  # many buses have a number as their name
         found = {one.name: one for one in self.buses}.get(bus)
@@ -180,21 +183,13 @@ class Feeder(Tables, frozen=True, kw_only=True):
         return Path(folder)
 
 
-def reader_of(name: str) -> Callable[..., Feeder] | None:
-    """Return the reader of a file that was written for another program, by the end of its name; None of other files."""
-    format = Path(name).suffix.lower().removeprefix(".")
-    return partial(_imported, format) if format in READERS.names else None
+def is_foreign(name: str | Path) -> bool:
+    """Whether a file is written for another program, by the end of its name."""
+    return _ending(name) in READERS.names
 
 
-def _imported(
-    format: str, path: str | Path, f_nom: float | None = None, *, leave_out: Names = (), switches: Names = ()
-) -> Feeder:
-    tables = READERS.resolve(format)(path, f_nom, leave_out=_listed(leave_out), switches=_listed(switches))
-    return _of_tables(tables)
-
-
-def _of_tables(tables: Tables) -> Feeder:
-    return Feeder(**{name: getattr(tables, name) for name in tables.__struct_fields__})
+def _ending(name: str | Path) -> str:
+    return Path(name).suffix.lower().removeprefix(".")
 
 
 def _listed(names: Names) -> Names:

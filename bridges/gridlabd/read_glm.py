@@ -49,7 +49,7 @@ KNOWN = DATA | WATCHING | LINEAR | SWITCHES | NOTED.keys() | set(CHILD_OF_BUS)
 def read_glm(
     path: str | Path, f_nom: float | None = None, *, leave_out: Sequence[str] = (), switches: Sequence[str] = ()
 ) -> Tables:
-    """Return the feeder of a model for GridLAB-D (`gridpeers.Feeder.from_glm`).
+    """Return the feeder of a model for GridLAB-D (`gridpeers.Feeder.read`).
 
     Its `notes` list what was done instead of what the model says.
     """

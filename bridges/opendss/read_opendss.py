@@ -27,7 +27,7 @@ SHOWN = 100  # letters of a command that an error shows
 def read_opendss(
     path: str | Path, f_nom: float | None = None, *, leave_out: Sequence[str] = (), switches: Sequence[str] = ()
 ) -> Tables:
-    """Return the feeder of a script for OpenDSS (`gridpeers.Feeder.from_opendss`).
+    """Return the feeder of a script for OpenDSS (`gridpeers.Feeder.read`).
 
     Its `notes` list what was done instead of what the script says.
     """

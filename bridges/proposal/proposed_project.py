@@ -64,7 +64,7 @@ def propose_project(folder: Path, script: Path, switches: list[str], leave_out: 
     A feeder without a switch to island at gets one near the substation.
     """
     try:
-        feeder = read_script(str(script), switches, leave_out)
+        feeder = read_script(script, switches, leave_out)
         try:
             proposal = propose(feeder)
         except NoSwitchError as error:
@@ -72,7 +72,7 @@ def propose_project(folder: Path, script: Path, switches: list[str], leave_out: 
                 raise
             line = error.lines[0]
             typer.echo(f"NOTE  no switch cuts half of the load off the substation; {line} is made one")
-            feeder = read_script(str(script), [*switches, line], leave_out)
+            feeder = read_script(script, [*switches, line], leave_out)
             proposal = propose(feeder)
     except NoProposalError as error:
         fail(f"{script}: {error}")

@@ -10,8 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from gridpeers.cli.suggestions import Commands
-from gridpeers.cli.usage import fail
+from gridpeers.cli.usage import Commands, fail
 from gridpeers.wire.plugins.registry import PluginError, Registry
 
 _PAPER = "gridpeers.papers.singhal2022"

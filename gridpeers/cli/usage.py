@@ -12,6 +12,8 @@ from importlib import util
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
+from typer import BadParameter
+from typer.core import TyperGroup
 
 from gridpeers.scenarios.console import terminal as terminal
 from gridpeers.wire.driver.command_line import command_line
@@ -39,14 +41,14 @@ def argument(metavar: str, help: str) -> Any:
 
 
 ScenarioName = Annotated[str, argument("SCENARIO", "A name that `gridpeers list` shows, or the path of a file.")]
+Switches = Annotated[
+    list[str] | None, option("LINE", "A line of a .dss or .glm file to make a switch; repeat it.", "--switch")
+]
+LeaveOut = Annotated[
+    list[str] | None, option("ELEMENT", 'Do without Class.name, * for any: "PVSystem.*"; repeat it.', "--leave-out")
+]
 
 PASSED, CLAIM_FAILED, BAD_INPUT, BROKEN, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 130, 143
-
-OPTIONS = {
-    "plant.simulator": "--plant",
-    "plant.load_set": "--load-set",
-}
-"""Options that change a key of the scenario, by this key."""
 
 
 def load(name: str, changes: Mapping[str, Any] | None = None) -> tuple[ScenarioModel, Tables]:
@@ -64,8 +66,7 @@ def load(name: str, changes: Mapping[str, Any] | None = None) -> tuple[ScenarioM
 def refuse(error: InputError) -> NoReturn:
     """End with every problem of a file, or of an option that changes a key of it."""
     problems = list(getattr(error, "problems", ())) or str(error).splitlines()
-    for key, option in OPTIONS.items():
-        problems = [re.sub(rf"^replace: {re.escape(key)}:", f"{option}:", problem) for problem in problems]
+    problems = [re.sub(r"^replace: plant\.simulator:", "--plant:", problem) for problem in problems]
     head = [] if len(problems) == 1 else [f"{len(problems)} problems:"]
     fail(*head, *problems)
 
@@ -153,3 +154,46 @@ def ended_by_signals(left: str) -> Iterator[None]:
             yield
     except KeyboardInterrupt as error:
         fail(f"interrupted; {left}", code=exit_code(error))
+
+
+_UsageError: type[BaseException] = BadParameter.__mro__[1]
+"""Base of all problems on a command line; releases of typer keep it in different modules."""
+
+
+class Commands(TyperGroup):
+    """Commands that report mistyped words in one line, where typer prints three."""
+
+    def make_context(self, *words: Any, **extra: Any) -> Any:  # noqa: D102
+        with _in_one_line():
+            return super().make_context(*words, **extra)
+
+    def invoke(self, ctx: Any) -> Any:  # noqa: D102
+        with _in_one_line():
+            return super().invoke(ctx)
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # noqa: D102
+        if not args[0].startswith("-") and self.get_command(ctx, args[0]) is None:
+            fail(f'no command "{args[0]}"; {suggestion(args[0], self.list_commands(ctx), "commands")}')
+        return super().resolve_command(ctx, args)
+
+
+@contextmanager
+def _in_one_line() -> Iterator[None]:
+    try:
+        yield
+    except _UsageError as error:
+        if type(error).__name__ == "NoArgsIsHelpError":  # the help is all that it says
+            raise
+        fail(_line(error))
+    except InputError as error:
+        refuse(error)
+
+
+def _line(error: Any) -> str:
+    """Return a problem in one line, in typer's words, with the command that shows what would be right."""
+    message = " ".join(error.format_message().split()).rstrip(".").replace("Value error, ", "")
+    words: list[str] = []
+    ctx = error.ctx
+    while ctx is not None and ctx.parent is not None:
+        words, ctx = [ctx.info_name, *words], ctx.parent
+    return f"{message[:1].lower()}{message[1:]}; {command_line(*words, '-h')} shows what can be given"

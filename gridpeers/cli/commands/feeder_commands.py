@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from gridpeers.cli.usage import argument, fail, option
-from gridpeers.feeder import Feeder, reader_of
+from gridpeers.cli.usage import LeaveOut, Switches, argument, fail, option
+from gridpeers.feeder import Feeder, is_foreign
 from gridpeers.output_folders import files_written, shown, whole_folder, write_whole
 from gridpeers.plant.equipment.connectivity import Connectivity
 from gridpeers.plant.equipment.imported_equipment import is_behind
@@ -22,12 +22,6 @@ app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Import, che
 
 FeederName = Annotated[
     str, argument("FEEDER", "A feeder that comes with gridpeers, a folder of tables, or a .dss or .glm file.")
-]
-Switches = Annotated[
-    list[str] | None, option("LINE", "A line to make a switch, beside the script's own; repeat it.", "--switch")
-]
-LeaveOut = Annotated[
-    list[str] | None, option("ELEMENT", 'Do without Class.name, * for any: "PVSystem.*"; repeat it.', "--leave-out")
 ]
 LoadSet = Annotated[str | None, option("NAME", "Load table of a folder of tables; main if left out.", "--load-set")]
 SHOWN = 12
@@ -45,7 +39,7 @@ def import_(
 
     Example:  gridpeers feeder import Master.dss --out my-feeder
     """
-    feeder = read_script(str(file), switch or [], leave_out or [])
+    feeder = read_script(file, switch, leave_out)
     folder = out or Path(folder_of(feeder.name))
     with whole_folder(folder):
         save_readable(feeder, folder, file.name)
@@ -66,7 +60,7 @@ def check(feeder: FeederName, load_set: LoadSet = None, switch: Switches = None,
 
     Example:  gridpeers feeder check microgrid123
     """
-    tables = _read(feeder, load_set, switch, leave_out)
+    tables = Feeder.read(feeder, load_set, switches=switch or (), leave_out=leave_out or ())
     _describe(tables)
     graph, load_by_bus = Connectivity(tables), tables.load_by_bus()
     for each in tables.switches:
@@ -94,7 +88,7 @@ def solve(
 
     Example:  gridpeers feeder solve microgrid123 --open 13-152
     """
-    tables = _read(feeder, load_set, switch, leave_out)
+    tables = Feeder.read(feeder, load_set, switches=switch or (), leave_out=leave_out or ())
     try:
         table = tables.solve(open_ or ())
     except (ValueError, ArithmeticError) as error:
@@ -123,13 +117,11 @@ def solve(
         typer.echo(f"Voltages: {shown(csv)}")
 
 
-def read_script(name: str, switches: list[str], leave_out: list[str]) -> Feeder:
-    """Read a feeder that was written for another program, or end with every problem in it."""
-    read = reader_of(name)
-    if read is None:
-        text = "a feeder is a .dss file (OpenDSS) or a .glm file (GridLAB-D), by the end of its name"
-        fail(f"{name}: {text}")
-    return read(name, switches=switches, leave_out=leave_out)
+def read_script(file: Path, switches: list[str] | None, leave_out: list[str] | None) -> Feeder:
+    """Read a feeder that was written for another program."""
+    if not is_foreign(file):
+        fail(f"{file}: a feeder is a .dss file (OpenDSS) or a .glm file (GridLAB-D), by the end of its name")
+    return Feeder.read(file, switches=switches or (), leave_out=leave_out or ())
 
 
 def save_readable(feeder: Feeder, folder: Path, script: str) -> None:
@@ -150,17 +142,6 @@ def folder_of(name: str) -> str:
     ('ieee13', '_up_and_away')
     """
     return re.sub(r"[^\w.-]+", "_", name).lstrip(".-") or "feeder"
-
-
-def _read(name: str, load_set: str | None, switch: list[str] | None, leave_out: list[str] | None) -> Feeder:
-    """Read a feeder of tables or a script, or end with every problem in it."""
-    if reader_of(name):
-        if load_set is not None:
-            fail(f"--load-set is for a folder of tables; {name} has the one set of loads that it describes")
-        return read_script(name, switch or [], leave_out or [])
-    if switch or leave_out:
-        fail("--switch and --leave-out are for .dss and .glm files; a folder's tables can be edited")
-    return Feeder.read(name, load_set or "main")
 
 
 def _describe(feeder: Feeder) -> None:

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from gridpeers.cli.usage import argument, fail, option
+from gridpeers.cli.usage import LeaveOut, Switches, argument, fail, option
 from gridpeers.output_folders import shown, whole_folder
 from gridpeers.rooms import ROOMS
 from gridpeers.wire.driver.command_line import command_line
@@ -24,12 +24,8 @@ def init(
     feeder: Annotated[
         Path | None, option("FILE", "Island this feeder, a .dss or .glm file: a scenario is proposed.", "--feeder")
     ] = None,
-    switch: Annotated[
-        list[str] | None, option("LINE", "With --feeder: a line to make a switch; repeat it.", "--switch")
-    ] = None,
-    leave_out: Annotated[
-        list[str] | None, option("ELEMENT", "With --feeder: do without Class.name; repeat it.", "--leave-out")
-    ] = None,
+    switch: Switches = None,
+    leave_out: LeaveOut = None,
 ) -> None:
     """Make a project of your own, or an islanding of your feeder.
 

@@ -8,8 +8,7 @@ from typing import Annotated
 
 import typer
 
-from gridpeers.cli.suggestions import Commands
-from gridpeers.cli.usage import argument, fail, flag, option, require
+from gridpeers.cli.usage import Commands, argument, fail, flag, option, require
 from gridpeers.wire.keys import Role
 from gridpeers.wire.trust import site_authority
 from gridpeers.wire.trust.credentials import DATE_AND_TIME

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from gridpeers.cli.commands.options import LiveRun, of_live_run
-from gridpeers.cli.suggestions import Commands
-from gridpeers.cli.usage import BROKEN, argument, fail, flag, option
+from gridpeers.cli.usage import BROKEN, Commands, argument, fail, flag, option
 from gridpeers.scenarios.live.run_address import UsageError
-
-if TYPE_CHECKING:
-    pass
 
 link = typer.Typer(
     cls=Commands,

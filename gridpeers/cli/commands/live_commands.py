@@ -5,7 +5,7 @@ People wait for them: what only one of them needs is imported when it is called.
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -115,7 +115,7 @@ def stop(
 
 @of_live_run
 def event(
-    action: Annotated[str, argument("open|close", "What to do with the switch.")],
+    action: Annotated[Literal["open", "close"], argument("open|close", "What to do with the switch.")],
     switch: Annotated[str, argument("SWITCH", 'Its name, e.g. "13-152" or "sw1_2".')],
     live: LiveRun,
     synchronised: Annotated[
@@ -126,12 +126,10 @@ def event(
 
     Example:  gridpeers event close 13-152 --synchronised
     """
-    if action not in ("open", "close"):
-        fail(f'"{action}" cannot be done to a switch; write open or close')
     if synchronised and action == "open":
         fail("--synchronised: only closing can wait for synchronism; leave it out to open a switch")
     with live.client(acts=True) as client:
-        typer.echo(ask(client, "synchronise" if synchronised else "open" if action == "open" else "close", switch))
+        typer.echo(ask(client, "synchronise" if synchronised else action, switch))
 
 
 @of_live_run

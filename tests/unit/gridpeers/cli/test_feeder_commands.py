@@ -177,9 +177,9 @@ def test_a_model_for_gridlabd_goes_the_same_ways(elsewhere: Path) -> None:
     (("import", "bad.txt"), "a feeder is a .dss file (OpenDSS) or a .glm file (GridLAB-D)"),
     (("check", "nothere"), "no such feeder and no such folder"),
     (("solve", "microgrid123", "--open", "sw9"), 'switch "sw9": no such switch'),
-    (("solve", "microgrid123", "--switch", "Line.l1"), "--switch and --leave-out are for .dss and .glm files"),
+    (("solve", "microgrid123", "--switch", "Line.l1"), "switches, leave_out and f_nom are for .dss and .glm files"),
     (("solve", "microgrid123", "--load-set", "evnt2"), 'load set "evnt2": no such set; there are event2, main'),
-    (("solve", "bad.dss", "--load-set", "main"), "--load-set is for a folder of tables"),
+    (("solve", "bad.dss", "--load-set", "main"), "load_set is for a folder of tables"),
     (("import", "bad.dss"), "3 problems"),
 ])  # fmt: skip
 def test_a_feeder_that_cannot_be_used_is_told_in_lines(elsewhere: Path, words: tuple[str, ...], text: str) -> None:

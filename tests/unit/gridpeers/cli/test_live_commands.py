@@ -35,7 +35,7 @@ pytestmark = pytest.mark.usefixtures("elsewhere")
         (["agent"], "missing argument 'INVERTER'"),
         (["agent", "inv 2"], 'INVERTER: "inv 2" cannot be part of a Zenoh key'),
         (["agent", "inv2", "--wait", "-3"], "--wait: must be a time of at least 0 s, got -3 s"),
-        (["event", "toggle", "sw1_2"], '"toggle" cannot be done to a switch; write open or close'),
+        (["event", "toggle", "sw1_2"], "'toggle' is not one of 'open', 'close'"),
         (["load", "48"], "nothing is to be set; give --factor, or one or both of --P (kW) and --Q (kvar)"),
         (["load", "48", "--factor", "2", "--P", "9"], "--factor: goes with neither --P nor --Q"),
         (

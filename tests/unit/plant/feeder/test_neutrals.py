@@ -68,7 +68,7 @@ def imported(folder: Path, street: str) -> tuple[gp.Feeder, str]:
     """The feeder of a script, and the script."""
     script = SOURCE + street + "Set VoltageBases=[15 0.4]\nCalcVoltageBases\nSolve\n"
     (folder / "Master.dss").write_text(script)
-    return gp.Feeder.from_opendss(folder / "Master.dss", switches=["Line.a1"]), script
+    return gp.Feeder.read(folder / "Master.dss", switches=["Line.a1"]), script
 
 
 def engine(script: str, *commands: str) -> dict[str, complex]:
@@ -276,7 +276,7 @@ Solve
 def test_legs_of_a_split_phase_service_return_to_their_neutral(tmp_path: Path) -> None:
     """A roof on each leg of a centre-tapped service, whose neutral is node 3, has the engine's voltages."""
     (tmp_path / "Master.dss").write_text(CENTRE_TAPPED)
-    feeder = gp.Feeder.from_opendss(tmp_path / "Master.dss")
+    feeder = gp.Feeder.read(tmp_path / "Master.dss")
     for leg in "AB":
         feeder = feeder.add_inverter(f"roof{leg}", "d", "GFL", 5e3, phases=leg, params={"P_min_pu": 0.0})
     network, dynamics = started(feeder, frozenset(), 0.6)
