@@ -24,7 +24,7 @@ _OWN = (
     ("chaos", "", "Disturb a scenario at random; judge and shrink what fails."),
     ("predict", "", "Predict from theory how a scenario will go."),
     ("compare", "show:compare", "Compare two runs: scenarios, metrics, and one figure of both."),
-    ("export", "export_command:export", "Write a run's tables as CSV, Parquet, MATLAB or Excel files."),
+    ("export", "show:export", "Write a run's tables as CSV, Parquet, MATLAB or Excel files."),
     ("replay", "", "Replay a recorded run, or show what would have been."),
     ("init", "init:init", "Make a project of your own, or an islanding of your feeder."),
     (

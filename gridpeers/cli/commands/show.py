@@ -1,4 +1,4 @@
-"""Commands that show what there is: `list`, `check`, `doc`, `compare`; each imports what it needs on use."""
+"""Commands that show what there is: `list`, `check`, `doc`, `compare`, `export`; each imports what it needs on use."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Annotated, Literal, get_args
 
 import typer
 
-from gridpeers.cli.usage import argument, fail, load, option
+from gridpeers.cli.usage import argument, fail, load, option, require
 from gridpeers.wire.wording import counted, printable
 
 Topic = Literal[
@@ -111,3 +111,41 @@ def _names(first: Path, second: Path) -> tuple[str, str]:
         if a != b:
             return printable(a), printable(b)
     return "first", "second"
+
+
+def export(
+    run: Annotated[Path, argument("RUN", "Folder of a run or of a case, e.g. runs/islanding/latest.")],
+    to: Annotated[
+        Literal["csv", "parquet", "feather", "mat", "xlsx"], typer.Option(help="Format: text, Arrow, MATLAB or Excel.")
+    ] = "csv",
+    case: Annotated[str, option("NAME", "Case of the run; all when left out.")] = "",
+    out: Annotated[Path | None, option("DIR", "Folder for the files; that of each record when left out.")] = None,
+) -> None:
+    """Write a run's tables as CSV, Parquet, MATLAB or Excel files.
+
+    Rows, events and fates of messages come of the record run.mcap, also where the run was killed or still goes on: then
+    they end with it, and a note says so. csv, parquet and feather have a file for each table, mat and xlsx one for all.
+    Files of the same name are replaced.
+
+    Exit code: 0 they were written, 2 bad usage, no record, no rows, or a folder that cannot be written.
+
+    Example:  gridpeers export runs/islanding/latest --to parquet
+    """
+    from gridpeers.output_folders import files_written, shown
+    from gridpeers.runs.export import PACKAGES
+    from gridpeers.runs.export import export as export_record
+    from gridpeers.scenarios.record.record_file import records_in
+    from gridpeers.scenarios.record.record_reader import RunRecord
+
+    if to in PACKAGES:
+        require({PACKAGES[to]: f"--to {to}"}, "install it: pip install 'gridpeers[export]'")
+    files = records_in(run, case)
+    with files_written(out or run):
+        for file in files:
+            record = RunRecord.open(file)
+            folder = file.parent if out is None else out / file.parent.name if len(files) > 1 else out
+            folder.mkdir(parents=True, exist_ok=True)
+            for written in export_record(record, to, folder):
+                typer.echo(shown(written))
+            for damage in record.damage:
+                typer.echo(f"NOTE  {shown(file)}: {damage}")
