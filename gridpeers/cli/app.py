@@ -44,12 +44,10 @@ def _main() -> None:
     _start_ahead(sys.argv[1:])
     with speaking("gridpeers"):
         from gridpeers.cli.root import app
-        from gridpeers.cli.usage import BROKEN, INTERRUPTED, fail
+        from gridpeers.cli.usage import BROKEN, fail
 
         try:
             app()
-        except KeyboardInterrupt:
-            fail("interrupted; everything that was started has ended", code=INTERRUPTED)
         except OSError as error:  # the machine refuses something: no memory for a process, no room on a disk
             fail(too_few_files(error) or str(error), code=BROKEN)
 

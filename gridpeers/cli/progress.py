@@ -46,27 +46,20 @@ def explained(explain: Callable[[], None]) -> Iterator[Callable[[], None]]:
 @contextmanager
 def progress(console: Console, cases: tuple[str, ...], explanation: str = COMPILING) -> Iterator[TellCase]:
     """Yield the function that takes the progress of each case; an `explanation` comes if t = 0 lasts long."""
-    columns = (
-        TextColumn("case {task.fields[case]:4}", markup=False),
-        BarColumn(bar_width=40),
-        TextColumn("{task.completed:4.1f} of {task.total:g} s simulated"),
-        TimeElapsedColumn(),
-    )
-    bars = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
-    tasks = {case: bars.add_task(case, case=case, total=1.0, start=False, visible=False) for case in cases}
     began: dict[str, float] = {}
-    done: set[str] = set()
-    with explained(lambda: console.print(explanation, soft_wrap=True)) as begun, bars:
+    left = set(cases)
+    with explained(lambda: console.print(explanation, soft_wrap=True)) as begun, _bars(console) as bars:
+        bar = bars.add_task("", start=False, visible=False)
 
         def tell(case: str, t: float, end: float) -> None:
             if t > 0.0:  # the plant's first step is compiled last
                 begun()
             if case not in began:
                 began[case] = monotonic()
-                bars.start_task(tasks[case])
-            bars.update(tasks[case], completed=t, total=end, visible=True)
-            if t >= end and case not in done and not console.is_terminal:
-                done.add(case)
+                bars.reset(bar, total=end, description=f"case {case}", visible=True)
+            bars.update(bar, completed=t)
+            if t >= end and case in left:
+                left.remove(case)
                 console.print(f"case {case}: {end:g} s simulated in {monotonic() - began[case]:.1f} s")
 
         yield tell
@@ -76,11 +69,26 @@ def progress(console: Console, cases: tuple[str, ...], explanation: str = COMPIL
 def remaining(console: Console, total: float) -> Iterator[TellPart]:
     """Yield the function that takes the progress of a total in any unit: runs, seconds simulated.
 
-    Its first call gives the amount that was done before; the time left counts from it.
+    Its first call gives the amount that was done before; the time left counts from it. Where the output is no terminal,
+    there is a line for each piece of work that begins, and for each tenth of all.
     """
-    if not console.is_terminal:
-        yield _part_lines(console, total)
-        return
+    shown: set[tuple[str, int]] = set()
+    with _bars(console) as bars:
+        bar = bars.add_task("starting", total=total, start=False)
+
+        def tell(what: str, done: float) -> None:
+            if not bars.tasks[0].started:
+                bars.reset(bar, total=total, completed=round(done))
+            bars.update(bar, description=what, completed=done)
+            now = what.partition(",")[0], int(10.0 * done / total)
+            if not console.is_terminal and now not in shown:
+                shown.add(now)
+                console.print(f"{what}: {100.0 * done / total:.0f} % done", soft_wrap=True)
+
+        yield tell
+
+
+def _bars(console: Console) -> Progress:
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(bar_width=30),
@@ -90,24 +98,5 @@ def remaining(console: Console, total: float) -> Iterator[TellPart]:
         TextColumn("after"),
         TimeElapsedColumn(),
     )
-    with Progress(*columns, console=console, transient=True, speed_estimate_period=MEMORY) as bars:
-        task = bars.add_task("starting", total=total, start=False)
-
-        def tell(what: str, done: float) -> None:
-            if not bars.tasks[0].started:
-                bars.reset(task, completed=round(done))
-            bars.update(task, description=what, completed=done)
-
-        yield tell
-
-
-def _part_lines(console: Console, total: float) -> TellPart:
-    """Print a line for each piece of work that begins, and for each tenth of all."""
-    shown: set[tuple[str, int]] = set()
-
-    def tell(what: str, done: float) -> None:
-        if (now := (what.partition(",")[0], int(10.0 * done / total))) not in shown:
-            shown.add(now)
-            console.print(f"{what}: {100.0 * done / total:.0f} % done", soft_wrap=True)
-
-    return tell
+    hidden = not console.is_terminal
+    return Progress(*columns, console=console, transient=True, disable=hidden, speed_estimate_period=MEMORY)

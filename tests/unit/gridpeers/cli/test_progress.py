@@ -9,7 +9,7 @@ from gridpeers.cli import progress
 from gridpeers.scenarios.console import terminal
 
 
-def test_elsewhere_than_on_a_terminal_a_finished_case_is_a_line() -> None:
+def test_a_finished_case_is_a_line() -> None:
     """A log has one line per case and no control characters."""
     out = io.StringIO()
 
@@ -24,7 +24,7 @@ def test_elsewhere_than_on_a_terminal_a_finished_case_is_a_line() -> None:
 
 
 def test_on_a_terminal_bars_come_and_go() -> None:
-    """The bars of a run and of many runs show what is done, and leave nothing behind."""
+    """The bars of a run and of many runs show what is done, and go with it."""
     out = io.StringIO()
     console = terminal(file=out, force_terminal=True, width=120)
 
