@@ -7,7 +7,6 @@ import shutil
 import sys
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -300,13 +299,8 @@ def shown_in_notebooks() -> None:
     shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
     if shell is None:
         return
+    from IPython.core.pylabtools import select_figure_formats
     from matplotlib.figure import Figure
 
-    def png(figure: Figure) -> bytes:
-        file = BytesIO()
-        figure.savefig(file, format="png")
-        return file.getvalue()
-
-    formatter = shell.display_formatter.formatters["image/png"]
-    if formatter.for_type(Figure) is None:  # whoever has chosen another format keeps it
-        formatter.for_type(Figure, png)
+    if shell.display_formatter.formatters["image/png"].for_type(Figure) is None:  # nobody has chosen a format
+        select_figure_formats(shell, {"png"})  # type: ignore[no-untyped-call]
