@@ -9,6 +9,7 @@ from gridpeers.agents.laws.law import SetPoints as SetPoints
 from gridpeers.agents.laws.law import Term as Term
 from gridpeers.agents.laws.law import Terms as Terms
 from gridpeers.feeder import Feeder as Feeder
+from gridpeers.lab.predict import theory_parts
 from gridpeers.lab.predict.prediction import Prediction as Prediction
 from gridpeers.lab.predict.prediction import predict as predict
 from gridpeers.lab.replay.counterfactual import Counterfactual as Counterfactual
@@ -65,4 +66,5 @@ metric = METRICS.register
 figures = style
 random_graphs = axes
 sweep_files = sweep_reading
+theory = theory_parts
 __version__: str

@@ -12,15 +12,14 @@ import pandas as pd
 
 from gridpeers import measures, theory
 from gridpeers.measures import STEADY, Floats, History, Settling, Window, nameplates_of
-from gridpeers.theory import InverterGroup, LoadStep, ScenarioModel, Tables, Times, VarResponse, inverter_group_of
 
 
 @dataclass(frozen=True, kw_only=True)
 class CaseData:
     """A scenario that was run, with the history of each case."""
 
-    scenario: ScenarioModel
-    feeder: Tables
+    scenario: theory.ScenarioModel
+    feeder: theory.Tables
     histories: Mapping[str, History]
 
     def t(self, case: str) -> Floats:
@@ -45,18 +44,18 @@ class CaseData:
         t = self.t(case)
         return float(x[(t >= end - STEADY - 1e-9) & (t < end - 1e-9)].mean())
 
-    def inverters(self, case: str) -> InverterGroup:
+    def inverters(self, case: str) -> theory.InverterGroup:
         """Return the inverters under the rule of a case."""
-        return inverter_group_of(self.scenario, self.feeder, case)
+        return theory.inverter_group_of(self.scenario, self.feeder, case)
 
     @cached_property
-    def loads(self) -> dict[str, LoadStep]:
+    def loads(self) -> dict[str, theory.LoadStep]:
         """The step of load of each event, from the plant on droop alone."""
         steps = theory.load_steps(theory.without_faults(self.scenario), self.feeder)
         return {step.label: step.load for step in steps if step.load is not None}
 
 
-def without(inverters: InverterGroup, links: Iterable[tuple[str, str]]) -> InverterGroup:
+def without(inverters: theory.InverterGroup, links: Iterable[tuple[str, str]]) -> theory.InverterGroup:
     """Return the inverters as if these links (src, dst) were not there."""
     A = np.array(inverters.A)
     for src, dst in links:
@@ -68,7 +67,7 @@ INDEXES = {"t_f_s": ("f", "Frequency within 0.01 Hz"), "t_share_s": ("sharing", 
 """The two times of an event that most experiments are about: index, word in a table, title of a panel."""
 
 
-def times_of(predicted: Times) -> dict[str, float]:
+def times_of(predicted: theory.Times) -> dict[str, float]:
     """Return the times to restore and to share (s) by their index; infinite for never."""
     times = zip(INDEXES, (predicted.restore_s, predicted.share_s), strict=True)
     return {index: np.inf if t is None else t for index, t in times}
@@ -86,7 +85,7 @@ class SweepData:
 
     rows: pd.DataFrame
     """All runs, in the order of the sweep."""
-    base: ScenarioModel
+    base: theory.ScenarioModel
     """The scenario that was varied."""
     window: str
     """Label of the event that is measured."""
@@ -129,30 +128,30 @@ class SweepData:
         return {style: self.base.cases[case].title for style, case in enumerate(cases)}
 
     @cached_property
-    def feeder(self) -> Tables:
+    def feeder(self) -> theory.Tables:
         return theory.feeder_of(self.base)
 
     @cached_property
-    def calm(self) -> ScenarioModel:
+    def calm(self) -> theory.ScenarioModel:
         """The scenario with links that do nothing, its first event alone, and an end before long."""
         return theory.first_window(self.base, 3.0)
 
     @cached_property
-    def load(self) -> LoadStep:
+    def load(self) -> theory.LoadStep:
         """The step of load of the event, from the plant on droop alone."""
         (step,) = (step for step in theory.load_steps(self.calm, self.feeder) if step.label == self.window)
         assert step.load is not None
         return step.load
 
     @cached_property
-    def response(self) -> VarResponse:
+    def response(self) -> theory.VarResponse:
         """How voltages and vars respond to V_set."""
         return theory.var_response(self.calm, self.feeder)
 
     @cached_property
-    def inverters(self) -> Mapping[str, InverterGroup]:
+    def inverters(self) -> Mapping[str, theory.InverterGroup]:
         """The inverters under the rule of each case."""
-        return {case: inverter_group_of(self.base, self.feeder, case) for case in self.base.cases}
+        return {case: theory.inverter_group_of(self.base, self.feeder, case) for case in self.base.cases}
 
     @cached_property
     def _predicted(self) -> dict[tuple[str, float, float], dict[str, float]]:

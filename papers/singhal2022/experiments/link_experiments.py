@@ -22,7 +22,6 @@ from gridpeers.papers.singhal2022.experiments.experiment_output import (
     PlotPanel,
     time_panels,
 )
-from gridpeers.theory import var_growth
 
 DELAY, LOSS, K_Q, ON = "link[0].delay", "link[0].loss", "gains.k_q", "link[0].on"
 WHOLE, ALONE = 0.25, 1e5
@@ -165,7 +164,7 @@ def _limit(sweep: SweepData, case: str, index: str, *, of_plant: bool) -> float:
         return theory.var_delay_limit(inverters, sweep.response)
     T_c = sweep.base.time.T_c_s
     for n in range(1, round(max(sweep.values(DELAY)) / T_c) + 1):
-        if var_growth(inverters, sweep.response, link_delay_s=n * T_c) > 0.0:
+        if theory.var_growth(inverters, sweep.response, link_delay_s=n * T_c) > 0.0:
             return round((n - 1) * T_c, 9)
     return np.inf
 

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from gridpeers import theory
 from gridpeers.measures import Floats
 from gridpeers.papers.singhal2022.experiments.experiment_data import INDEXES, CaseData, times_of, without
 from gridpeers.papers.singhal2022.experiments.experiment_output import Curve, ExperimentResult, PlotPage, PlotPanel
-from gridpeers.theory import Case, Loop, Ticks, predicted_times, sharing_index
 
 COLUMNS = (
     ("halves", ("halves", "halves-expire")),
@@ -31,13 +31,13 @@ def partition(runs: CaseData) -> ExperimentResult:
     event, last, f_nom = runs.scenario.events[-1], runs.scenario.time.end_s, runs.feeder.f_nom
     start, end = split.from_s, split.to_s or last
     split_cases = [case for case, rule in runs.scenario.cases.items() if rule.netem.partitions]
-    theory = {case: predicted(runs, case, end - event.t_s) for case in split_cases}
+    of_theory = {case: predicted(runs, case, end - event.t_s) for case in split_cases}
     panels = []
     for row, (title, measure, y_label, y_range) in enumerate(_measures(runs, "f", "MPSI", (59.97, 60.25))):
         for name, cases in COLUMNS:
             curves = [Curve(runs.t("whole"), measure("whole"), WHOLE, "reference")]
             for style, case in zip((HELD, EXPIRED), cases, strict=False):
-                t, of = theory[case]
+                t, of = of_theory[case]
                 curves.append(Curve(runs.t(case), measure(case), style, "solid"))
                 curves.append(Curve(t + event.t_s, of[row], style, "predicted"))
             panel = PlotPanel(
@@ -65,8 +65,8 @@ def partition(runs: CaseData) -> ExperimentResult:
         f_off, MPSI = 1e3 * (runs.f(case) - f_nom), runs.MPSI(case)
         f_apart: float | str = ""
         MPSI_apart: float | str = ""
-        if case in theory:
-            _, (of_f, of_MPSI) = theory[case]
+        if case in of_theory:
+            _, (of_f, of_MPSI) = of_theory[case]
             f_apart, MPSI_apart = round(1e3 * (float(of_f[-1]) - f_nom), 1), round(float(of_MPSI[-1]), 3)
         cells = {
             "case": rule.title,
@@ -99,11 +99,11 @@ def predicted(runs: CaseData, case: str, length: float) -> tuple[Floats, tuple[F
     names = [name for name in inverters.names if name in group]
     cut = {(a, b) for a in names for b in names if group[a] != group[b]}
     expires = runs.scenario.cases[case].degraded_communication.max_age > 0.0
-    ticks = Ticks() if expires else Ticks(loss=dict.fromkeys(cut, LOST))
-    loop = Loop(inverters=without(inverters, cut) if expires else inverters, ticks=ticks)
+    ticks = theory.Ticks() if expires else theory.Ticks(loss=dict.fromkeys(cut, LOST))
+    loop = theory.Loop(inverters=without(inverters, cut) if expires else inverters, ticks=ticks)
     nominal = load.load_pu * float(inverters.weight @ inverters.m_p)
     path = loop.run(round(length / inverters.T_c), load.start_pu * inverters.m_p, nominal, islanding=load.islanding)
-    return path.t, (runs.feeder.f_nom * (1.0 + path.e), sharing_index(path, inverters))
+    return path.t, (runs.feeder.f_nom * (1.0 + path.e), theory.sharing_index(path, inverters))
 
 
 def flapping(runs: CaseData) -> ExperimentResult:
@@ -140,7 +140,7 @@ def flapping(runs: CaseData) -> ExperimentResult:
     return ExperimentResult(page, rows)
 
 
-def extra_age(rule: Case) -> float:
+def extra_age(rule: theory.Case) -> float:
     """Return the mean age (s) that flapping adds to held states: d^2 / (2 (u + d)); while down, ages rise to d."""
     flaps = [entry.flap for entry in rule.netem.links if entry.flap is not None]
     return sum(flap.down_s**2 / (2.0 * (flap.up_s + flap.down_s)) for flap in flaps)
@@ -151,5 +151,5 @@ def _flapping_predicted(runs: CaseData, case: str, label: str) -> dict[str, floa
     rule, inverters = runs.scenario.cases[case], runs.inverters(case)
     late = dict.fromkeys((("inv4", "inv5"), ("inv5", "inv4")), inverters.T_c + extra_age(rule))
     if any(entry.cut for entry in rule.netem.links):
-        return times_of(predicted_times(without(inverters, late), load=runs.loads[label]))
-    return times_of(predicted_times(inverters, link_delay_s=late, load=runs.loads[label]))
+        return times_of(theory.predicted_times(without(inverters, late), load=runs.loads[label]))
+    return times_of(theory.predicted_times(inverters, link_delay_s=late, load=runs.loads[label]))

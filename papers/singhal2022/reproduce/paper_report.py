@@ -14,14 +14,13 @@ from typing import Any, NamedTuple
 import msgspec
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from gridpeers import Verdict
+from gridpeers import Verdict, theory
 from gridpeers.measures import HEADINGS
 from gridpeers.output_folders import set_status, versions, write_whole
 from gridpeers.papers.singhal2022.communication_claims import graph_runs
 from gridpeers.papers.singhal2022.paper_benchmarks import ComparedNumber, headline, numbers
 from gridpeers.papers.singhal2022.reproduce.work import SETTINGS, PartResult, Work
 from gridpeers.papers.singhal2022.tables import MQSI_FACTOR, V_RELATIVE, Cell, PaperTable
-from gridpeers.theory import ScenarioModel
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +64,7 @@ class Reproduction:
         return f"{wall:.0f} s, {cpu:.0f} s of processor time"
 
 
-def settings(scenarios: Mapping[str, ScenarioModel]) -> list[tuple[str, str, str]]:
+def settings(scenarios: Mapping[str, theory.ScenarioModel]) -> list[tuple[str, str, str]]:
     """Return each setting, its value with the unit, and its reason, for the scenarios of a report by their part."""
     first, reduced = next(iter(scenarios.values())), scenarios.get("reduced-communication")
     sets: dict[str, list[str]] = {}

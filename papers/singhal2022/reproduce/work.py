@@ -12,13 +12,12 @@ from typing import Any, Literal
 import msgspec
 
 import gridpeers as gp
-from gridpeers import Findings, Verdict, judge
+from gridpeers import Findings, Verdict, judge, theory
 from gridpeers.cli.progress import TellPart
 from gridpeers.papers.singhal2022.figures import topologies
 from gridpeers.papers.singhal2022.paper_benchmarks import CLAIMS
 from gridpeers.papers.singhal2022.reproduce.studies import END_S, Tell, graphs, topology_study
 from gridpeers.papers.singhal2022.tables import PaperTable, tables_of
-from gridpeers.theory import ScenarioModel
 
 
 class Picture(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -131,7 +130,7 @@ class Work:
         """Seed of the first part; all scenarios of the catalogue have the same."""
         return next(iter(self._loaded.values())).spec.seed
 
-    def specs(self) -> dict[str, ScenarioModel]:
+    def specs(self) -> dict[str, theory.ScenarioModel]:
         """Return the keys of the scenario of each part."""
         return {part: scenario.spec for part, scenario in self._loaded.items()}
 
