@@ -21,7 +21,6 @@ from gridpeers.wire.wording import first_of
 
 BEYOND = 100.0  # voltage (pu) that only a singular matrix gives
 MATCH = 1e-6  # largest difference (pu of nominal voltage) of voltages that count as equal
-TOLERANCE = 1e-11  # largest change of any voltage (pu) in the last iteration of our power flow
 SHOWN_NAMES, SHOWN_BUSES = 5, 8
 """A sentence names at most so many loads, or buses of a section; a note on renamed buses names at most so many."""
 
@@ -312,12 +311,12 @@ def _named(feeder: Tables, section: Collection[Node], node_name: Callable[[str],
 def difference(feeder: Tables, theirs: Mapping[Node, complex]) -> tuple[float, Node]:
     """Return the largest difference (pu) between our voltages and another program's, `theirs` (V), and its node.
 
-    ArithmeticError if our power flow does not converge.
+    ArithmeticError if our power flow has no solution.
     """
     from gridpeers.plant.network import Network, solve_power_flow
 
     network = Network(feeder)
-    V = solve_power_flow(network, network.closed0, tolerance=TOLERANCE).V
+    V = solve_power_flow(network, network.closed0)
     at = [k for k, node in enumerate(network.nodes) if node in theirs]
     given = np.array([theirs[network.nodes[k]] for k in at])
     # where the given voltage is far above the nominal one, the nominal one is not what the script means

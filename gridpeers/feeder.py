@@ -148,7 +148,7 @@ class Feeder(Tables, frozen=True, kw_only=True):
 
         network = Network(self)
         closed = network.closed0 - {network.switch_name(name) for name in _listed(open_switches)}
-        V = solve_power_flow(network, closed).V
+        V = solve_power_flow(network, closed)
         of = [network.neutrals.get(bus, "") for bus, _ in network.nodes]
         to = [n if p in PHASES and p != n else "" for n, (_, p) in zip(of, network.nodes, strict=True)]
         back = np.array([network.index(bus, n) if n else -1 for n, (bus, _) in zip(to, network.nodes, strict=True)])

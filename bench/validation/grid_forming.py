@@ -172,7 +172,7 @@ class GridFormingIsland:
     def snapshot(self) -> NDArray[np.complex128]:
         """Return our phasors (V) behind a source of 1 pu."""
         network = Network(behind_source(self._feeder))
-        V = solve_power_flow(network, network.closed0 - {ISLANDING}, tolerance=1e-12).V
+        V = solve_power_flow(network, network.closed0 - {ISLANDING})
         kept = [i for i, (bus, _) in enumerate(network.nodes) if bus != EMF]
         ours: NDArray[np.complex128] = V[kept][self.nodes]
         return ours

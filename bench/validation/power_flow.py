@@ -104,7 +104,7 @@ class SwitchStates:
             network = self._network
         else:
             network = Network(replace(self._feeder, source=Source(bus=bus, V_pu=1.0, angle=0.0)))
-        return solve_power_flow(network, closed, tolerance=1e-12).V
+        return solve_power_flow(network, closed)
 
 
 LIMIT = 1e-6
@@ -170,7 +170,7 @@ def _node_names(network: Network) -> list[str]:
 def _our_voltages(feeder: Tables) -> tuple[dict[str, complex], dict[str, float]]:
     """Return voltage and nominal voltage (V) of each node, named as OpenDSS names them."""
     network = Network(feeder)
-    V = solve_power_flow(network, network.closed0, tolerance=1e-12).V
+    V = solve_power_flow(network, network.closed0)
     names = _node_names(network)
     return dict(zip(names, V.tolist(), strict=True)), dict(zip(names, network.V_nom.tolist(), strict=True))
 

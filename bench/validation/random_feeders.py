@@ -23,7 +23,7 @@ from gridpeers.plant.equipment import Tables
 from gridpeers.plant.equipment.named_loads import with_powers
 from gridpeers.plant.feeder.circuits import circuit_of
 from gridpeers.plant.feeder.plant import installed_inverters
-from gridpeers.plant.network import Network, solve_power_flow
+from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings
 from gridpeers.plant.tables import FeederError
 
@@ -49,8 +49,6 @@ class FeederStates(NamedTuple):
     """Commands that lead the engine from each state to the next."""
     residual: float
     """Largest current that is left at a node in any state (A)."""
-    start: float
-    """Largest difference of the start from `solve_power_flow` (pu)."""
     asymmetry: float
     """Largest y_ij - y_ji (S)."""
     islanded: int
@@ -93,7 +91,6 @@ class _Run:
         """Run through them."""
         dynamics, network, n = self._dynamics, self._network, len(self._rows)
         dynamics.start(np.full(n, 0.2), V_set=np.full(n, 1.0))
-        start = self._difference_from_power_flow()
         residual, V = kirchhoff_residual(dynamics), [self._voltages()]
         commands = [(*self._created(), *self._held())]
 
@@ -122,7 +119,6 @@ class _Run:
             V_nom=network.V_nom,
             commands=commands,
             residual=residual,
-            start=start,
             asymmetry=float(abs(Y - Y.T).max()),
             islanded=int(np.sum(reduction.online & ~reduction.has_source[reduction.inverter_island])),
         )
@@ -171,25 +167,6 @@ class _Run:
                 commands.append(f"edit Load.{name} enabled=no")
         return commands
 
-    def _difference_from_power_flow(self) -> float:
-        """Return the largest difference (pu) of the first point from the power flow with the inverters' powers."""
-        network, circuit, units = self._network, self._circuit, self._dynamics.inverters
-        own = ~circuit.copies
-        at, S = circuit.terminals[own], (units.V * np.conj(units.I))[own]
-        back = np.repeat(circuit.returns, 3).reshape(own.shape)[own]
-        through = back >= 0
-
-        def fed(V: NDArray[np.complex128]) -> NDArray[np.complex128]:
-            delivered = np.conj(S / (V[at] - np.where(through, V[back], 0.0)))
-            currents = np.zeros(V.size, complex)
-            np.add.at(currents, at, delivered)
-            np.add.at(currents, back[through], -delivered[through])
-            return currents
-
-        V = self._voltages()
-        flow = solve_power_flow(network, network.closed0, injection=fed, tolerance=1e-12, start=V)
-        return float(np.max(np.abs(V - flow.V) / network.V_nom))
-
 
 LIMIT = 1e-6
 """Largest difference of a phasor (pu of nominal voltage), and largest current that is left at a node (A)."""
@@ -221,7 +198,6 @@ def _run(case: str, count: int = ALL) -> CaseResult:
             plain = solve_scripts(engine, [(script, [()]) for script in refused])
             falsely |= {script for script, each in zip(refused, plain, strict=True) if np.isfinite(each.V).all()}
     checks += [
-        ToleranceCheck("start, pu, `solve_power_flow`", max(states.start for states in found), LIMIT),
         ToleranceCheck("current left, A", max(states.residual for states in found), LIMIT),
         ToleranceCheck("refused, but solved by an engine", float(len(falsely)), 0.0),
     ]

@@ -143,7 +143,7 @@ def phase_powers(feeder: Tables, switch: str, head: str) -> NDArray[np.complex12
     loads = tuple(part for part in feeder.load_parts if part.S.real >= 0.0)
     network = Network(replace(feeder, load_parts=loads, inverters=()))
     try:
-        V = solve_power_flow(network, network.closed0).V
+        V = solve_power_flow(network, network.closed0)
     except ArithmeticError:
         return np.empty(0, np.complex128)
     without = network.closed0 - {network.switch_name(switch)}

@@ -29,7 +29,7 @@ class NoPowerFlowError(PlantError):
     """No operating point at the start; `weak`: load branches too large even alone, and short-circuit powers (VA)."""
 
     def __init__(self, weak: dict[int, float]) -> None:
-        super().__init__("no initial operating point: the power flow did not converge")
+        super().__init__("no initial operating point: the power flow has no solution")
         self.weak = weak
 
 

@@ -14,7 +14,6 @@ from scipy.optimize import root
 
 from gridpeers.plant.dynamics.circuit import Circuit, NoPowerFlowError, PlantError
 from gridpeers.plant.dynamics.inverters import Inverters
-from gridpeers.plant.dynamics.island_newton import weak_branches
 from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Integers, Real
 from gridpeers.plant.dynamics.kernel.network_arrays import Reduced
 from gridpeers.plant.dynamics.kernel.solve import NO_NETWORK, settle_powers
@@ -44,7 +43,8 @@ class InverterPowerFlow:
         """Return injections and voltages where every inverter that is not frozen delivers P + jQ (pu)."""
         units, m = self.units, self.V_b.size
         J, V = J.copy(), np.empty(J.shape, complex)
-        tolerance, left, renewed = 1e-12 * float(units.V_b.max()), MOST_ROUNDS, False
+        highest = units.V_b if len(units) else np.abs(self.circuit.V_branch)
+        tolerance, left, renewed = 1e-12 * float(highest.max(initial=0.0)), MOST_ROUNDS, False
         total, before = MOST_ROUNDS, 1.0
         while left > 0:
             most = left if self._near else min(left, NEAR)
@@ -67,7 +67,7 @@ class InverterPowerFlow:
                 # a tangent does not lead across a limit of the loads' law; Newton's method does
                 self.V_b, failed = self.reduction.solve_islands(J, self.circuit.source_voltage, self.V_b)
                 if failed or renewed:
-                    raise self._no_power_flow()
+                    raise NoPowerFlowError(self.reduction.weak_branches())
                 self.net, renewed = self._linearise(), True
                 continue
             left, renewed = left - rounds, False
@@ -82,16 +82,6 @@ class InverterPowerFlow:
             f"no initial operating point: injections still change by {change:.1e} pu after {total} iterations; "
             "the inverters may have to deliver more than the network can carry; try another P_set0 or V_set0"
         )
-
-    def _no_power_flow(self) -> NoPowerFlowError:
-        reduction, at = self.reduction, self.reduction.unknown
-        weak = weak_branches(
-            reduction.Y[at][:, at].tocsc(),
-            reduction.C.tocsr()[at].tocsc(),
-            reduction.loads,
-            np.abs(self.circuit.V_branch[reduction.branches]),
-        )
-        return NoPowerFlowError({int(reduction.branches[k]): S for k, S in weak.items()})
 
 
 DROOP, INSIDE, UNDER, OVER = range(4)

@@ -19,7 +19,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import SuperLU, splu
 
 from gridpeers.plant.dynamics.circuit import Circuit
-from gridpeers.plant.dynamics.island_newton import Island, solve_island
+from gridpeers.plant.dynamics.island_newton import Island, solve_island, weak_branches
 from gridpeers.plant.dynamics.kept_network import kept_network
 from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Integers, Real
 from gridpeers.plant.dynamics.kernel.network_arrays import COPY, Reduced, SparseMaps, factorise_blocks
@@ -202,6 +202,13 @@ class Reduction:
             else:
                 V_b[own] += island.C.T @ V
         return V_b, tuple(failed)
+
+    def weak_branches(self) -> dict[int, float]:
+        """Return load branches of constant power too large even alone, and the short-circuit powers there (VA)."""
+        at = self.unknown
+        V_nom = np.abs(self.circuit.V_branch[self.branches])
+        weak = weak_branches(self.Y[at][:, at].tocsc(), self.C.tocsr()[at].tocsc(), self.loads, V_nom)
+        return {int(self.branches[k]): S for k, S in weak.items()}
 
     @cached_property
     def _islands(self) -> list[tuple[int, Integers, Integers, Island]]:

@@ -1,7 +1,7 @@
-"""The three-phase network of a feeder: nodes, switches, admittance matrix, islands, and a plain power flow."""
+"""The three-phase network of a feeder: nodes, switches, admittance matrix, islands, and its power flow."""
 
 from gridpeers.plant.network.merging import Merge
 from gridpeers.plant.network.network import Network
-from gridpeers.plant.network.powerflow import PowerFlow, solve_power_flow
+from gridpeers.plant.network.powerflow import solve_power_flow
 
-__all__ = ["Merge", "Network", "PowerFlow", "solve_power_flow"]
+__all__ = ["Merge", "Network", "solve_power_flow"]

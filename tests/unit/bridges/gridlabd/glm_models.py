@@ -156,6 +156,6 @@ def largest_difference(path: Path, leave_out: tuple[str, ...] = ()) -> tuple[flo
     """Largest difference between GridLAB-D's voltages and ours (pu), and over how many nodes."""
     theirs = gridlabd_voltages(path)
     network = Network(read_glm(path, leave_out=leave_out))
-    solved = solve_power_flow(network, network.closed0, tolerance=1e-11)
-    ours = {node: (V, V_nom) for node, V, V_nom in zip(network.nodes, solved.V, network.V_nom, strict=True)}
+    solved = solve_power_flow(network, network.closed0)
+    ours = {node: (V, V_nom) for node, V, V_nom in zip(network.nodes, solved, network.V_nom, strict=True)}
     return max(abs(ours[node][0] - V) / ours[node][1] for node, V in theirs.items()), len(theirs)

@@ -54,9 +54,9 @@ def engine_voltages(path: Path) -> dict[str, complex]:
 def our_voltages(path: Path) -> tuple[dict[str, complex], dict[str, float]]:
     """Voltage and nominal voltage (V) of each node after the import, named as the engine names them."""
     network = Network(read_opendss(path))
-    solved = solve_power_flow(network, network.closed0, tolerance=1e-12)
+    solved = solve_power_flow(network, network.closed0)
     names = [f"{bus}.{LETTERS.index(phase) + 1}" for bus, phase in network.nodes]
-    return dict(zip(names, solved.V.tolist(), strict=True)), dict(zip(names, network.V_nom.tolist(), strict=True))
+    return dict(zip(names, solved.tolist(), strict=True)), dict(zip(names, network.V_nom.tolist(), strict=True))
 
 
 def largest_difference(path: Path, engine: dict[str, complex] | None = None) -> float:

@@ -98,12 +98,12 @@ New Line.l bus1=c bus2=d r1=0.02 x1=0.02 r0=0.02 x0=0.05 length=1
 New Load.d bus1=d phases=3 kv=0.48 kw=90 kvar=30
 """
     network = Network(read_opendss(write(tmp_path, LINE, STEP_DOWN, ring), switches=["Line.tie"]))
-    solved = solve_power_flow(network, network.closed0 - {network.switch_name("tie")}, tolerance=1e-12)
+    solved = solve_power_flow(network, network.closed0 - {network.switch_name("tie")})
     theirs = engine_voltages(write(tmp_path, LINE, STEP_DOWN, ring, "Open Line.tie 1"))
 
     for number, letter in enumerate("ABC", start=1):
         i = network.index("d", letter)
-        assert abs(solved.V[i] - theirs[f"d.{number}"]) / network.V_nom[i] < TOLERANCE
+        assert abs(solved[i] - theirs[f"d.{number}"]) / network.V_nom[i] < TOLERANCE
 
 
 def test_a_line_that_is_opened_becomes_a_switch(tmp_path: Path) -> None:
@@ -177,6 +177,6 @@ def test_a_feeder_meets_its_published_solution(name: str, count: int) -> None:
     assert len(rows) == count
     for bus, letter, magnitude, angle in rows:
         i = network.index(bus, letter)
-        V = solved.V[i] / network.V_nom[i]
+        V = solved[i] / network.V_nom[i]
         assert abs(V) == pytest.approx(magnitude, abs=0.0002), f"{bus} {letter}"
         assert abs(degrees(phase(V * np.exp(-1j * radians(angle))))) < 0.04, f"{bus} {letter}"

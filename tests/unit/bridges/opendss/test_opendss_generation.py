@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from msgspec.structs import replace
 
@@ -76,7 +77,7 @@ def test_generation_beyond_its_limits_is_that_of_the_engine(tmp_path: Path, kind
     assert feeder.source
 
     network = Network(replace(feeder, source=replace(feeder.source, V_pu=feeder.source.V_pu * pu / 1.02)))
-    V = solve_power_flow(network, network.closed0, tolerance=1e-12).V
+    V = solve_power_flow(network, network.closed0)
 
     for name, theirs in engine_voltages(path).items():
         bus, _, number = name.rpartition(".")
@@ -102,7 +103,8 @@ def test_generation_disconnects_above_1_2_pu(tmp_path: Path, kind: str) -> None:
 
     network = Network(replace(feeder, source=replace(feeder.source, V_pu=1.25)))
 
-    assert solve_power_flow(network, network.closed0).S_loads == pytest.approx(0.0, abs=1.0)
+    V = solve_power_flow(network, network.closed0)
+    assert network.loads().powers(V).sum() + V @ np.conj(network.Y_loads @ V) == pytest.approx(0.0, abs=1.0)
 
 
 def test_generation_is_told_and_no_load(tmp_path: Path) -> None:

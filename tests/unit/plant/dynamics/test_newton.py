@@ -14,11 +14,9 @@ from gridpeers.plant.dynamics.circuit import LoadLaw
 from gridpeers.plant.dynamics.island_newton import Island, solve_island
 from gridpeers.plant.dynamics.kernel.compiled import Complex
 from gridpeers.plant.dynamics.live_network import unsettled_island
-from gridpeers.plant.dynamics.reduction import Reduction
 from gridpeers.plant.feeder import Plant
-from gridpeers.plant.feeder.circuits import Circuits
 from gridpeers.plant.inverters.gfm_droop import GfmDroop
-from gridpeers.plant.network import Network, solve_power_flow
+from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings, Protection, SwitchEvent
 from gridpeers.plant.tables import read_feeder
 from tests.unit.plant.dynamics.circuits import BALANCED, GFM_D, S_B, V_B, Z_B, circuit, inverter, loaded, lone
@@ -70,26 +68,6 @@ def test_a_load_behind_next_to_no_impedance_has_the_textbook_voltage(B: float) -
 def test_what_is_not_finite_has_no_solution() -> None:
     """Injections that are not numbers give no voltages."""
     assert voltage_of(1e3, complex("nan"), E) is None
-
-
-@pytest.mark.parametrize("scale", [1.0, 1.6])
-def test_the_feeder_has_the_voltages_of_the_plain_power_flow(
-    scale: float,
-) -> None:
-    """From nominal voltages, and from wrong ones, the same as the fixed point of `solve_power_flow`: two methods."""
-    feeder = read_feeder("microgrid123")
-    loads = tuple(replace(load, S=tuple(scale * S for S in load.S)) for load in feeder.loads)
-    network = Network(replace(feeder, loads=loads))
-    want = solve_power_flow(network, network.closed0).V
-    circuit = Circuits(network).of(network.closed0)
-    n = len(network.inverters)
-    state = Reduction(circuit, np.zeros(n, complex), np.zeros(n, bool), np.zeros(n, bool))
-
-    for factor in (1.0, 0.6 + 0.3j):
-        J = np.zeros((n, 3), complex)
-        V_b, failed = state.solve_islands(J, circuit.source_voltage, factor * circuit.V_branch)
-        assert failed == ()
-        np.testing.assert_allclose(V_b, circuit.C.T @ want, rtol=1e-7)
 
 
 ISLANDS = 3

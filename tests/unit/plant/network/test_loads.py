@@ -200,54 +200,28 @@ def two_buses(load: complex) -> Network:
 
 
 def test_power_flow_satisfies_the_equations(network: Network) -> None:
-    """At the solution, currents into every node but the source's sum to zero, and the power balance closes."""
-    solved = solve_power_flow(network, network.closed0)
+    """At the solution the currents into every node but the source's sum to zero."""
+    V = solve_power_flow(network, network.closed0)
     merge = network.merge(network.closed0)
     parts: sp.csc_array = network.Y_branches + network.Y_capacitors + network.Y_loads
-    residual = merge.gather(parts @ solved.V + network.loads().currents(solved.V))
-    source = solved.V[network.source_nodes] @ np.conj(residual[network.source_nodes])
+    residual = merge.gather(parts @ V + network.loads().currents(V))
     residual[network.source_nodes] = 0.0
 
     assert np.abs(residual).max() < 1e-4
-    assert source == pytest.approx(solved.S_source, rel=1e-9)
-    assert solved.S_source == pytest.approx(solved.S_loads + solved.S_losses + solved.S_capacitors, rel=1e-12)
 
 
-def test_dead_buses_have_no_voltage_and_no_load() -> None:
-    """Nodes that the substation does not reach have zero volts and take no power."""
-    network = two_buses(100e3 + 50e3j)
+def test_dead_buses_have_no_voltage() -> None:
+    """Nodes that the substation does not reach have zero volts."""
+    V = solve_power_flow(two_buses(100e3 + 50e3j), frozenset())
 
-    solved = solve_power_flow(network, frozenset())
-
-    np.testing.assert_allclose(np.abs(solved.V), [2448.0] * 6 + [0.0] * 3)
-    assert solved.S_loads == 0
-    assert abs(solved.S_source) < 1e-3
-
-
-def test_injection_and_shunt_are_part_of_the_balance() -> None:
-    """A current fed in at the load relieves the source by its power; a shunt takes its own."""
-    network = two_buses(100e3 + 50e3j)
-    at = [network.index("3", phase) for phase in "ABC"]
-    shunt = np.zeros(9, dtype=np.complex128)
-    shunt[at] = 1e-3 - 2e-3j
-
-    def feed(V: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        current = np.zeros(9, dtype=np.complex128)
-        current[at] = np.conj((100e3 + 50e3j) / V[at]) + shunt[at] * V[at]
-        return current
-
-    solved = solve_power_flow(network, network.closed0, shunt=shunt, injection=feed)
-
-    np.testing.assert_allclose(np.abs(solved.V), 2448.0, rtol=1e-9)
-    assert abs(solved.S_source) < 1.0
-    assert solved.S_loads == pytest.approx(300e3 + 150e3j)
+    np.testing.assert_allclose(np.abs(V), [2448.0] * 6 + [0.0] * 3)
 
 
 def test_unbearable_load_is_told() -> None:
-    """A load beyond what the line can carry ends in an error that names the bus, not in numbers."""
+    """A load beyond what the line can carry ends in an error that names it, not in numbers."""
     network = two_buses(5e6 + 0j)
 
-    with pytest.raises(ArithmeticError, match=r"power flow did not converge: after \d+ iterations bus [23] phase"):
+    with pytest.raises(ArithmeticError, match=r"the power flow has no solution; the network cannot feed .*at bus 3"):
         solve_power_flow(network, network.closed0)
 
 
@@ -286,7 +260,7 @@ def test_a_section_with_next_to_nothing_to_ground_is_solved_as_far_as_rounding_l
         )
     )
 
-    V = solve_power_flow(network, network.closed0).V.reshape(3, 3)
+    V = solve_power_flow(network, network.closed0).reshape(3, 3)
 
     assert np.abs(np.abs(V @ DELTA.T) / 2400.0 / np.sqrt(3.0) - 1.0).max() < 0.05
 

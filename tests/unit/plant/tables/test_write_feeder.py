@@ -30,7 +30,7 @@ def test_own_tables_survive_writing(name: str, tmp_path: Path) -> None:
     for transformer, read in zip(feeder.transformers, again.transformers, strict=True):
         assert read.z == pytest.approx(transformer.z)
     one, other = (Network(each) for each in (feeder, again))
-    V, W = (solve_power_flow(network, network.closed0).V for network in (one, other))
+    V, W = (solve_power_flow(network, network.closed0) for network in (one, other))
     np.testing.assert_allclose(W, V, rtol=1e-11)
 
 
