@@ -7,11 +7,9 @@ and the plant holds their set-points and advances.
 
 from __future__ import annotations
 
-import gc
 from collections import defaultdict, deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
-from itertools import count
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import ExitStack
 from time import perf_counter
 
 import msgspec
@@ -58,11 +56,6 @@ def _run_direct(
             on_other(journal)
     return core.stepper
 
-
-COLLECTED = 20
-"""Runs of this process after which it looks for garbage in all that it has: that takes 20 ms."""
-
-_runs = count(1)
 
 _Node = PlantNode | AgentNode
 
@@ -206,7 +199,6 @@ def run_inprocess(
                 return Outcome(broke=why, reproducible=False, events=(), notes=(), ticks=0, start_s=took, run_s=0.0)
             stack.callback(plant.close)
         stack.callback(close_laws, laws)
-        stack.enter_context(_all_so_far_stays())
         plant_config = msgspec.structs.replace(plant_config, recorders=())
         agents: list[AgentNode] = []
         nodes: tuple[_Node, ...] = ()
@@ -230,24 +222,6 @@ def run_inprocess(
         start_s=started - began,
         run_s=perf_counter() - started,
     )
-
-
-@contextmanager
-def _all_so_far_stays() -> Iterator[None]:
-    """Let garbage collection skip what is there by now: 7 % of the time of 999 agents.
-
-    Every `COLLECTED`th run it looks at all.
-    """
-    if gc.get_freeze_count():  # a process whose memory others share, or a run beside this one
-        yield
-        return
-    gc.freeze()
-    try:
-        yield
-    finally:
-        gc.unfreeze()
-        if next(_runs) % COLLECTED == 0:
-            gc.collect()
 
 
 def _run_on_bus(
