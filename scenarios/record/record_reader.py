@@ -98,7 +98,7 @@ class RunRecord:
             rows += canonical(message.rows)
         if not rows:
             raise RecordFileError(f"{self.path}: it has no rows: it ends before the run began")
-        return History.of(inverters, bytes(rows))
+        return History.of(inverters, rows)
 
     def events(self) -> tuple[PlantEvent, ...]:
         """Return the events of the plant, the roster and the links, in the order of time."""

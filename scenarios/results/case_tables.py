@@ -50,9 +50,9 @@ def write_tables(
 
 def _history_csv(history: History) -> Iterator[str]:
     yield ",".join(header(history.inverters)) + "\n"
-    table = history.table
-    for first in range(0, len(table), _ROWS):
-        yield "".join([_line(row) + "\n" for row in table[first : first + _ROWS].tolist()])
+    for first in range(0, len(history.t), _ROWS):
+        rows = history.rows(slice(first, first + _ROWS)).table.tolist()
+        yield "".join([_line(row) + "\n" for row in rows])
 
 
 def _line(row: list[float]) -> str:

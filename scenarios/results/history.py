@@ -103,7 +103,7 @@ class History:
     def until(self, t: float) -> History:
         return self.rows(self.t <= t + 1e-9)
 
-    def rows(self, which: Flags) -> History:
+    def rows(self, which: Flags | slice) -> History:
         columns = {of.name: getattr(self, of.name)[which] for of in fields(self) if of.name != "inverters"}
         return replace(self, **columns)
 
@@ -128,10 +128,10 @@ class History:
         return sha256(self.table.astype("<f8").tobytes()).hexdigest()
 
     @classmethod
-    def of(cls, inverters: tuple[str, ...], rows: Sequence[Sequence[float]] | Floats | bytes) -> History:
+    def of(cls, inverters: tuple[str, ...], rows: Sequence[Sequence[float]] | Floats | bytes | bytearray) -> History:
         """Return the arrays of rows, or of their canonical bytes; ValueError if one is too short or long."""
         columns = 1 + len(QUANTITIES) * len(inverters)
-        if isinstance(rows, bytes):
+        if isinstance(rows, bytes | bytearray):  # the arrays are views of them: a history is in memory once
             table = np.frombuffer(rows, "<f8").reshape(-1, columns)
         else:
             table = np.asarray(rows, np.float64)

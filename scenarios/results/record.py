@@ -60,7 +60,7 @@ class Recorded:
     def history(self) -> History:
         from gridpeers.scenarios.results.history import History  # numpy, which a run starts without
 
-        return History.of(self.inverters, bytes(self.table)) if self.file is None else self.file.physics()
+        return History.of(self.inverters, self.table) if self.file is None else self.file.physics()
 
     def traces(self) -> Iterator[LinkTrace]:
         """Yield the verdicts of the emulated links, in parts of one link."""

@@ -134,25 +134,27 @@ def test_a_gap_that_is_allowed_is_known_by_its_times(tmp_path: Path) -> None:
     assert (recorded.ended, recorded.history.t.tolist()) == (4.0, [0.0, 0.5, 1.0, 3.5, 4.0])
 
 
-def test_a_recorder_keeps_no_rows(tmp_path: Path) -> None:
-    """A run of hours takes no more memory than a short one; its numbers are read from the file, once it is whole."""
-    numbers = tuple(float(k) for k in range(60))
-
-    def message(first: int) -> Telemetry:
-        rows = tuple((0.01 * k, *numbers) for k in range(first, first + 10))
-        return replace(telemetry(()), t=rows[-1][0], inverters=inverters, rows=rows)
-
-    inverters = tuple(f"inv{i}" for i in range(10))
+def test_a_recorder_keeps_no_rows_and_has_them_once_at_its_end(tmp_path: Path) -> None:
+    """A run of hours takes no more memory than a short one; its rows are read from the file, into one table."""
+    inverters, values = tuple(f"inv{i}" for i in range(10)), tuple(float(k) for k in range(60))
     with Recorder(tmp_path / "I", record=info_of(*inverters)) as recorder:
-        for first in range(0, 1_000, 10):
-            recorder(message(first))
+
+        def record(numbers: range) -> None:
+            for first in numbers[::100]:
+                rows = tuple((0.01 * k, *values) for k in range(first, first + 100))
+                recorder(replace(telemetry(()), t=rows[-1][0], inverters=inverters, rows=rows))
+
+        record(range(1_000))
         tracemalloc.start()
-        for first in range(1_000, 6_000, 10):
-            recorder(message(first))
+        record(range(1_000, 4_000))
         grown, _ = tracemalloc.get_traced_memory()
         tracemalloc.stop()
-        recorded = recorder.finish(0.01 * 5_999, 0.01)
-    history = recorded.history
+        record(range(4_000, 16_000))
+        tracemalloc.start()
+        history = recorder.finish(0.01 * 15_999, 0.01).history
+        _, peak = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
 
+    assert (len(history.t), history.V_set[-1, -1]) == (16_000, 59.0)
     assert grown < 300_000  # a chunk that waits
-    assert (len(history.t), history.V_set[-1, -1]) == (6_000, 59.0)
+    assert peak < 8 * 16_000 * 61 + 10_000_000  # the table, and some chunks with their messages
