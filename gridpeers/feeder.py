@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -11,7 +11,6 @@ from msgspec.structs import replace
 from gridpeers.plant.equipment import NODES, PHASES, InverterRow, Tables
 from gridpeers.plant.equipment.imported_equipment import is_behind
 from gridpeers.plant.equipment.neutrals import neutral_for, neutrals_of
-from gridpeers.plant.inverters.inverter_model import InverterModel
 from gridpeers.rooms import READERS
 from gridpeers.wire.wording import InputError, suggestion
 
@@ -93,17 +92,15 @@ class Feeder(Tables, frozen=True, kw_only=True):
         microgrid: str = "MG1",
         m_p: float = 0.01,
         m_q: float = 0.05,
-        params: str | Mapping[str, Any] | InverterModel | None = None,
+        params: str = "",
     ) -> Feeder:
         """Return the feeder with one inverter more; ValueError says why there can be none.
 
         The bus must have its phases, without another inverter on them. P_rated (W) is of all its phases; m_p and m_q
         are droops (pu frequency per pu power, pu voltage per pu reactive power). The phases return to `neutral`: a node
-        of the bus by its number or letter, or "earth"; by default the neutral to which loads return, else earth. Its
-        own parameters, `params`, replace those of `[plant.gfm]` or `[plant.gfl]` of a scenario: the name of a set that
-        the feeder has, some by their keys there ({"T_p_s": 0.02}), or all.
+        of the bus by its number or letter, or "earth"; by default the neutral to which loads return, else earth.
+        `params` names a published set of parameters, "regfm_a1"; a scenario gives others, in `[plant.inverter.NAME]`.
         """
-        from gridpeers.plant.tables.parameter_sets import as_set
         from gridpeers.plant.tables.shunts import problems_of
 
         bus = str(bus)  # many buses have a number as their name
@@ -120,19 +117,18 @@ class Feeder(Tables, frozen=True, kw_only=True):
             m_p=m_p,
             m_q=m_q,
             phases=str(phases).strip() or "ABC",  # type: ignore[arg-type]  # `problems_of` refuses others
+            parameters=params,
             neutral=NODES[neutral - 1] if isinstance(neutral, int) and 0 < neutral <= len(NODES) else str(neutral),
         )
         if problems := problems_of(row, found, self):
             raise ValueError("; ".join(problems))
-        set_name, sets = as_set(name, kind, params, self.parameter_sets)
         row = replace(
             row,
             **{key: str(getattr(row, key)) for key in ("name", "microgrid")},
             **{key: float(getattr(row, key)) for key in ("P_rated", "m_p", "m_q")},  # of numpy, maybe
             neutral=neutral_for(row.neutral, found, row.phases, neutrals_of(self).get(bus, "")),
-            parameters=set_name,
         )
-        return replace(self, inverters=(*self.inverters, row), parameter_sets=sets)
+        return replace(self, inverters=(*self.inverters, row))
 
     def solve(self, open_switches: Names = ()) -> pd.DataFrame:
         """Return the voltages that the substation alone gives: bus, phase, V (V), V_pu, angle_deg, to.

@@ -9,7 +9,7 @@ import msgspec
 
 from gridpeers.plant.equipment.imported_equipment import LinearElement, LoadPart, is_behind
 from gridpeers.plant.inverters.inverter_model import InverterModel, Kind
-from gridpeers.plant.inverters.inverter_registry import ParameterSet, with_own, with_published
+from gridpeers.plant.inverters.inverter_registry import PUBLISHED_SETS, ParameterSet, with_own
 
 Phase = Literal["A", "B", "C"]
 PHASES: tuple[Phase, ...] = ("A", "B", "C")  # order of the phases in every table and vector
@@ -138,7 +138,7 @@ class InverterRow(msgspec.Struct, frozen=True, kw_only=True):
     phases: Literal["ABC", "A", "B", "C"] = "ABC"  # phases of the bus at which it stands: all three, or one
     neutral: str = ""  # node of the bus to which its phases return, by its letter; empty for earth
     spare: bool = False  # whether it stays off until an agent joins for it
-    parameters: str = ""  # name of its set, of `Tables.parameter_sets` or published; empty for none
+    parameters: str = ""  # name of a published set; empty for none
     own: ParameterSet = {}  # parameters that a scenario gives it
 
     @property
@@ -168,12 +168,10 @@ class Tables(msgspec.Struct, frozen=True, kw_only=True):
     places: dict[str, str] = {}
     """File and line of each element, load and "bus NAME" of such a feeder, where its import knows them."""
     spares: tuple[InverterRow, ...] = ()  # inverters that stay off until an agent joins for them
-    parameter_sets: dict[str, ParameterSet] = {}  # parameters in place of the kind's, by the set's name
 
     def parameters_of(self, row: InverterRow, gfm: InverterModel, gfl: InverterModel) -> InverterModel:
         """Return the model of one inverter: its own parameters, then those of its set, then its kind's."""
-        of_set = with_published(self.parameter_sets).get(row.parameters, {})
-        return with_own(gfm if row.kind == "GFM" else gfl, of_set | row.own)
+        return with_own(gfm if row.kind == "GFM" else gfl, PUBLISHED_SETS.get(row.parameters, {}) | row.own)
 
     def demands(self) -> Iterator[tuple[str, str, complex]]:
         """Yield the bus, the phases ("A", or "AB" between two) and the nominal power (VA) of each branch of a load."""

@@ -161,15 +161,13 @@ def _published(own: InverterModel) -> dict[str, Any]:
     return {name: value for name, value in given(own).items() if name not in BOUNDS_OF_SET_POINTS}
 
 
-PUBLISHED_SETS = {"regfm_a1": _published(REGFM_A1), "regfm_a1_vflag0": _published(REGFM_A1_VFLAG0)}
-
 ParameterSet = dict[str, Any]
 """Parameters by name."""
 
-
-def with_published(sets: Mapping[str, ParameterSet]) -> dict[str, ParameterSet]:
-    """Return the sets of a feeder, which come first, and the published ones."""
-    return {**sets, **{name: own for name, own in PUBLISHED_SETS.items() if name not in sets}}
+PUBLISHED_SETS: dict[str, ParameterSet] = {
+    "regfm_a1": _published(REGFM_A1),
+    "regfm_a1_vflag0": _published(REGFM_A1_VFLAG0),
+}
 
 
 def foreign(own: Mapping[str, Any], kind: Kind, model: type[InverterModel] | None = None) -> list[str]:

@@ -162,17 +162,9 @@ class InverterColumns(msgspec.Struct, frozen=True, kw_only=True):
     """Phases of the bus at which it stands: all three, or one for a single-phase inverter."""
     spare: Annotated[Literal["", "yes"], '"yes" if it stands by, switched off, until an agent comes for it.'] = ""
     parameters: str = ""
-    """Name of its set of parameters in inverter_parameters.csv; empty: those of its kind."""
+    """Name of a published set of parameters, "regfm_a1"; empty: those of its kind."""
     neutral: str = ""
     """Node of the bus to which its phases return, or "earth"; empty: the neutral to which loads return, else earth."""
-
-
-class ParameterColumns(msgspec.Struct, frozen=True, kw_only=True):
-    """inverter_parameters.csv: parameters of single inverters, one a row; a set is all rows of its name."""
-
-    set: Annotated[str, "Name of the set, which inverters.csv gives in `parameters`."]
-    key: Annotated[str, "Which parameter, as in the tables [plant.gfm] and [plant.gfl] of a scenario: P_max_pu."]
-    value: Annotated[str, "Its value."]
 
 
 class SourceColumns(msgspec.Struct, frozen=True, kw_only=True):
@@ -231,7 +223,6 @@ TABLES: dict[str, type[msgspec.Struct]] = {
     "transformers.csv": TransformerColumns,
     "capacitors.csv": CapacitorColumns,
     "inverters.csv": InverterColumns,
-    "inverter_parameters.csv": ParameterColumns,
     "source.csv": SourceColumns,
     "elements.csv": ElementColumns,
 }

@@ -13,7 +13,6 @@ from gridpeers.plant.equipment.neutrals import neutrals_by_bus
 from gridpeers.plant.tables import branches, shunts
 from gridpeers.plant.tables.csv_table import required_columns
 from gridpeers.plant.tables.feeder_columns import LOAD_SETS, TABLES, LoadColumns, Manifest
-from gridpeers.plant.tables.parameter_sets import read_parameter_sets
 from gridpeers.wire.schema.table_reading import read_table
 from gridpeers.wire.text_file import TextFileError, text_of
 from gridpeers.wire.wording import InputError, first_of, suggestion
@@ -99,11 +98,10 @@ def _read_tables(folder: Path, feeder: str, load_set: str, contents: tuple[tuple
     elements = branches.read_elements(buses)
     load_parts = shunts.read_load_parts(buses, of_parts)
     capacitors = shunts.read_capacitors(buses)
-    parameter_sets = read_parameter_sets(buses)
     powers = [*(S for load in loads for S in load.S), *(part.S for part in load_parts)]
     demand = sum(S.real for S in powers if S.real > 0.0)
     neutrals = neutrals_by_bus(buses.rows, load_parts, elements, switches)
-    inverters = shunts.read_inverters(buses, demand, neutrals, parameter_sets)
+    inverters = shunts.read_inverters(buses, demand, neutrals)
     source = shunts.read_source(buses)
     manifest, found = read_table(Manifest, _manifest(folder / MANIFEST, problems))
     problems += [f"{MANIFEST}: {path}: {text}" for path, text in found]
@@ -124,7 +122,6 @@ def _read_tables(folder: Path, feeder: str, load_set: str, contents: tuple[tuple
         f_nom=manifest.f_nom_Hz,
         elements=elements,
         load_parts=load_parts,
-        parameter_sets=parameter_sets or {},
     )
     if not problems and whole.buses:
         # After other problems this would only repeat them: a misnamed end leaves the right bus unconnected.

@@ -10,7 +10,7 @@ from gridpeers.plant.equipment import Bus, Capacitor, InverterRow, Load, Source,
 from gridpeers.plant.equipment.connectivity import buses_without_ground
 from gridpeers.plant.equipment.imported_equipment import LoadPart
 from gridpeers.plant.equipment.neutrals import neutral_for, neutrals_of
-from gridpeers.plant.inverters.inverter_registry import ParameterSet, foreign, with_published
+from gridpeers.plant.inverters.inverter_registry import PUBLISHED_SETS, foreign
 from gridpeers.plant.tables import feeder_columns as columns
 from gridpeers.plant.tables.branches import BusTable, require_ground, require_phases
 from gridpeers.plant.tables.csv_table import CsvRow
@@ -114,23 +114,11 @@ class InverterPlaces(NamedTuple):
     neutrals: Mapping[str, str]  # neutrals of the buses
 
 
-def read_inverters(
-    buses: BusTable, load: float, neutrals: Mapping[str, str], sets: Mapping[str, ParameterSet] | None
-) -> tuple[InverterRow, ...]:
-    """Read inverters.csv; `sets`: sets of parameters, None where they are unreadable."""
+def read_inverters(buses: BusTable, load: float, neutrals: Mapping[str, str]) -> tuple[InverterRow, ...]:
     inverters: dict[str, InverterRow] = {}
     places = InverterPlaces(load, {}, buses.floating, neutrals)
     for row in buses.table("inverters.csv", columns.InverterColumns):
         it, name, bus = row.columns, row.columns.name, buses.find(row)
-        if it.parameters and sets is not None:
-            known = with_published(sets)
-            if it.parameters not in known:
-                hint = suggestion(it.parameters, known, "sets")
-                row.problem(f'parameters "{it.parameters}": no such set; {hint}')
-            elif wrong := foreign(known[it.parameters], it.kind):
-                row.problem(
-                    f'parameters "{it.parameters}": a {it.kind} has no {", ".join(wrong)}; give it a set of its own'
-                )
         row.is_new("inverter", name, inverters)
         neutral = _check_place(row, bus, it.neutral, places)
         if bus is None:
@@ -175,7 +163,7 @@ def problems_of(inverter: InverterRow, bus: Bus, feeder: Tables) -> list[str]:
 
 
 def _check_place(row: CsvRow[columns.InverterColumns], bus: Bus | None, neutral: str, places: InverterPlaces) -> str:
-    """Note what is wrong with an inverter's name, rating and place; return the node to which it returns.
+    """Note what is wrong with an inverter's name, set, rating and place; return the node to which it returns.
 
     `neutral`: the node to which it shall return.
     """
@@ -183,6 +171,11 @@ def _check_place(row: CsvRow[columns.InverterColumns], bus: Bus | None, neutral:
     phases = "" if "phases" in row.wrong else it.phases
     if bus is not None:
         row.require("P_rated_kW", _rating(bus, it.phases, places.load / 1e3))
+    if it.parameters and it.parameters not in PUBLISHED_SETS:
+        hint = suggestion(it.parameters, PUBLISHED_SETS, "sets")
+        row.problem(f'parameters "{it.parameters}": no such set; {hint}')
+    elif it.parameters and (wrong := foreign(PUBLISHED_SETS[it.parameters], it.kind)):
+        row.problem(f'parameters "{it.parameters}": a {it.kind} has no {", ".join(wrong)}')
     if it.name in TAKEN:
         row.problem(f'name "{it.name}" is taken: {TAKEN[it.name]}; name the inverter otherwise')
     elif it.name and it.name.isprintable():

@@ -11,9 +11,7 @@ from typing import Any
 from gridpeers.plant.equipment import InverterRow, Line, LineConfig, Regulator, Tables, Transformer
 from gridpeers.plant.equipment.imported_equipment import LoadPart
 from gridpeers.plant.equipment.neutrals import EARTH, neutrals_of
-from gridpeers.plant.inverters.inverter_registry import ParameterSet, chosen_own
 from gridpeers.plant.tables.feeder_columns import LOAD_SETS, TABLES, InverterColumns
-from gridpeers.wire.schema.table_schema import named
 
 TAP_STEP = 0.00625  # step (pu) in which the ratios of regulators are written
 
@@ -66,9 +64,6 @@ def _tables(feeder: Tables) -> Iterator[tuple[str, list[Row]]]:
     neutrals, inverters = neutrals_of(feeder), (*feeder.inverters, *feeder.spares)
     earth = {it.name: it.neutral or (EARTH if it.bus in neutrals else "") for it in inverters}
     yield "inverters.csv", [tuple((inverter_cells(it) | {"neutral": earth[it.name]}).values()) for it in inverters]
-    if feeder.parameter_sets:
-        rows = [row for name, own in feeder.parameter_sets.items() for row in _parameters(name, own)]
-        yield "inverter_parameters.csv", rows
     if source := feeder.source:
         yield "source.csv", [(source.bus, source.V_pu, degrees(source.angle))]
 
@@ -92,11 +87,6 @@ def inverter_cells(it: InverterRow) -> dict[str, str]:
     spare = "yes" if it.spare else ""
     values = (*texts, P_rated, it.m_p, it.m_q, it.phases, spare, it.parameters, it.neutral)
     return dict(zip(InverterColumns.__struct_fields__, map(str, values), strict=True))
-
-
-def _parameters(name: str, own: ParameterSet) -> Iterator[Row]:
-    for field, value in own.items():
-        yield name, named(chosen_own(own), field).key, str(value).lower() if isinstance(value, bool) else value
 
 
 def _upper_triangle(config: LineConfig) -> Iterator[Row]:

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 from gridpeers.plant.equipment import InverterRow, Tables
 from gridpeers.plant.inverters.inverter_model import InverterModel
-from gridpeers.plant.inverters.inverter_registry import foreign, given, with_published
+from gridpeers.plant.inverters.inverter_registry import PUBLISHED_SETS, foreign, given
 from gridpeers.plant.known_names import DEFAULTS, defaults
 from gridpeers.scenarios.schema.participants import inverters_of
 from gridpeers.scenarios.schema.scenario_errors import Problems, multiple
@@ -199,7 +199,7 @@ def check_changes(scenario: ScenarioModel, feeder: Tables, problems: Problems) -
         path = f"plant.inverter.{name}"
         if problems.unknown(path, "inverter", name, rows):
             continue
-        kind, sets = rows[name].kind, with_published(feeder.parameter_sets)
+        kind, sets = rows[name].kind, PUBLISHED_SETS
         if table == InverterTable() and not problems.below(path):
             problems.add(
                 path, f"changes nothing; give it one of {', '.join(keys_of(InverterTable))}, or a key of {kind}"
@@ -254,9 +254,7 @@ def _check_own(row: InverterRow, scenario: ScenarioModel, feeder: Tables, proble
         return
     table = f"plant.{row.kind.lower()}"
     parameters = feeder.parameters_of(row, plant.gfm, plant.gfl)
-    for key in foreign(
-        {**with_published(feeder.parameter_sets).get(row.parameters, {}), **row.own}, row.kind, type(parameters)
-    ):
+    for key in foreign(PUBLISHED_SETS.get(row.parameters, {}) | row.own, row.kind, type(parameters)):
         problems.add(path, f"its model {parameters.model} has no {key}; leave it out, or name another model")
     for key, text in contradictions(type(parameters), parameters):
         if not problems.touch(f"{table}.{key}"):

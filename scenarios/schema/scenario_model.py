@@ -92,9 +92,9 @@ class InverterTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     """Q-V droop (pu voltage per pu reactive power)."""
     P_rated_kW: Annotated[float | None, Unit("kW"), Plausible("a rating", 0.1, 1e6)] = None
     """Rated power (kW), the base of its per-unit values."""
-    parameters: Annotated[str | None, Example('"fast"')] = None
-    """Name of a set of parameters of the feeder (inverter_parameters.csv), or of a published one ("regfm_a1",
-    "regfm_a1_vflag0"), in place of the one that inverters.csv names; "" is none."""
+    parameters: Annotated[str | None, Example('"regfm_a1"')] = None
+    """Name of a published set of parameters ("regfm_a1", "regfm_a1_vflag0"), in place of the one that inverters.csv
+    names; "" is none."""
     own: Annotated[OwnParameters, INLINE, ChosenBy("model", chosen_own)] = OwnParameters()
     """Parameters of its kind, in its table."""
 

@@ -15,6 +15,7 @@ from gridpeers.plant.dynamics import Dynamics
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.feeder.circuits import circuit_of
 from gridpeers.plant.feeder.plant import installed_inverters
+from gridpeers.plant.inverters.gfl import Gfl
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings, SwitchEvent
 from tests.unit.bridges.opendss.opendss_solutions import LETTERS, TOLERANCE
@@ -88,7 +89,7 @@ def engine(script: str, *commands: str) -> dict[str, complex]:
 
 def started(feeder: gp.Feeder, closed: frozenset[str], P: float) -> tuple[Network, Dynamics]:
     """The feeder's inverters at rest, each with this part of its rating."""
-    network, settings = Network(feeder), PlantSettings()
+    network, settings = Network(feeder), PlantSettings(gfl=Gfl(P_min=0.0))
     dynamics = Dynamics(circuit_of(network, closed, network.loads()), installed_inverters(network, settings), 1e-3)
     n = len(feeder.inverters)
     dynamics.start(np.full(n, P), V_set=np.full(n, 1.0))
@@ -142,9 +143,7 @@ def largest_difference(
 
 def with_followers(feeder: gp.Feeder) -> gp.Feeder:
     """The feeder with followers of one phase and of three at its houses."""
-    return feeder.add_inverter("roof", "b3", "GFL", 5e3, phases="A", params={"P_min_pu": 0.0}).add_inverter(
-        "hall", "b2", "GFL", 2e4, params={"P_min_pu": 0.0}
-    )
+    return feeder.add_inverter("roof", "b3", "GFL", 5e3, phases="A").add_inverter("hall", "b2", "GFL", 2e4)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -175,9 +174,9 @@ def with_roofs(feeder: gp.Feeder) -> gp.Feeder:
     return with_followers(feeder.add_inverter("street", "b1", "GFM", 3e4))
 
 
-def events_of(feeder: gp.Feeder, until: float, P: float = 0.4) -> tuple[Plant, list[str]]:
+def events_of(feeder: gp.Feeder, until: float, P: float = 0.4, **gfl: Any) -> tuple[Plant, list[str]]:
     """The plant after its street is cut off at 0.1 s, and the texts of its events."""
-    settings = PlantSettings(P_set0=P, events=(SwitchEvent(t=0.1, switch="a1", action="open"),))
+    settings = PlantSettings(P_set0=P, gfl=Gfl(**gfl), events=(SwitchEvent(t=0.1, switch="a1", action="open"),))
     plant = Plant(Network(feeder), settings, 0.02, 0.02)
     while plant.tick * 0.02 < until:
         plant.advance()
@@ -188,8 +187,8 @@ def test_a_street_that_is_cut_off_keeps_its_loads_and_its_star_point_is_earthed(
     """An island without the earth of its transformer serves its 25 kW at healthy voltages, and says who earths it."""
     feeder, _ = imported(tmp_path, KINDS["earthed at the transformer"])
     feeder = feeder.add_inverter("bat", "b1", "GFM", 6e4)
-    feeder = feeder.add_inverter("pv", "b2", "GFL", 3e4, params={"P_min_pu": 0.0, "volt_var": False})
-    plant, told = events_of(feeder, 3.0, P=0.2)
+    feeder = feeder.add_inverter("pv", "b2", "GFL", 3e4)
+    plant, told = events_of(feeder, 3.0, P=0.2, P_min=0.0, volt_var=False)
     now = plant.measure()
 
     assert [text for text in told if "earth" in text] == ["bat earths its neutral, node 4 of bus b1: nothing else does"]
@@ -278,7 +277,7 @@ def test_legs_of_a_split_phase_service_return_to_their_neutral(tmp_path: Path) -
     (tmp_path / "Master.dss").write_text(CENTRE_TAPPED)
     feeder = gp.Feeder.read(tmp_path / "Master.dss")
     for leg in "AB":
-        feeder = feeder.add_inverter(f"roof{leg}", "d", "GFL", 5e3, phases=leg, params={"P_min_pu": 0.0})
+        feeder = feeder.add_inverter(f"roof{leg}", "d", "GFL", 5e3, phases=leg)
     network, dynamics = started(feeder, frozenset(), 0.6)
 
     assert [row.neutral for row in feeder.inverters] == ["C", "C"]

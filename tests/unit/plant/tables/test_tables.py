@@ -168,6 +168,8 @@ MISTAKES: list[tuple[str, int, dict[str, str], str]] = [
     ("inverters.csv", 3, {"bus": "94", "phases": "B"}, 'bus "94" has no phase B; it has A'),
     ("inverters.csv", 3, {"phases": "AB"}, 'phases "AB": must be "ABC" or "A" or "B" or "C" or empty'),
     ("inverters.csv", 3, {"bus": "160", "phases": "C"}, 'bus "160" has inverter "inv1" on phase C already; only one'),
+    ("inverters.csv", 2, {"parameters": "regfm"}, 'parameters "regfm": no such set; did you mean "regfm_a1"?'),
+    ("inverters.csv", 3, {"parameters": "regfm_a1"}, 'parameters "regfm_a1": a GFL has no model = "regfm_a1"'),
     ("source.csv", 3, {}, "a second source; a feeder has one at most"),
 ]
 
@@ -225,7 +227,7 @@ def test_misnamed_file_is_told(folder: Path) -> None:
     assert problems(folder) == (
         'inverter.csv: not a table of a feeder; did you mean "inverters.csv"? The tables are buses.csv, lines.csv, '
         "line_configs.csv, switches.csv, regulators.csv, transformers.csv, capacitors.csv, inverters.csv, "
-        "inverter_parameters.csv, source.csv, elements.csv",
+        "source.csv, elements.csv",
     )
 
 
