@@ -7,15 +7,13 @@ measurement: in simulated time all agents' are the same.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING, NamedTuple
-
-import numpy as np
 
 from gridpeers.agents.agent_config import SharedQuantity
 from gridpeers.scenarios.record.record_file import RecordFileError
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.results.case_tables import QUANTITIES
-from gridpeers.scenarios.results.history import Floats
 from gridpeers.scenarios.schema.plugin_keys import law_of
 from gridpeers.wire.messages import State
 from gridpeers.wire.wording import suggestion
@@ -25,33 +23,30 @@ if TYPE_CHECKING:
 
     from gridpeers.scenarios.checks.checked_case import CheckedCase
 
-Series = Mapping[str, tuple[Floats, Floats]]
-"""Times (s) and values of one quantity, by inverter."""
-
 
 class SharedRecord(NamedTuple):
     """A shared quantity in the cases of a run."""
 
     quantity: SharedQuantity
-    series: Mapping[str, Series]
-    """By case."""
+    frames: Mapping[str, pd.DataFrame]
+    """By case: a column for each inverter, index t (s)."""
 
 
-def read_shared(record: RunRecord) -> dict[str, Series]:
-    """Return all that the laws of a run shared, by name; RecordFileError if the record has no states."""
+def read_shared(record: RunRecord) -> pd.DataFrame:
+    """Return all that the laws of a run shared: columns (quantity, inverter), index t (s); nan where none was sent.
+
+    Raise RecordFileError if the record has no states.
+    """
+    import pandas as pd  # takes longer to import than a case to run
+
     if record.info.level == "physics":
         raise RecordFileError(f'{record.path}: it has no states: the run was recorded with record = "physics"')
-    found: dict[str, dict[str, list[tuple[float, float]]]] = {}
-    for state in record.messages(State):
-        for name, value in state.shared.items():
-            found.setdefault(name, {}).setdefault(state.sender, []).append((state.t, value))
-    inverters = record.agents
-    return {name: {it: _columns(of[it]) for it in inverters if it in of} for name, of in found.items()}
-
-
-def _columns(rows: list[tuple[float, float]]) -> tuple[Floats, Floats]:
-    t, values = np.array(rows).T
-    return t, values
+    states = record.messages(kind=State)
+    rows = [(state.t, name, state.sender, value) for state in states for name, value in state.shared.items()]
+    places = ["t", "quantity", "inverter"]
+    found = pd.DataFrame(rows, columns=[*places, "value"]).drop_duplicates(places, keep="last")
+    frame = found.pivot(index="t", columns=places[1:], values="value")
+    return frame.reindex(columns=record.agents, level="inverter")
 
 
 def shared_frame(record: RunRecord, name: str) -> pd.DataFrame:
@@ -61,11 +56,12 @@ def shared_frame(record: RunRecord, name: str) -> pd.DataFrame:
     """
     shared = read_shared(record)
     if name not in shared:
-        of_plant = [column.rpartition("_")[0] for column in QUANTITIES]
-        known = suggestion(name, (*of_plant, *shared), "quantities") + ("" if shared else "; no law shared anything")
-        raise RecordFileError(f'{record.path}: there is no quantity "{name}"; {known}')
-    frame = _frame(shared[name])
-    frame.index.name, frame.columns.name = "t", "inverter"
+        known = [*(column.rpartition("_")[0] for column in QUANTITIES), *shared.columns.unique("quantity")]
+        none = "; no law shared anything" if shared.empty else ""
+        raise RecordFileError(
+            f'{record.path}: there is no quantity "{name}"; {suggestion(name, known, "quantities")}{none}'
+        )
+    frame: pd.DataFrame = shared[name].dropna(how="all")
     frame.attrs["units"] = {"t": "s", name: _units(record).get(name, "")}
     return frame
 
@@ -79,18 +75,9 @@ def shared_table(record: RunRecord) -> pd.DataFrame:
 
     if not (units := _units(record)) or record.info.level == "physics":
         return pd.DataFrame()
-    frames = [
-        _frame(series).add_suffix(f"_{name}_{units[name]}" if units.get(name) else f"_{name}")
-        for name, series in read_shared(record).items()
-    ]
-    return pd.concat(frames, axis=1).sort_index().rename_axis("t_s").reset_index() if frames else pd.DataFrame()
-
-
-def _frame(series: Series) -> pd.DataFrame:
-    import pandas as pd  # takes longer to import than a case to run
-
-    columns = {it: pd.Series(values, index=t) for it, (t, values) in series.items()}
-    return pd.DataFrame({it: column[~column.index.duplicated(keep="last")] for it, column in columns.items()})
+    shared = read_shared(record)
+    columns = ("_".join(filter(None, (it, name, units.get(name)))) for name, it in shared.columns)
+    return shared.set_axis(list(columns), axis=1).rename_axis("t_s").reset_index()
 
 
 def _units(record: RunRecord) -> dict[str, str]:
@@ -101,14 +88,13 @@ def shared_records(cases: Mapping[str, CheckedCase]) -> dict[str, SharedRecord]:
     """Return what the laws of a run declare to share, by name, in the cases that were recorded."""
     found: dict[str, SharedRecord] = {}
     for name, case in cases.items():
-        if not (declared := law_of(case.scenario, name).shared) or case.folder is None:
+        declared = law_of(case.scenario, name).shared
+        if not declared or case.folder is None or case.scenario.record == "physics":
             continue
-        try:
-            shared = read_shared(RunRecord.open(case.folder))
-        except RecordFileError:
-            continue
+        record = RunRecord.open(case.folder)
         for quantity in declared:
-            if quantity.name in shared:
-                of = found.setdefault(quantity.name, SharedRecord(quantity, {}))
-                found[quantity.name] = of._replace(series={**of.series, name: shared[quantity.name]})
+            with suppress(RecordFileError):  # nothing of it was sent
+                frame = shared_frame(record, quantity.name)
+                before = found[quantity.name].frames if quantity.name in found else {}
+                found[quantity.name] = SharedRecord(quantity, {**before, name: frame})
     return found

@@ -254,7 +254,11 @@ def powers(drawing: Drawing, *, GFM: bool) -> Page:
 
 def shared(drawing: Drawing, name: str) -> Page:
     """Return a quantity that laws share, of each inverter, one panel per case."""
-    quantity, series = drawing.shared[name]
+    quantity, frames = drawing.shared[name]
+    series = {
+        case: {it: (sent.index.to_numpy(), sent.to_numpy()) for it in frame if (sent := frame[it].dropna()).size}
+        for case, frame in frames.items()
+    }
     label = f"{name} ({quantity.unit})" if quantity.unit else name
     page = _by_inverter(drawing, series, label, f"{name}: {quantity.help}".rstrip(" .:"))
     return page._replace(one_row=False)
