@@ -102,25 +102,8 @@ def _default(field: Field) -> str:
     return "none" if value is None else f"`{shown(value)}`"
 
 
-_LAW = """A class derived from gridpeers.Law; `docs/laws.md` has the contract.
-
-    @gridpeers.law("mine")
-    class Mine(gridpeers.Law):
-        gain: Annotated[float, Unit("1/s"), Range(0, 100), "Rate."] = 5.0
-        def step(self, own, neighbours, T):
-            return gridpeers.SetPoints(P_set=own.P_set, V_set=own.V_set)
-"""
-
-_INVERTER = """A class derived from gridpeers.InverterModel; `docs/inverter-models.md` has the contract and an example.
-
-    class Mine(gridpeers.InverterModel):
-        H: Annotated[float, Unit("s"), Plausible("an inertia constant", 0.01, 20.0), "Inertia."] = 0.1
-        STATES: ClassVar = ("q",)
-        @staticmethod
-        def advance(g, t, x0, x, d, h, second): ...
-        @staticmethod
-        def rest(g, x, V, I, J, S, v): ...
-"""
+_LAW = "A class derived from gridpeers.Law; `docs/laws.md` has the contract and examples."
+_INVERTER = "A class derived from gridpeers.InverterModel; `docs/inverter-models.md` has the contract and an example."
 
 _REGISTRIES: dict[str, tuple[Registry[Any], str, str]] = {
     "laws": (LAWS, _LAW, 'law = "mine:Mine", or law = { use = "mine:Mine", gain = 2.0 }, for all cases or in one'),
@@ -242,8 +225,7 @@ def _section(title: str, cls: type[msgspec.Struct], text: str, leave_out: Iterab
 
 def _registry(topic: str) -> Iterator[str]:
     registry, how, key = _REGISTRIES[topic]
-    title, _, rest = how.strip().partition("\n")
-    yield from (f"# {registry.plural[:1].upper()}{registry.plural[1:]}", "", title, *rest.rstrip().split("\n"), "")
+    yield from (f"# {registry.plural[:1].upper()}{registry.plural[1:]}", "", how.strip(), "")
     yield f"In a scenario: {key}. A module is looked for beside the scenario's file, then on the Python path. A"
     yield f"distribution adds its own under the entry points `{registry.group}`."
     if not registry.names:
