@@ -10,9 +10,8 @@ from typing import Any
 
 import msgspec
 
-from gridpeers.scenarios.checks.check_verdict import FILE, verdicts_json
+from gridpeers.scenarios.checks.check_verdict import FILE, judge_case, verdicts_json
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.checks.judging import judge_case
 from gridpeers.scenarios.results.claims import NO_BENCHMARK, benchmark_of, judge, judged
 from gridpeers.scenarios.results.findings import Findings, find
 from gridpeers.scenarios.results.history import late_moves

@@ -18,9 +18,8 @@ from gridpeers.rooms import ROOMS
 from gridpeers.runs import frames
 from gridpeers.runs.run_folder import RunFolder, new_home
 from gridpeers.scenarios.checks import check_verdict
-from gridpeers.scenarios.checks.check_verdict import CheckVerdict
+from gridpeers.scenarios.checks.check_verdict import CheckVerdict, judge_case
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.checks.judging import judge_case
 from gridpeers.scenarios.record.record_info import LIVE
 from gridpeers.scenarios.results.claims import Verdict, benchmark_of, judge, judged
 from gridpeers.scenarios.results.findings import Findings, find

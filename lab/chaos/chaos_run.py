@@ -17,9 +17,8 @@ from gridpeers.lab.chaos.disturbed_scenario import RESTORED, WITHIN_S, ChaosBase
 from gridpeers.plant.equipment import Tables
 from gridpeers.plant.equipment.connectivity import bus_islands
 from gridpeers.scenarios.checks.check_registry import LAW_FAILED
-from gridpeers.scenarios.checks.check_verdict import SHOWN_VIOLATIONS, CheckVerdict
+from gridpeers.scenarios.checks.check_verdict import SHOWN_VIOLATIONS, CheckVerdict, judge_case
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.checks.judging import judge_case
 from gridpeers.scenarios.results.island_membership import closed_switches
 from gridpeers.scenarios.results.recorded_events import tripped_by, tripped_inverters
 from gridpeers.scenarios.results.run_files import JournalRow

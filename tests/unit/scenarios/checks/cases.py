@@ -14,9 +14,8 @@ import gridpeers as gp
 from gridpeers.lab.communication.communication_checks import CommunicationSummary
 from gridpeers.lab.communication.record_pass import RecordContent
 from gridpeers.scenarios.checks.check_registry import chosen_checks
-from gridpeers.scenarios.checks.check_verdict import CheckVerdict
+from gridpeers.scenarios.checks.check_verdict import CheckVerdict, judge_by
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.checks.judging import judge_by
 from gridpeers.scenarios.results.history import History
 
 

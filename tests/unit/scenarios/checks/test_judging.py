@@ -12,18 +12,18 @@ from typing import Annotated, Any
 import pytest
 
 import gridpeers as gp
-from gridpeers.scenarios.checks import judging
+from gridpeers.scenarios.checks import check_verdict
 from gridpeers.scenarios.checks.check_registry import ALWAYS, CHECKS
 from gridpeers.scenarios.checks.check_verdict import (
     SHOWN_VIOLATIONS,
     CheckVerdict,
     NotJudgedError,
     Violation,
+    judge_by,
     read_verdicts,
     summary,
 )
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.checks.judging import judge_by
 from gridpeers.wire.plugins.plugin import Plugin, plugin_problems
 from tests.unit.scenarios.checks.cases import ran
 
@@ -87,7 +87,7 @@ def test_a_check_of_ones_own_passes_fails_or_is_not_judged(
 
 def test_a_check_that_yields_without_end_is_asked_for_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
     """It has failed, with as many violations as were counted, of which the first are kept."""
-    monkeypatch.setattr(judging, "MOST_VIOLATIONS", 1000)
+    monkeypatch.setattr(check_verdict, "MOST_VIOLATIONS", 1000)
     numbers = count()
     found = judged(lambda case: (Violation(text=f"x{k}") for k in numbers), monkeypatch)
 
