@@ -17,7 +17,7 @@ from typer.core import TyperGroup
 
 from gridpeers.scenarios.console import terminal as terminal
 from gridpeers.wire.driver.command_line import command_line
-from gridpeers.wire.driver.ending import StopSignal
+from gridpeers.wire.driver.ending import stop_handler
 from gridpeers.wire.wording import DISTRIBUTIONS, InputError, damaged, printable, requirement, suggestion
 
 if TYPE_CHECKING:
@@ -126,7 +126,7 @@ def interruptible() -> Iterator[None]:
     """
     from gridpeers.scenarios.results.run_files import TerminatedError  # imports msgspec, which the help does without
 
-    terminate, numbers = StopSignal(TerminatedError), [signal.SIGTERM]
+    terminate, numbers = stop_handler(TerminatedError), [signal.SIGTERM]
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else a shell has it ignored, or another has it
         numbers.append(signal.SIGINT)
     if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # else nohup has asked that the run outlives its terminal

@@ -1,8 +1,7 @@
 """How a process ends: by a signal, by the loss of its output, or although threads would keep it.
 
-Output is lost when its reader has gone, as by `| head -3`, or its disk is full. Python ignores SIGPIPE, and so must we:
-a Zenoh session or a child that disappears in the middle of a write would end the process too. So the write itself
-detects the loss, below all buffers, for print, logging and rich alike. There are two reactions:
+Output is lost when its reader has gone, as by `| head -3`, or its disk is full. SIGPIPE is ignored, because it would
+also come of a Zenoh session or a child that disappears. So the write itself detects the loss, below all buffers:
 
 - A command that exists for its output quits (`speaking`). If no reader is left, it ends silently with the exit
   status that a shell gives for SIGPIPE; if the output cannot be written, it ends with one line on standard error.
@@ -32,30 +31,27 @@ SAME_REQUEST_TIME = 1.0
 ends all processes of a run signals those that their parent ends too. An end must not be interrupted by that."""
 
 
-class StopSignal:
-    """Handler of signals: SIGINT raises KeyboardInterrupt, any other an error that is made from its name.
+def stop_handler(error: Callable[[str], BaseException]) -> Callable[[int, FrameType | None], None]:
+    """Return a handler of signals: SIGINT raises KeyboardInterrupt, any other an error that is made from its name.
 
-    A signal that comes less than `SAME_REQUEST_TIME` after the last one that raised does nothing.
+    A signal less than `SAME_REQUEST_TIME` after one that raised does nothing.
     """
+    raised_at = -inf
 
-    def __init__(self, error: Callable[[str], BaseException], clock: Callable[[], float] = monotonic) -> None:
-        self._error, self._clock = error, clock
-        self._at = -inf
-
-    def __call__(self, number: int, frame: FrameType | None) -> None:
-        now = self._clock()
-        if now - self._at >= SAME_REQUEST_TIME:
-            self._at = now
+    def stop(number: int, frame: FrameType | None) -> None:
+        nonlocal raised_at
+        now = monotonic()
+        if now - raised_at >= SAME_REQUEST_TIME:
+            raised_at = now
             name = signal.Signals(number).name
-            raise KeyboardInterrupt(name) if number == signal.SIGINT else self._error(name)
+            raise KeyboardInterrupt(name) if number == signal.SIGINT else error(name)
+
+    return stop
 
 
 def stop_at_signals(error: Callable[[str], BaseException]) -> None:
-    """Have SIGINT and SIGTERM raise in the main thread, by one handler.
-
-    A SIGINT that is ignored stays so: a shell ignores it for a program in the background.
-    """
-    stop = StopSignal(error)
+    """Have SIGINT and SIGTERM raise in the main thread; a SIGINT that a shell ignores in the background stays so."""
+    stop = stop_handler(error)
     signal.signal(signal.SIGTERM, stop)
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, stop)
@@ -80,34 +76,29 @@ class OutputLostError(SystemExit):
 
 
 class _Watched(io.FileIO):
-    """Standard output or error that detects its loss; from then on, a command's output is dropped.
-
-    A process that continues tries again: a disk may have space again, but a reader never comes back.
-    """
+    """Standard output or error that detects its loss. A process that continues tries again: a disk may have space."""
 
     def __init__(self, stream: io.TextIOWrapper, *, quits: bool) -> None:
         super().__init__(stream.fileno(), "w", closefd=False)
         self.name = stream.name
         self.quits = quits
-        self._reader_gone = self._raised = False
+        self._raised = False
 
     def write(self, data: ReadableBuffer, /) -> int:
-        unwritable = ""
-        if not (self._raised or self._reader_gone):
-            try:
+        try:
+            if not self._raised:
                 return super().write(data)
-            except BrokenPipeError:
-                self._reader_gone = True
-            except OSError as error:
-                unwritable = f"standard output cannot be written: {error.strerror or error}"
-        # A command that cannot write its error message still has its exit status.
-        ends = self.quits and (self._reader_gone or self.name != "<stderr>")
-        # Raise once: the rest of the output is dropped. In another thread the error would end only that thread.
-        if ends and not self._raised and threading.current_thread() is threading.main_thread():
-            self._raised = True
-            if self._reader_gone:
-                raise OutputLostError(READER_GONE, "nobody reads its output any more")
-            raise OutputLostError(UNWRITABLE, unwritable)
+        except OSError as error:
+            # In another thread the error would end only that thread. A command that cannot write its error message
+            # still has its exit status.
+            gone = isinstance(error, BrokenPipeError)
+            ends = self.quits and (gone or self.name != "<stderr>")
+            if ends and threading.current_thread() is threading.main_thread():
+                self._raised = True  # once: the rest of the output is dropped
+                if gone:
+                    raise OutputLostError(READER_GONE, "nobody reads its output any more") from None
+                text = f"standard output cannot be written: {error.strerror or error}"
+                raise OutputLostError(UNWRITABLE, text) from None
         return memoryview(data).nbytes
 
 
