@@ -135,8 +135,12 @@ def page(topic: str) -> str:
 
 def _keys() -> Iterator[str]:
     yield from ("# Keys of a run", "")
+    yield from ("Operators and viewers are command lines, pages of a run and recorders.", "")
     header = ("key", "kind", "message", "from", "to", "when")
-    rows = ((f"`{s.expression}`", s.kind, s.message, s.sender, s.listener, s.when) for s in keys.KEY_SPECS)
+    rows = (
+        (f"`{s.expression}`", s.kind, s.message, ", ".join(s.writers), ", ".join(s.readers), s.when)
+        for s in keys.KEY_SPECS
+    )
     yield from markdown_table(header, rows)
 
 

@@ -40,12 +40,10 @@ class KeySpec(msgspec.Struct, frozen=True):
     path: str
     kind: Literal["publication", "queryable", "token"]
     message: str
-    sender: str
-    listener: str
-    when: str
     writers: tuple[Role, ...]
     """Roles of members of a site that may publish, answer or hold it; an agent only with its own name in the key."""
     readers: tuple[Role, ...]
+    when: str
 
     @property
     def expression(self) -> str:
@@ -152,111 +150,99 @@ def run_of_plant(key: str) -> str:
     return ""
 
 
-_BY_PLANT: tuple[Role, ...] = ("plant",)
-_BY_AGENT: tuple[Role, ...] = ("agent",)
+_PLANT: tuple[Role, ...] = ("plant",)
+_AGENT: tuple[Role, ...] = ("agent",)
 _PEOPLE: tuple[Role, ...] = ("plant", "operator", "viewer")  # the recorder on the plant's host has its certificate
 
 KEY_SPECS = (
     KeySpec(
-        "alive/plant/<epoch>", "token", "-", "plant", "agents, recorders",
+        "alive/plant/<epoch>", "token", "-", _PLANT, ROLES,
         "as long as the plant's session lives; declared after its subscribers; says the epoch of its messages",
-        _BY_PLANT, ROLES,
     ),
     KeySpec(
-        "alive/agent/<inverter>/<instance>", "token", "-", "agent", "plant, other agents",
-        "while the agent's session lives; declared after its subscribers and its queryable", _BY_AGENT, ROLES,
+        "alive/agent/<inverter>/<instance>", "token", "-", _AGENT, ROLES,
+        "while the agent's session lives; declared after its subscribers and its queryable",
     ),
     KeySpec(
-        "alive/recorder/<recorder>", "token", "-", "recorder", "plant",
-        "until the final telemetry is in; declared after its subscriber", ("plant", "operator"), ROLES,
+        "alive/recorder/<recorder>", "token", "-", ("plant", "operator"), ROLES,
+        "until the final telemetry is in; declared after its subscriber",
     ),
     KeySpec(
-        "nameplate/<inverter>/<instance>", "queryable", "Nameplate", "agent", "plant, other agents",
+        "nameplate/<inverter>/<instance>", "queryable", "Nameplate", _AGENT, ("plant", "agent"),
         "asked when a token appears; by a neighbour once more, as proof that its subscription has arrived",
-        _BY_AGENT, ("plant", "agent"),
     ),
     KeySpec(
-        "control", "publication", "Prepare, Waiting, Stop", "plant", "agents",
-        "before tick 0; at the end; while the plant waits", _BY_PLANT, _BY_AGENT,
+        "control", "publication", "Prepare, Waiting, Stop", _PLANT, _AGENT,
+        "before tick 0; at the end; while the plant waits",
     ),
     KeySpec(
-        "stop_request/<inverter>/<instance>", "publication", "Stop", "plant", "the one instance",
+        "stop_request/<inverter>/<instance>", "publication", "Stop", _PLANT, _AGENT,
         "when its name is taken or is no inverter of the feeder; real time: on `gridpeers stop`",
-        _BY_PLANT, _BY_AGENT,
     ),
     KeySpec(
-        "ready/<inverter>", "publication", "Ready", "agent", "plant",
-        "when it has proof to hear every in-neighbour on the roster", _BY_AGENT, _BY_PLANT,
+        "ready/<inverter>", "publication", "Ready", _AGENT, _PLANT,
+        "when it has proof to hear every in-neighbour on the roster",
     ),
+    KeySpec("measurement/<inverter>", "publication", "Measurement", _PLANT, _AGENT, "at every tick: it is the grant"),
     KeySpec(
-        "measurement/<inverter>", "publication", "Measurement", "plant", "agent", "at every tick: it is the grant",
-        _BY_PLANT, _BY_AGENT,
-    ),
-    KeySpec(
-        "state/<inverter>", "publication", "State", "agent", "plant, neighbours",
+        "state/<inverter>", "publication", "State", _AGENT, ("plant", "agent"),
         "at every tick, once its measurement and the neighbours' states of the tick before are in",
-        _BY_AGENT, ("plant", "agent"),
     ),
     KeySpec(
-        "set_points/<inverter>", "publication", "State", "agent", "plant",
+        "set_points/<inverter>", "publication", "State", _AGENT, _PLANT,
         "real time: instead of state, at a tick at which the law sends nothing to the neighbours",
-        _BY_AGENT, _BY_PLANT,
     ),
     KeySpec(
-        "telemetry", "publication", "Telemetry, LinkReport, Journal, LinkRequest", "plant", "recorders",
-        "at tick 0, every tenth tick (real time: every 0.2 s), and at the end", _BY_PLANT, _PEOPLE,
+        "telemetry", "publication", "Telemetry, LinkReport, Journal, LinkRequest", _PLANT, _PEOPLE,
+        "at tick 0, every tenth tick (real time: every 0.2 s), and at the end",
     ),
     KeySpec(
-        "report/<inverter>", "publication", "LinkReport", "agent", "plant, which publishes it on telemetry",
-        "in a run with emulated links: every 100 ticks, and when it ends", _BY_AGENT, _BY_PLANT,
+        "report/<inverter>", "publication", "LinkReport", _AGENT, _PLANT,
+        "in a run with emulated links: every 100 ticks, and when it ends (the plant publishes it on telemetry)",
     ),
     KeySpec(
-        "journal/<inverter>", "publication", "Journal", "agent", "plant, which publishes it on telemetry",
-        "in a recorded run: when the way in which the agent decides changes; real time: every 0.2 s",
-        _BY_AGENT, _BY_PLANT,
+        "journal/<inverter>", "publication", "Journal", _AGENT, _PLANT,
+        "in a recorded run: when the way in which the agent decides changes; real time: every 0.2 s (the plant "
+        "publishes it on telemetry)",
     ),
     KeySpec(
-        "link_request/<inverter>", "publication", "LinkRequest", "plant", "agent",
-        "real time: at each link command, and all of them to an agent that joins; again "
-        "every second, until it is acknowledged", _BY_PLANT, _BY_AGENT,
+        "link_request/<inverter>", "publication", "LinkRequest", _PLANT, _AGENT,
+        "real time: at each link command, and all of them to an agent that joins; again every second, until it is "
+        "acknowledged",
     ),
     KeySpec(
-        "link_acknowledgement/<inverter>", "publication", "LinkAcknowledgement", "agent",
-        "plant, which publishes it on the client's key", "real time: one for every LinkRequest, in their order",
-        _BY_AGENT, _BY_PLANT,
+        "link_acknowledgement/<inverter>", "publication", "LinkAcknowledgement", _AGENT, _PLANT,
+        "real time: one for every LinkRequest, in their order",
     ),
     KeySpec(
-        "leave/<inverter>", "publication", "Leave", "agent", "plant",
+        "leave/<inverter>", "publication", "Leave", _AGENT, _PLANT,
         "real time: when it leaves properly; the plant then takes its inverter off the network",
-        _BY_AGENT, _BY_PLANT,
     ),
     KeySpec(
-        "status/<inverter>", "publication", "AgentStatus", "agent", "plant, watchers",
+        "status/<inverter>", "publication", "AgentStatus", _AGENT, _PEOPLE,
         "real time: every 0.5 s of wall time, and when its phase or its neighbours in use change",
-        _BY_AGENT, _PEOPLE,
     ),
     KeySpec(
-        "config/<inverter>", "queryable", "-", "plant", "an agent of a live run",
-        "real time: asked once the plant's token is there; its AgentConfig as JSON", _BY_PLANT, ROLES,
+        "config/<inverter>", "queryable", "-", _PLANT, ROLES,
+        "real time: asked once the plant's token is there; its AgentConfig as JSON",
     ),
     KeySpec(
-        "feeder_map", "queryable", "-", "plant", "a client that draws the feeder",
+        "feeder_map", "queryable", "-", _PLANT, _PEOPLE,
         "real time: asked once the plant's token is there; buses, branches, switches, inverters as JSON",
-        _BY_PLANT, _PEOPLE,
     ),
     KeySpec(
-        "command", "publication", "Command", "command line", "plant",
-        "real time: once the plant's token is there, to change something", ("operator",), _BY_PLANT,
+        "command", "publication", "Command", ("operator",), _PLANT,
+        "real time: once the plant's token is there, to change something",
     ),
     KeySpec(
-        "request", "publication", "Command", "command line, recorder", "plant",
-        "real time: once the plant's token is there, to learn something (status, links, telemetry); "
-        "simulated: by the recorder, after each Telemetry and every second", ROLES, _BY_PLANT,
+        "request", "publication", "Command", ROLES, _PLANT,
+        "real time: once the plant's token is there, to learn something (status, links, telemetry); simulated: by "
+        "the recorder, after each Telemetry and every second",
     ),
     KeySpec(
-        "answer/<id>", "publication", "Answer, LinkAcknowledgement", "plant", "the command line that asked",
-        "real time: one Answer for every command; to a link command every LinkAcknowledgement, too; "
-        "simulated: to a recorder that asks again", _BY_PLANT, ROLES,
+        "answer/<id>", "publication", "Answer, LinkAcknowledgement", _PLANT, ROLES,
+        "real time: one Answer for every command; to a link command every LinkAcknowledgement, too; simulated: to a "
+        "recorder that asks again",
     ),
 )  # fmt: skip
 """Every kind of key with its message, its two ends and its time; `gridpeers doc keys` prints it."""
