@@ -71,7 +71,7 @@ def _chosen(cumulated: tuple[float, ...], u: float) -> int:
 class Bernoulli(LossModel, frozen=True, kw_only=True, tag="bernoulli"):
     """Loss with probability p; in a file `loss = 0.02` says the same."""
 
-    p: Annotated[float, Probability("a loss")]
+    p: Annotated[float, Probability("of a loss")]
     """Probability of loss."""
 
     @property

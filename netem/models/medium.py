@@ -123,7 +123,7 @@ _WHETHER, _WHICH, _PER_COPY = 0, 1, 2
 class Duplicate(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """With probability p a copy follows, a fixed time later; in a file `duplicate = 0.01` says: at once."""
 
-    p: Annotated[float, Probability("a duplicate")]
+    p: Annotated[float, Probability("of a duplicate")]
     """Probability that a delivered message has a copy."""
     extra_delay_s: Annotated[float, Unit("s"), DELAY] = 0.0
     """How much later the copy arrives (s)."""
@@ -135,7 +135,7 @@ class Duplicate(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 class Corrupt(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """With probability p a bit of a copy is flipped, each bit alike; in a file `corrupt = 0.001` says the same."""
 
-    p: Annotated[float, Probability("a corruption")]
+    p: Annotated[float, Probability("of a corruption")]
     """Probability that an arriving copy of a message is corrupted."""
     checksum: bool = False
     """True: the link notices it by its checksum (CRC-32 finds every single bit) and drops the copy, reason "checksum".

@@ -38,8 +38,6 @@ _KIND_WORDS = {
     bool: "true or false",
     dict: "a table",
 }
-_UNIT_WORDS = {"s": "in seconds", "pu": "per unit", "Hz": "in hertz"}
-_KNOWN_UNITS = ("us", "ms", "s", "pu", "percent", "kW", "W", "kvar", "kV", "V", "mHz", "Hz")
 
 
 def read_table(struct: type[T], data: Mapping[str, Any]) -> tuple[T, list[Problem]]:
@@ -193,13 +191,6 @@ class _Reader:
     def _unknown(self, key: str, cls: type) -> str:
         """Say what to write instead of an unknown key."""
         known = [*_names(cls)]
-        bare, _, unit = key.rpartition("_")
-        for stem in [key] + ([bare] if unit in _KNOWN_UNITS else []):
-            for right, word in _UNIT_WORDS.items():
-                if f"{stem}_{right}" in known:
-                    return f"unknown {self._noun}; write {stem}_{right}, {word}"
-            if stem != key and stem in known:
-                return f"unknown {self._noun}; write {stem}"
         if f"{key}s" not in known:
             for where, table in _tables(self._root, "", "at the top of the file, before any table"):
                 if table is not cls and key in keys_of(table):

@@ -113,27 +113,17 @@ class Plausible:
         return "; it is per unit of the rating, neither kW nor V" if unit == "pu" and abs(value) > 100 else ""
 
 
-@dataclass(frozen=True)
-class Probability:
-    what: str
-    """Name of the event."""
-    above_zero: bool = False
-    """Whether 0, and all below 1e-12, is an error: the probability divides another number."""
-
-    @property
-    def span(self) -> str:
-        return "above 0, to 1" if self.above_zero else "0 to 1"
-
-    def objection(self, value: float, unit: str = "") -> str:
-        if (1e-12 if self.above_zero else 0.0) <= value <= 1.0:
-            return ""
-        bounds = "above 0 and up to 1" if self.above_zero else "from 0 to 1"
-        return f"{self.what} is a probability {bounds}, got {value:g}{in_percent(value)}"
-
-
 def in_percent(value: float) -> str:
     """Return the end of a sentence about a number from 0 to 1 that was written in percent, "" if it was not."""
     return f"; did you mean {value / 100.0:g} ({value:g} %)?" if 1.0 < value <= 100.0 else ""
+
+
+def Probability(what: str, above_zero: bool = False) -> Plausible:
+    """Return the range of a probability; with `above_zero` it divides another number, so that all below 1e-12 is wrong.
+
+    `what` follows the word, such as "of a loss".
+    """
+    return Plausible(f"the probability {what}", 1e-12 if above_zero else 0.0, 1.0, above_zero, in_percent)
 
 
 _OTHER_UNITS: dict[str, tuple[tuple[float, str], ...]] = {
@@ -293,8 +283,8 @@ class Field(NamedTuple):
         return f"must be a finite number, got {value}" if isinstance(value, float) and not math.isfinite(value) else ""
 
     @property
-    def _allowed(self) -> Plausible | Probability | Range | None:
-        return self.number.mark((Plausible, Probability, Range))  # type: ignore[no-any-return]
+    def _allowed(self) -> Plausible | Range | None:
+        return self.number.mark((Plausible, Range))  # type: ignore[no-any-return]
 
 
 @cache

@@ -86,8 +86,12 @@ def test_a_scenarios_entries_are_read_as_written() -> None:
     [
         ('[[link]]\non = "* -> *"\ndelay = -0.1', "link[0].delay", ["must not be negative, got -0.1 s"]),
         ('[[link]]\non = "* -> *"\ndelay = "20 ms"', "link[0].delay", ["must be a number", "write 0.02"]),
-        ('[[link]]\non = "* -> *"\ndelay_ms = 20', "link[0].delay_ms", ["unknown key", "write delay"]),
-        ('[[link]]\non = "* -> *"\nloss = 30', "link[0].loss", ["0 to 1, got 30", "0.3 (30 %)"]),
+        ('[[link]]\non = "* -> *"\ndelay_ms = 20', "link[0].delay_ms", ["unknown key", 'did you mean "delay"']),
+        (
+            '[[link]]\non = "* -> *"\nloss = 30',
+            "link[0].loss",
+            ["is not plausible for the probability of a loss", "0.3 (30 %)"],
+        ),
         ('[[link]]\non = "* -> *"\nrate = 0', "link[0].rate", ["bytes/s", "not bits"]),
         ('[[link]]\non = "* -> *"\nflap = {up_s = 0, down_s = 1}', "link[0].flap.up_s", ["above 0"]),
         (

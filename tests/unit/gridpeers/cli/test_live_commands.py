@@ -132,7 +132,7 @@ def test_the_plant_hands_every_agent_what_it_needs() -> None:
     ("words", "said"),
     [
         (["set", "inv1", "inv4"], "nothing is to be set; give one of --delay, --jitter (with --delay), --loss,"),
-        (["set", "inv1 -> inv4", "--loss", "20"], "--loss: a loss is a probability from 0 to 1, got 20; did you"),
+        (["set", "inv1 -> inv4", "--loss", "20"], "--loss: 20 is not plausible for the probability of a loss"),
         (["set", "inv1", "inv4", "--delay", "100"], "--delay: 100 s is not plausible for a delay (0 to 10 s); did"),
         (["set", "inv1", "inv4", "--delay", "0.1", "--jitter", "0.2"], "--jitter: must be above 0 s, and at most"),
         (["set", "inv1", "inv4", "--jitter", "0.2"], "--jitter: is around a delay; give --delay too"),

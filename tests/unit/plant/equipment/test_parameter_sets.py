@@ -51,7 +51,7 @@ def test_an_inverters_own_keys_come_before_its_set_and_its_set_before_its_kind(t
         ('[plant.inverter.inv2]\nmodel = "regfm_a1"', r'inv2.model: a GFL has no model "regfm_a1"'),
         ('[plant.inverter.inv1]\nparameters = "regfm_a"', r'no parameter set "regfm_a"; did you mean "regfm_a1"\?'),
         ('[plant.inverter.inv2]\nparameters = "regfm_a1"', r'set "regfm_a1" has .*, which a GFL has not'),
-        ("[plant.inverter.inv1]\nT_p = 0.1", r"plant.inverter.inv1.T_p: unknown key; write T_p_s, in seconds"),
+        ("[plant.inverter.inv1]\nT_p = 0.1", r'plant.inverter.inv1.T_p: unknown key; did you mean "T_p_s"'),
         (
             "[plant.inverter.inv1]\nP_min_pu = 1.1",
             r"inv1.P_min_pu: 1.1 pu must be below P_max_pu = 1 pu; .*\[plant.gfm\]",

@@ -195,7 +195,7 @@ def test_factors_and_an_inverters_own_data_reach_the_plant_and_the_agents(tmp_pa
     ("keys", "said"),
     [
         ("m_p_factor = 0", "plant.m_p_factor: 0 is not plausible for a factor on droops (0.01 to 100)"),
-        ("inverter.inv3.m_p = 0.02", "plant.inverter.inv3.m_p: unknown key; write m_p_pu, per unit"),
+        ("inverter.inv3.m_p = 0.02", 'plant.inverter.inv3.m_p: unknown key; did you mean "m_p_pu"'),
         ("inverter.inv3 = {}", "plant.inverter.inv3: changes nothing; give it one of m_p_pu, m_q_pu, P_rated_kW"),
         ("inverter = 3", "plant.inverter: must be written as tables [plant.inverter.NAME], got 3"),
     ],

@@ -21,7 +21,7 @@ ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
     ("old", "new", "said"),
     [
         ("seed = 1", "seeed = 1", r'mine.toml:\d+: seeed: unknown key; did you mean "seed"\?'),
-        ("T_c_s = 0.02", "T_c = 0.02", r"time.T_c: unknown key; write T_c_s, in seconds"),
+        ("T_c_s = 0.02", "T_c = 0.02", r'time.T_c: unknown key; did you mean "T_c_s"'),
         ("T_c_s = 0.02", "T_c_s = 0", r"time.T_c_s: a control period must be above 0, got 0 s"),
         ("T_c_s = 0.02", 'T_c_s = "20 ms"', r'time.T_c_s: must be a number, got "20 ms"; write 0.02'),
         ("T_c_s = 0.02", "T_c_s = nan", r"time.T_c_s: a control period must be a finite number"),

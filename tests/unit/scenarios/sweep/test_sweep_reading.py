@@ -151,7 +151,7 @@ def test_a_scenario_beside_the_sweep_is_found_and_its_problems_are_told(sweep_fi
     (tmp_path / "base.toml").write_text("[time]\nend_s = 1.0\nT_c = 0.02\n")
     found = problems_of(sweep_file('scenario = "base.toml"\nseeds = 0'))
 
-    assert any("base.toml:3: time.T_c: unknown key; write T_c_s" in problem for problem in found)
+    assert any('base.toml:3: time.T_c: unknown key; did you mean "T_c_s"' in problem for problem in found)
     assert any("seeds: must be from 1" in problem for problem in found)
 
 
