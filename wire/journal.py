@@ -1,9 +1,8 @@
 """A node's journal: what went into its core and what came out, as a stream of entries, for a recorder. Pure.
 
-The record of a run is what went into the pure cores and what came out of them; the same cores compute everything else
-again. A node therefore notes the bytes that it sends, what it hears, tokens that come and go, and the inputs of each
-decision. An entry is a msgpack array whose first value names its kind; entries follow each other without a frame, so a
-journal is cut at any entry and joined to the next part. `gridpeers.wire.messages.Journal` carries one part.
+A node notes the bytes that it sends, what it hears, tokens that come and go, and the inputs of each decision: the same
+cores compute everything else again. An entry is a msgpack array whose first value names its kind; entries follow each
+other without a frame, so a journal may be cut at any of them. `gridpeers.wire.messages.Journal` carries one part.
 
 Three rules keep it small, because in simulated time a tick must not wait for its journal:
 

@@ -2,15 +2,12 @@
 
 - A liveliness token, `alive/agent/<name>/<instance>`, identifies a process. Of two of one name the first counts,
   until its token is gone; in simulated time the plant's roster may select another one.
-- A *name* is valid under its own keys only.
-- An *epoch* (`epoch` in messages) identifies one process. The plant's token contains it; an agent's nameplate, asked
-  of the one process that holds the token, contains it. It is learnt once. A message of any other epoch is a ghost's.
-  Epochs are compared only for equality, so no host's clock decides which process is believed.
+- An *epoch* (`epoch` in messages) identifies one process: the plant's token contains it, and so does the nameplate of
+  an agent's process. It is learnt once, and compared only for equality, so no host's clock decides who is believed.
 - *Numbers* rise within an epoch.
 
-A message is checked as it comes off the wire and, if an emulated link held it, again when the link delivers it. This is
-no protection against an attacker who listens and then sends under another's name, in its epoch and with its next
-number: that needs certificates (docs/security.md).
+A message is checked as it comes off the wire and, if an emulated link held it, again when the link delivers it. An
+attacker who sends under another's name and epoch with its next number passes, without certificates.
 """
 
 from __future__ import annotations
@@ -190,14 +187,10 @@ class Membership:
         self._update(name)
         return True
 
-    @property
-    def unmet(self) -> list[tuple[str, str]]:
-        every = ((name, instance) for name, instances in self._instances.items() for instance in instances)
-        return [process for process in every if process not in self._answers]
-
     def next_unmet(self) -> list[tuple[str, str]]:
         """Return the next of the processes that have not answered; all come in turn."""
-        unmet = self.unmet
+        every = ((name, instance) for name, instances in self._instances.items() for instance in instances)
+        unmet = [process for process in every if process not in self._answers]
         begin = self._asked if self._asked < len(unmet) else 0
         self._asked = begin + ASKED_AT_ONCE
         return unmet[begin : self._asked]

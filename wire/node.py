@@ -1,20 +1,8 @@
 """A node: one participant of a run, on either side and under either kind of time. Messages in, actions out. Pure.
 
 A node is sans-IO. A driver (`gridpeers.wire.driver.drive` over Zenoh, `gridpeers.scenarios.drivers.inprocess` on a bus)
-owns it in one thread and does
-
-    node.start(now)                                         before all else
-    node.appeared(key, now) | node.vanished(key, now)       for a liveliness token that appears or vanishes
-    node.received(key, payload, now)                        for a message, or the answer to a `Fetch`
-    node.work(now)                                          for at most one piece of work, if it is ready
-    for action in node.take_actions(): ...                  to perform the actions, in this order
-    node.expire(now)                                        when `node.deadline` has passed
-    node.lost(loss, now)                                    for messages that it has dropped unread
-    for line in node.take_rejects(): ...                    for its log
-
-until `node.finished`, the last actions included. `now` is the driver's clock (s).
-
-A node has a post (`gridpeers.wire.post`), which checks and routes its messages and collects its actions.
+owns it in one thread, calls the methods of `Core` with its clock (s), and performs the actions in their order, until
+the node has finished. Its post (`gridpeers.wire.post`) checks and routes its messages and collects its actions.
 """
 
 from __future__ import annotations
@@ -93,8 +81,12 @@ class Core(Protocol):
     def vanished(self, key: str, now: float) -> None: ...
     def received(self, key: str, payload: bytes, now: float) -> None: ...
     def lost(self, loss: Loss, now: float) -> None: ...
-    def work(self, now: float) -> bool: ...
-    def expire(self, now: float) -> None: ...
+
+    def work(self, now: float) -> bool:
+        """Do at most one piece of work, if one is ready; return whether it did."""
+
+    def expire(self, now: float) -> None:
+        """Act, as the deadline has passed."""
 
 
 CLOCK_ALONE = 1 << 30

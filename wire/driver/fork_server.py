@@ -3,16 +3,13 @@
     python -m gridpeers.wire.driver.fork_server SOCKET MODULE ...
 
 `SOCKET` is the number of an inherited Unix socket, where the requests of `gridpeers.scenarios.drivers.forking` arrive.
-Each `MODULE` is imported at the start; of `MODULE:FUNCTION` the function is called too. Then each request, a JSON
-object with the words of a command line (`agents`, `--leash`, `inv1`) and three open files, becomes a process that runs
-the module as `python -m` would: with these as its standard input, output and error, in a session of its own.
+Each `MODULE` is imported at the start; of `MODULE:FUNCTION` the function is called too. Then each request, the words of
+a command line (`agents`, `--leash`, `inv1`) as JSON and three open files, becomes a process that runs the module as
+`python -m` would: with these as its standard input, output and error, in a session of its own.
 
-**Whose child it is.** The server forks twice and the process between ends at once, so that the new process becomes a
-child of the one that asks, the next subreaper above (`prctl(2)`). That one waits for it and learns its exit status as
-of any child. Nothing depends on the server once it has answered: it may die.
-
-**Why forking is safe here.** The server has one thread, and no session: each process opens its own. Before each fork
-the server checks that it is alone.
+The server forks twice and the process between ends at once, so that the new process becomes a child of the one that
+asks, the next subreaper above (`prctl(2)`). Forking is safe here: the server has one thread, which it checks, and no
+session.
 """
 
 from __future__ import annotations

@@ -47,10 +47,8 @@ LOSSLESS = 8
 class Inbox:
     """Queue events from Zenoh's threads to the owner's.
 
-    The owner states how many messages it needs to continue, and wakes only then: in a full mesh of nine this is one
-    wake a tick instead of nine, and half of the time of a tick. Any other event wakes it at once.
-
-    `lossless` is for simulated time, where none may be lost.
+    The owner states how many messages it needs to continue, and wakes only then: in a full mesh of nine this halves the
+    time of a tick. Any other event wakes it at once. `lossless` is for simulated time, where no message may be lost.
     """
 
     def __init__(self, *, lossless: bool = False) -> None:
