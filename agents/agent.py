@@ -157,18 +157,6 @@ class Agent:
         if self._detector is not None:
             self._detector.forget(name)
 
-    def taken_over(self, config: AgentConfig, law: Law | None = None) -> Agent:
-        """Return an agent under another rule of control that goes on from here, for a replay that asks what would be.
-
-        It knows the same nameplates and states, and its law begins anew from the same set-points.
-        """
-        agent = Agent(config, law)
-        agent._known = {**self._known, config.name: agent.nameplate}
-        agent.heard.update(self.heard)
-        agent._P_set, agent._V_set = self.set_points or (None, None)
-        agent._islands, agent._sent_at = self._islands, self._sent_at
-        return agent
-
     @property
     def set_points(self) -> tuple[float, float] | None:
         """Own set-points (W, V); None before the first tick and after a pause, when those of the measurement count."""

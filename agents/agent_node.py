@@ -77,9 +77,6 @@ class AgentTickPolicy(TickPolicy, Protocol):
 
     def new_session(self) -> None: ...
 
-    def changed(self) -> None:
-        """Take the agent's new rule of control."""
-
     def gone(self, name: str) -> TickVerdict:
         """Note that a process is gone; of the plant, say what follows."""
 
@@ -348,11 +345,3 @@ class AgentNode:
             self.stopped, self.failed = stopped, failed
             self.phases.on("end")
             self.post.closed = True
-
-    def change(self, config: AgentConfig, law: Law | None = None) -> None:
-        """Go on under another rule of control, in a replay that asks what would have been; see `Agent.taken_over`."""
-        self._config, self._agent = config, self._agent.taken_over(config, law)
-        self._agent.rejects, self.heard.agent = self.rejects, self._agent
-        if self._decisions is not None:
-            self._decisions = DecisionJournal(self._agent, self._decisions.journal)
-        self.policy.changed()

@@ -109,9 +109,6 @@ class AgentBarrier:
     def new_session(self) -> None:
         """Do nothing: a run ends with a session."""
 
-    def changed(self) -> None:
-        """Do nothing: neighbours change with the roster."""
-
     def gone(self, name: str) -> TickVerdict:
         """Note that a process is gone: nothing of it is waited for."""
         if name == PLANT:

@@ -153,9 +153,6 @@ class AgentTimer:
         self._heard.clear()
         self.upkeep.new_session()
 
-    def changed(self) -> None:
-        self.meeting.listen()
-
     def gone(self, name: str) -> TickVerdict:
         """Note that a process is gone."""
         if name == PLANT:
@@ -238,7 +235,7 @@ class AgentTimer:
         if measurement is None or agent.fault:
             return None
         heard, neighbours, upkeep, at = self._heard, self.meeting.neighbours, self.upkeep, self.at
-        limit = agent.config.control.degraded_communication.max_age or self._config.max_age
+        limit = self._config.control.degraded_communication.max_age or self._config.max_age
         ages = {name: age for name in neighbours if (age := heard.age(name, at)) <= limit}
         before = agent.set_points
         state = replace(agent.tick(measurement, tuple(ages), ages), seq=upkeep.sent)

@@ -66,7 +66,7 @@ class ChangedRule:
     feeder: Tables
     case: str
     control: Control | None
-    """Rule of control of every agent; None keeps that of the record."""
+    """Rule of control of every agent, from the start; None keeps that of the record."""
     links: dict[str, Any] | None
     """Configuration of the emulated links, of the whole run; None keeps that of the record."""
     changes: Changes
@@ -74,8 +74,6 @@ class ChangedRule:
     def unwritten(self, *, clock: str) -> Iterator[str]:
         if not self.links_written:
             yield "The changes of links are not in this file: their entries would contradict others."
-        if self.control is not None and (since := self.changes.since) > 0.0:
-            yield f"Law, gains and graph hold from the start here; in what would have been, from {since:g} s on."
         if clock == "wall":
             yield "Not in this file: delays and losses on the wire, and what people did; a run of it has its own."
 
@@ -112,10 +110,10 @@ def changed_rule(record: RunRecord, changes: Changes) -> ChangedRule:
         cuts = (Fault(on=pattern, cut=True, from_s=since) for pattern in changes.without)
         netem = replace(netem, links=(*netem.links, *cuts))
     control, as_it_was = (configs(scenario, feeder, case)[1][0].control for scenario in (after, before))
-    if control != as_it_was and since > 0.0 and record.info.simulated:
+    if control != as_it_was and since > 0.0:
         raise ReplayError(
-            "in simulated time the law, its gains and the graph change from the start of the run only: leave the time "
-            "out, or take a record of a run in real time; links can change at any time"
+            "the law, its gains and the graph change from the start of the run only: leave the time out; links can "
+            "change at any time"
         )
     written = after if netem == netem_before else _written(record, _with_links(after, case, netem))
     title = f"what would have been, {changes}" if changes else after.cases[case].title

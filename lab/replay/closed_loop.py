@@ -17,7 +17,7 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from gridpeers.agents.agent_config import AgentConfig, nameplate_of
+from gridpeers.agents.agent_config import nameplate_of
 from gridpeers.agents.agent_node import AgentNode
 from gridpeers.agents.carriers.law_registry import close_laws
 from gridpeers.agents.graphs import in_neighbours, rule_of
@@ -31,8 +31,6 @@ from gridpeers.lab.replay.recorded_process import (
     ReplayedProcess,
     ReplayError,
     agent_again,
-    agent_as_run,
-    law_again,
     made_here,
     plant_again,
     processes_of,
@@ -80,7 +78,6 @@ class LoopProcess:
     def __init__(self, recorded: RecordedProcess) -> None:
         self.recorded, self.name = recorded, recorded.name
         self.again: ReplayedProcess | None = None
-        self.config: AgentConfig | None = None
         self._steps: Iterator[RecordedStep] = recorded.steps()
         self.head: RecordedStep | None = next(self._steps, None)
         self._sent: dict[str, int] = {}
@@ -201,9 +198,9 @@ class ClosedLoop:
         if config is None or not step.instance:
             self._note(f"the record lacks the start of {process.name}, so that its states are as recorded")
             return
-        if self._changed and self._control is not None:
+        if self._control is not None:
             config = replace(config, control=self._control)
-        process.config, links = config, self._links(process.name, config.links)
+        links = self._links(process.name, config.links)
         process.again = agent_again(process.recorded, config, step.instance, self._laws, links)
 
     def _links(self, name: str, recorded: dict[str, Any]) -> Links | None:
@@ -245,10 +242,6 @@ class ClosedLoop:
                 links = links_of(process.name, self._netem)
                 assert links is not None
                 again.use_links(links)
-            if self._control is not None and process.config is not None and process.agent is not None:
-                config = replace(agent_as_run(process.config, process.recorded.epoch), control=self._control)
-                self._laws.append(law_again(config))
-                process.agent.change(config, self._laws[-1])
 
     # ---------------------------------------------------------------- messages
 

@@ -277,19 +277,12 @@ def made_here(failing: str, errors: tuple[type[Exception], ...] = (ValueError,))
 def agent_again(
     recorded: RecordedProcess, config: AgentConfig, instance: str, laws: list[Law], links: Links | None
 ) -> ReplayedProcess:
-    laws.append(law_again(config))
-    with made_here(f"{config.name}: cannot be made again here"):
-        return ReplayedProcess(AgentNode(agent_as_run(config, recorded.epoch), instance, links, laws[-1]), links)
-
-
-def law_again(config: AgentConfig) -> Law:
     with made_here(f"{config.name}: its law cannot be made here"):
-        return make_law(config.control)
-
-
-def agent_as_run(config: AgentConfig, epoch: int) -> AgentConfig:
-    """Return a configuration for a replay; its deadline is that of a process, which has found its plant in this run."""
-    return replace(config, epoch=epoch, record="physics", deadline=0.0)
+        laws.append(make_law(config.control))
+    # the deadline is that of a process, which has found its plant in this run
+    config = replace(config, epoch=recorded.epoch, record="physics", deadline=0.0)
+    with made_here(f"{config.name}: cannot be made again here"):
+        return ReplayedProcess(AgentNode(config, instance, links, laws[-1]), links)
 
 
 def plant_again(recorded: RecordedProcess, info: RecordInfo, plant: LivePlant, links: Links | None) -> ReplayedProcess:

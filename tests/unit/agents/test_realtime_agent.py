@@ -5,10 +5,7 @@ from itertools import pairwise
 import pytest
 from msgspec.structs import replace
 
-from gridpeers.scenarios.record.journal_reader import entries_of
-from gridpeers.wire.journal import Decision
 from gridpeers.wire.messages import Leave, Stop
-from tests.toy.toy_configs import agent_config
 from tests.unit.agents.realtime_lab import KEYS, T_C, Lab, running
 
 
@@ -222,18 +219,3 @@ def test_a_message_on_which_the_agent_fails_costs_only_itself() -> None:
     assert "in broken" in line
     assert "\x1b" not in line
     assert len(lab.decided()) == 1
-
-
-def test_under_another_rule_it_notes_the_states_that_come_then() -> None:
-    """A counterfactual replay changes the rule: the journal follows the agent that decides."""
-    lab = running("inv2", record="all")
-    lab.side.change(replace(agent_config("inv1"), clock="wall", record="all"))
-    lab.meet("inv3")
-    lab.state("inv3", 7)
-    lab.measure(1)
-    lab.go(T_C)
-    assert lab.side.post.journal is not None
-    entries = [entry for part in lab.side.post.journal.take_parts() for entry in entries_of(part)]
-    decision = [entry for entry in entries if isinstance(entry, Decision)][-1]
-
-    assert dict(zip(decision.neighbours, decision.states, strict=True)) == {"inv2": None, "inv3": 7}
