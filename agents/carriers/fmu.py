@@ -19,7 +19,6 @@ import re
 import shutil
 import sys
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
 from pathlib import Path
 from tempfile import mkdtemp
 from typing import Any
@@ -28,7 +27,7 @@ import msgspec
 from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import LawChoice, SharedQuantity
-from gridpeers.agents.carriers.program import ProgramLaw, ProgramReady
+from gridpeers.agents.carriers.program import ProgramLaw
 from gridpeers.agents.laws.call import LawError, decide, start_law
 from gridpeers.agents.laws.law import LIMITS, NOTHING_SHARED, Law, Neighbour, Own, SetPoints, limits_in
 from gridpeers.wire.messages import SHARED_LIMIT
@@ -136,37 +135,12 @@ class FmuLaw(ProgramLaw):
             raise
         self._patience = max(10.0, self._patience)  # s, to be loaded
 
-    def load(self) -> None:
-        """Wait until the FMU is loaded; raise LawError if it cannot be."""
-        self._ask({"type": "load"}, ProgramReady, 0.0)
-
     def close(self) -> None:
         super().close()
         shutil.rmtree(self._unpacked, ignore_errors=True)
 
     def _says(self, error: str, what: str) -> str:
         return printable(error, 300)
-
-
-def load_problem(path: Path) -> str:
-    """Return why an FMU cannot be loaded, "" if it can; the answer is kept as long as the file is the same."""
-    about = path.stat()
-    return _load_problem(str(path.absolute()), about.st_mtime_ns, about.st_size)
-
-
-@lru_cache(maxsize=64)
-def _load_problem(path: str, changed: int, size: int) -> str:
-    try:
-        law = FmuLaw(LawChoice(fmu=path))
-    except ValueError as error:
-        return str(error)
-    try:
-        law.load()
-    except LawError as error:
-        return f"law {Path(path).name} cannot be instantiated: {error}"
-    finally:
-        law.close()
-    return ""
 
 
 class LoadedFmu(Law):
@@ -276,8 +250,6 @@ def main(path: str, folder: str) -> None:
 
 
 def _answer(law: LoadedFmu, asked: dict[str, Any]) -> dict[str, Any]:
-    if asked["type"] == "load":
-        return {"type": "ready"}
     own = Own(**asked["own"])
     if asked["type"] == "start":
         law.take(asked["parameters"])

@@ -70,10 +70,10 @@ def _class_problems(choice: LawChoice, parameters: Mapping[str, Any]) -> list[Pr
     if found := read_parameters(law, parameters)[1]:
         return found
     try:
-        failed = make_limited(law, parameters, choice.time_limit).close_failure()
+        make_limited(law, parameters, choice.time_limit).close()
     except ValueError as error:
         return [Problem("use", f"{choice.use} {error}")]
-    return [Problem("use", f"the close of {choice.use} failed: {failed}")] if failed else []
+    return []
 
 
 def _program_problems(choice: LawChoice, parameters: Mapping[str, Any]) -> list[Problem]:
@@ -89,8 +89,6 @@ def _program_problems(choice: LawChoice, parameters: Mapping[str, Any]) -> list[
 
 
 def _fmu_problems(choice: LawChoice, parameters: Mapping[str, Any]) -> list[Problem]:
-    from gridpeers.agents.carriers.fmu import fmu_problems, load_problem
+    from gridpeers.agents.carriers.fmu import fmu_problems
 
-    path = Path(choice.folder) / choice.fmu
-    found = [Problem(*problem) for problem in fmu_problems(path, parameters)]
-    return found or [Problem("fmu", text) for text in [load_problem(path)] if text]
+    return [Problem(*problem) for problem in fmu_problems(Path(choice.folder) / choice.fmu, parameters)]

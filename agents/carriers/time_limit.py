@@ -101,16 +101,8 @@ class TimeLimited(Law):
 
     def close(self) -> None:
         """End the law; the run is over, so that one that fails in it is but named in the log."""
-        if failed := self.close_failure():
-            logging.getLogger(__name__).warning("law %s: close failed: %s", type(self.carried).__name__, failed)
-
-    def close_failure(self) -> str:
-        """End the law, and return why it failed in it; "" if it did not."""
         try:
             with limited("it", self._time_limit, self._limit):
                 self.carried.close()
-        except LawError as error:
-            return str(error)
         except ANYTHING as error:
-            return named(error)
-        return ""
+            logging.getLogger(__name__).warning("law %s: close failed: %s", type(self.carried).__name__, named(error))

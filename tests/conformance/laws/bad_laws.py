@@ -78,15 +78,6 @@ class NeverMade(Held):
             pass
 
 
-class NeverClosed(Held):
-    """Never ends."""
-
-    def close(self) -> None:
-        """Go on."""
-        while True:
-            pass
-
-
 class NamedAsAKey(Held):
     """Has a parameter that no scenario can give."""
 

@@ -89,22 +89,14 @@ def test_an_fmu_of_fmi_3_gives_the_history_of_the_class(fmi3: dict[str, str]) ->
     assert carried.sha256 == scenario.replace(k_p).run("IV").sha256
 
 
-@pytest.mark.parametrize(
-    ("kind", "library", "said"),
-    [
-        ("Boolean", b"", f"{NAME}.fmu has own_leader as Boolean; declare it as a scalar Float64"),
-        ("Float64", b"no library", f"law {NAME}.fmu cannot be instantiated: "),
-    ],
-)
-def test_an_fmu_that_cannot_be_a_law_is_told_before_the_run(
-    kind: str, library: bytes, said: str, tmp_path: Path
-) -> None:
-    """A variable of another type, and a library that cannot be loaded: one line at its key, and no traceback."""
+def test_an_fmu_that_cannot_be_a_law_is_told_before_the_run(tmp_path: Path) -> None:
+    """A variable of another type: one line at its key, and no traceback."""
     fmpy, here = pytest.importorskip("fmpy"), Path.cwd()
     with zipfile.ZipFile(tmp_path / f"{NAME}.fmu", "w") as packed:
-        packed.writestr("modelDescription.xml", described(kind))
-        packed.writestr(f"binaries/{fmpy.platform_tuple}/{NAME}{fmpy.sharedLibraryExtension}", library)
+        packed.writestr("modelDescription.xml", described("Boolean"))
+        packed.writestr(f"binaries/{fmpy.platform_tuple}/{NAME}{fmpy.sharedLibraryExtension}", b"")
 
-    with pytest.raises(gp.ScenarioError, match=re.escape(f"case.IV.law.fmu: {said}")):
+    said = f"case.IV.law.fmu: {NAME}.fmu has own_leader as Boolean; declare it as a scalar Float64"
+    with pytest.raises(gp.ScenarioError, match=re.escape(said)):
         written({"fmu": f"{NAME}.fmu", "folder": str(tmp_path)})
     assert Path.cwd() == here

@@ -13,7 +13,7 @@ from time import monotonic
 import pytest
 
 from gridpeers.agents.agent_config import LawChoice
-from gridpeers.agents.carriers.fmu import FmuLaw, fmu_problems, load_problem
+from gridpeers.agents.carriers.fmu import FmuLaw, fmu_problems
 from gridpeers.agents.carriers.law_registry import close_laws
 from gridpeers.agents.carriers.program import LEAVING, ProgramLaw
 from gridpeers.agents.laws.call import LawError, decide, start_law
@@ -78,7 +78,6 @@ def test_an_fmu_that_cannot_be_loaded_is_told(
             other.writestr(name, whole.read(name)[:1000] if name.startswith("binaries/") else whole.read(name))
     with pytest.raises(LawError, match=r"ended at the start at t = 0 s with signal|OSError: "):
         steps(place / NAME, 0)
-    assert load_problem(place / NAME).startswith(f"law {NAME} cannot be instantiated: ")
     (place / NAME).write_bytes((folder / NAME).read_bytes()[:-1000])
     with pytest.raises(LawError, match="BadZipFile"):
         steps(place / NAME, 0)

@@ -153,7 +153,6 @@ def _text(path: Path) -> str:
     (f"{BAD}:WrongStep", r"WrongStep is no law: write its method step\(self, own, neighbours, T\): too many"),
     (f"{BAD}:Unmakeable", r"Unmakeable cannot be made: RuntimeError: no licence"),
     ({"use": f"{BAD}:NeverMade", "time_limit_s": 0.01}, r"cannot be made: its __init__ took longer than 0.1 s, ten t"),
-    ({"use": f"{BAD}:NeverClosed", "time_limit_s": 0.01}, r"the close of .*:NeverClosed failed: it took longer than t"),
     (f"{BAD}:NamedAsAKey", r"is no law: its parameter folder cannot be given, as a scenario has the key folder for s"),
     ({"use": f"{BAD}:Failing", "gain": 500}, r"case.IV.law.gain: must be from 0 to 100 1/s, got 500"),
     ({"use": "consensus", "k_p": 1.0}, r"case.IV.law.k_p: the parameters of .consensus. are those of \[gains\]"),
