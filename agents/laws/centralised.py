@@ -58,6 +58,7 @@ class Centralised(Law):
 
     omega: Annotated[float, SHARED, Unit("pu"), "Correction of frequency, of the centre."]
     E: Annotated[float, SHARED, Unit("pu"), "Correction of voltage, of the centre."]
+    v: Annotated[float, SHARED, Unit("pu"), "Terminal voltage, of all others."]
 
     def __init__(self, **parameters: Any) -> None:
         super().__init__(**parameters)
@@ -76,12 +77,12 @@ class Centralised(Law):
             if other.name == self.centre and {"omega", "E"} <= other.shared.keys():
                 P_set, V_set = other.shared["omega"] / own.m_p, 1.0 + other.shared["E"]
                 terms = partial(_terms_of_correction, own, P_set, V_set, other.name)
-                return SetPoints(P_set, V_set, {"V": own.V}, True, terms)
-        return SetPoints(own.P_set, own.V_set, {"V": own.V}, True, Terms)
+                return SetPoints(P_set, V_set, {"v": own.V}, True, terms)
+        return SetPoints(own.P_set, own.V_set, {"v": own.V}, True, Terms)
 
     def _mean_error(self, own: Own, neighbours: Sequence[Neighbour]) -> float:
         """Return the error of the mean of the voltages that the centre knows (pu)."""
-        voltages = [own.V, *(other.shared["V"] for other in neighbours if "V" in other.shared)]
+        voltages = [own.V, *(other.shared["v"] for other in neighbours if "v" in other.shared)]
         return 1.0 - sum(voltages) / len(voltages)
 
 

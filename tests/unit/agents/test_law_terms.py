@@ -41,7 +41,7 @@ def owns(draw: st.DrawFn) -> Own:
 def neighbours(draw: st.DrawFn, name: str) -> Neighbour:
     shared = draw(
         st.sampled_from(
-            ({}, {"V": 1.02}, {"omega": 0.002}, {"omega": 0.006, "E": 0.01}, {"V": 0.97, "omega": -0.001, "E": -0.02})
+            ({}, {"v": 1.02}, {"omega": 0.002}, {"omega": 0.006, "E": 0.01}, {"v": 0.97, "omega": -0.001, "E": -0.02})
         )
     )
     return Neighbour(
