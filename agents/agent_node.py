@@ -42,7 +42,7 @@ AGENT_PHASES: PhaseTable = {
 
 
 class AgentTickPolicy(TickPolicy, Protocol):
-    """What the node asks beside; each kind of time does in its own way what follows from these events."""
+    """What an agent's node asks beside; each kind of time does in its own way what follows."""
 
     at: float
     """Time of the last measurement or tick (s of run time)."""
@@ -71,10 +71,7 @@ class AgentTickPolicy(TickPolicy, Protocol):
 
     def plant_came(self, now: float) -> None: ...
     def plant_waits(self, message: Waiting | Prepare, now: float) -> None: ...
-
-    def new_plant(self) -> None:
-        """Begin anew with another plant."""
-
+    def new_plant(self) -> None: ...
     def new_session(self) -> None: ...
 
     def gone(self, name: str) -> TickVerdict:
@@ -137,7 +134,7 @@ class AgentNode:
         self.session_broken = False
         self._config, self._instance = config, instance
         self._plant, self._plant_epoch = FollowedPlant(post, self._follow), 0
-        agent = self._agent = Agent(config if realtime else config.by_own_clock(), law)
+        agent = Agent(config if realtime else config.by_own_clock(), law)
         agent.rejects = self.rejects
         self.nameplate = keys.nameplate(name, instance), encode(agent.nameplate)
         """Key of the own queryable, and its answer."""
@@ -201,7 +198,7 @@ class AgentNode:
             return
         if self.phases.allows("new session"):
             self.phases.on("new session")
-        self._agent.restart()
+        self.heard.agent.restart()
         self.routes.clear()
         self.routes.update(self._first_routes)
         self._plant.present.clear()
@@ -311,7 +308,7 @@ class AgentNode:
             elif self.phases.now == "waiting":
                 self.phases.on("measured")
                 policy.joined(measured)
-            state = policy.decide(self._agent, measured, self._decisions, now)
+            state = policy.decide(heard.agent, measured, self._decisions, now)
             if state is not None:
                 self.post.publish(policy.quiet_key if state.quiet else self._state_key, encode(state))
         if policy.ticked(now):

@@ -138,9 +138,7 @@ def replay(
         list[str] | None,
         option("KEY=VALUE", "A key of agents or links, e.g. gains.k_p=0.001; can be repeated.", "--set"),
     ] = None,
-    since: Annotated[
-        float, option("T", "Run time (s) from which links change; 0: the start.", "--from")
-    ] = 0.0,
+    since: Annotated[float, option("T", "Run time (s) from which links change; 0: the start.", "--from")] = 0.0,
     out: Annotated[
         Path | None, option("DIR", "New folder for what would have been; in runs/ when left out.", "--out")
     ] = None,

@@ -69,16 +69,12 @@ def explain(record: RunRecord, agent: str, t: float, events: tuple[PlantEvent, .
     """Explain the decision of an agent that was in force at a run time (s); `events` are the record's, if known."""
     if agent not in record.agents:
         raise RecordFileError(f"{record.path}: there was no agent {agent!s:.64}; agents are {short(record.agents)}")
-    return explained(record, record.decision(agent, t), t, record.events() if events is None else events)
-
-
-def explained(
-    record: RunRecord, decision: RecordedDecision, asked: float, events: tuple[PlantEvent, ...]
-) -> Explanation:
+    decision = record.decision(agent, t)
+    events = record.events() if events is None else events
     return Explanation(
         scenario=record.info.scenario,
         case=record.info.case,
-        asked=asked,
+        asked=t,
         decision=decision,
         neighbours=_accounts(record, decision, events),
         step=law_step(record, decision),
@@ -86,9 +82,9 @@ def explained(
             event
             for event in events
             if decision.t - RECENT <= event.t <= decision.t + 1e-9
-            or (event.subject == decision.agent and decision.t < event.t <= asked)
+            or (event.subject == decision.agent and decision.t < event.t <= t)
         ),
-        aftermath=aftermath(record, decision, asked, events),
+        aftermath=aftermath(record, decision, t, events),
         damage=record.damage,
     )
 
