@@ -8,40 +8,32 @@ from typing import Any, Literal
 import pytest
 from msgspec.structs import replace
 
-from gridpeers.agents.agent import Agent
 from gridpeers.plant import recorder_feed
 from gridpeers.plant.meeting import AGAIN
 from gridpeers.plant.plant_config import ScheduledAction
 from gridpeers.plant.plant_interface import Reading
-from gridpeers.plant.plant_node import PHASES, PlantNode
+from gridpeers.plant.plant_node import PHASES
 from gridpeers.plant.plant_stepper import measurement_of
 from gridpeers.wire.codec import decode, encode
-from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import (
     Answer,
     Command,
     Measurement,
-    Message,
-    PlantEvent,
     Prepare,
     Ready,
-    State,
     Stop,
     Telemetry,
     Waiting,
 )
-from gridpeers.wire.node import Fetch, Publish
 from gridpeers.wire.phases import diagram
-from tests.toy.toy_configs import agent_config, toy_configs
-from tests.toy.toy_plant import ToyPlant
+from tests.toy.toy_configs import toy_configs
+from tests.unit.plant.plant_lab import KEYS, PlantLab
 
-KEYS = Keys("toy")
 NAMES = ("inv1", "inv2", "inv3", "inv4")
-STAYS = "its inverter stays on primary droop at its last set-points"
 
 
-class Lab:
-    """The toy plant with all agents played by the test; the process of an agent is its name."""
+class Lab(PlantLab):
+    """The toy plant in simulated time."""
 
     def __init__(
         self,
@@ -51,46 +43,9 @@ class Lab:
         **changes: Any,
     ) -> None:
         config, _ = toy_configs(n, spares=spares)
-        config = replace(
-            config,
-            **changes,
-            schedule=tuple(ScheduledAction(t=t, inverter=name, action=action) for t, name, action in schedule),
-        )
-        self.toy = ToyPlant(config)
-        self.node = PlantNode(config, self.toy)
-        self.now = 0.0
-        self.sent: list[tuple[str, Message]] = []
-        self.asked: list[tuple[str, ...]] = []
+        actions = tuple(ScheduledAction(t=t, inverter=name, action=action) for t, name, action in schedule)
+        super().__init__(replace(config, **changes, schedule=actions))
         self._read = 0
-        self.node.start(self.now)
-        self.do()
-
-    def do(self) -> None:
-        """Take the actions, and let it work."""
-        while True:
-            for action in self.node.take_actions():
-                if isinstance(action, Publish):
-                    self.sent.append((action.key, decode(action.payload)))
-                elif isinstance(action, Fetch):
-                    self.asked.append(KEYS.parts(action.key)[1:])
-            if not self.node.work(self.now):
-                return
-
-    def token(self, name: str, instance: str = "", *, gone: bool = False) -> None:
-        """A token of an agent comes or goes."""
-        key = KEYS.alive_agent(name, instance or name)
-        (self.node.vanished if gone else self.node.appeared)(key, self.now)
-        self.do()
-
-    def recorder(self, name: str) -> None:
-        """A recorder comes."""
-        self.node.appeared(KEYS.alive_recorder(name), self.now)
-        self.do()
-
-    def hear(self, key: str, message: Message) -> None:
-        """A message comes in."""
-        self.node.received(key, encode(message), self.now)
-        self.do()
 
     def wait(self, seconds: float) -> None:
         """Time passes, and the node is woken when it asks for it."""
@@ -114,27 +69,20 @@ class Lab:
         self._read = len(self.sent)
         return numbers
 
-    def join(self, *names: str) -> None:
-        """Agents come, and answer for their nameplates."""
-        for name in names:
-            self.token(name)
-            self.hear(KEYS.nameplate(name, name), Agent(agent_config(name)).nameplate)
-
     def ready(self, number: int, *names: str) -> None:
         """Agents are ready for a roster."""
         for name in names:
             self.hear(KEYS.ready(name), Ready(sender=name, epoch=1, seq=number, t=0.0))
 
-    def state(self, k: int, *names: str) -> None:
+    def states(self, k: int, *names: str) -> None:
         """States of tick k."""
         for name in names:
-            state = State(sender=name, epoch=1, seq=k, t=round(0.02 * k, 9), P_set=5e4, V_set=277.0, Q=0.0)
-            self.hear(KEYS.state(name), state)
+            self.state(name, k)
 
     def tick(self, count: int) -> None:
         """Let the whole roster do ticks."""
         for _ in range(count):
-            self.state(self.node.stepper.tick, *self.last(Prepare).roster)
+            self.states(self.node.stepper.tick, *self.last(Prepare).roster)
 
     def last(self, kind: type[Any]) -> Any:
         """The last message of a type."""
@@ -144,14 +92,6 @@ class Lab:
         """Processes that were told to close: why, and whether they were refused."""
         stops = [(KEYS.parts(key), message) for key, message in self.sent if isinstance(message, Stop)]
         return {parts[1:]: (message.reason, message.refused) for parts, message in stops if parts[0] == "stop_request"}
-
-    def events(self) -> list[str]:
-        """Notes on agents, once the run has ended."""
-        self.node.abort("enough", self.now)
-        self.do()
-        telemetry = [message for _, message in self.sent if isinstance(message, Telemetry)]
-        noted: list[PlantEvent] = [event for message in telemetry for event in message.events]
-        return [event.text for event in noted if event.kind == "roster"]
 
     @property
     def missing(self) -> list[tuple[str, str]]:
@@ -183,21 +123,14 @@ def ticking(*schedule: tuple[float, str, Literal["leave", "join", "die"]], **cha
 # ---------------------------------------------------------------- who takes part
 
 
-def test_of_two_processes_of_a_name_the_first_takes_part() -> None:
-    """The other is refused."""
-    lab = Lab()
-    lab.token("inv1", "a")
+def test_who_may_come_depends_on_the_time() -> None:
+    """A stranger never, a spare only when the tick is held for it, anybody else once, and only before the start."""
+    lab = Lab((0.1, "inv4", "join"), spares=("inv4",))
+    lab.token("inv1")
     lab.token("inv1", "b")
-
-    assert lab.asked == [("inv1", "a")]
     reason, refused = lab.stopped()["inv1", "b"]
     assert refused
     assert "another agent of this name takes part" in reason
-
-
-def test_who_may_come_depends_on_the_time() -> None:
-    """A stranger never, a spare only when the tick is held for it, anybody else only before the start."""
-    lab = Lab((0.1, "inv4", "join"), spares=("inv4",))
     lab.token("inv9")
     lab.token("inv4")
     assert lab.stopped()["inv9", "inv9"][0].endswith("only for inv1, inv2, inv3, inv4")
@@ -210,7 +143,7 @@ def test_who_may_come_depends_on_the_time() -> None:
     lab.token("inv3", "again")
     assert "the run has begun, at t = 0 s" in lab.stopped()["inv4", "early"][0]
     assert "the run has begun, at t = 0 s" in lab.stopped()["inv3", "again"][0]
-    lab.state(0, "inv1", "inv2")
+    lab.states(0, "inv1", "inv2")
     lab.ready(1, "inv1", "inv2")
     lab.tick(4)
     assert lab.node.phase == "joining"
@@ -235,7 +168,7 @@ def test_before_the_start_agents_and_recorders_are_awaited() -> None:
 def test_everybody_must_be_ready_for_this_roster() -> None:
     """Word on an earlier one is stale; whoever dies after the beginning is not awaited."""
     lab = ticking((0.02, "inv1", "die"))
-    lab.state(0, *NAMES)
+    lab.states(0, *NAMES)
     assert lab.missing == [("Ready(1)", name) for name in NAMES[1:]]
 
     lab.ready(0, "inv2")
@@ -251,10 +184,10 @@ def test_one_state_of_everybody_is_awaited_at_a_tick() -> None:
     lab = ticking()
     assert lab.missing == [("State(0)", name) for name in NAMES]
     assert lab.node.messages_needed == 4
-    lab.state(0, "inv1", "inv4", "inv3")
+    lab.states(0, "inv1", "inv4", "inv3")
     assert (lab.missing, lab.node.messages_needed) == ([("State(0)", "inv2")], 1)
 
-    lab.state(0, "inv2")
+    lab.states(0, "inv2")
     assert lab.node.stepper.tick == 1
     assert lab.last(Measurement).seq == 1
 
@@ -264,8 +197,8 @@ def test_a_state_that_is_not_awaited_is_refused(k: int, kind: str) -> None:
     """One of another tick, and a second one of this tick."""
     lab = ticking()
     lab.tick(4)
-    lab.state(4, "inv1")
-    lab.state(k, "inv1")
+    lab.states(4, "inv1")
+    lab.states(k, "inv1")
 
     assert lab.node.rejects.counts == {kind: 1}
 
@@ -293,7 +226,7 @@ def test_a_nameplate_is_asked_for_again_until_it_comes() -> None:
     for name in NAMES[:3]:
         lab.token(name)
     lab.wait(AGAIN)
-    assert lab.asked == [(name, name) for name in NAMES[:3]] * 2
+    assert lab.fetched == [(name, name) for name in NAMES[:3]] * 2
     lab.join("inv1")
     lab.wait(9.5)
     assert lab.node.stepper.outcome == ""
@@ -302,9 +235,9 @@ def test_a_nameplate_is_asked_for_again_until_it_comes() -> None:
     lab.ready(0, *NAMES[:3])
     lab.tick(1)
     lab.token("inv4")
-    lab.asked.clear()
+    lab.fetched.clear()
     lab.wait(AGAIN)
-    assert lab.asked == [("inv4", "inv4")]
+    assert lab.fetched == [("inv4", "inv4")]
     lab.wait(10.0)
     assert lab.node.stepper.outcome.startswith("plant: no nameplate from inv4 within 10 s")
 
@@ -324,7 +257,7 @@ def test_the_deadline_names_who_is_missing() -> None:
     """The error names agent, message, waiting time and last sign of life; then the run is over for all."""
     lab = ticking()
     lab.now = 3.0
-    lab.state(0, "inv1", "inv3", "inv4")
+    lab.states(0, "inv1", "inv3", "inv4")
     lab.node.expire(lab.node.deadline or 0.0)
     lab.do()
 
@@ -332,21 +265,6 @@ def test_the_deadline_names_who_is_missing() -> None:
         lab.node.stepper.outcome == "plant: no State(0) from inv2 within 10 s; last heard of inv2: tick 0, 10.0 s ago"
     )
     assert lab.node.phase == "closing"
-
-
-# ---------------------------------------------------------------- leaving, joining, dying
-
-
-def test_a_death_while_the_run_goes_on_is_told() -> None:
-    """The run goes on without the dead, and is not reproducible."""
-    lab = ticking()
-    lab.tick(10)
-    lab.token("inv2", gone=True)
-    lab.state(10, "inv1", "inv3", "inv4")
-
-    assert lab.last(Prepare).roster == ("inv1", "inv3", "inv4")
-    assert not lab.node.stepper.reproducible
-    assert lab.events() == [f"inv2 died at t = 0.2 s; {STAYS}"]
 
 
 # ---------------------------------------------------------------- recorders
@@ -396,7 +314,7 @@ def test_the_plant_leaves_once_its_recorder_has_the_end() -> None:
     lab.tick(10)
     for name in NAMES:
         lab.token(name, gone=True)
-    lab.node.vanished(KEYS.alive_recorder("history"), lab.now)
+    lab.recorder("history", gone=True)
     lab.wait(600.0)
     assert lab.node.phase == "recording"
     lab.recorder("history")

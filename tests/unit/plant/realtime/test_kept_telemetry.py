@@ -12,7 +12,8 @@ from msgspec.structs import replace
 from gridpeers.plant.recorder_feed import RecorderFeed
 from gridpeers.scenarios.drivers.telemetry_stream import ASTRAY, TelemetryStream
 from gridpeers.wire.messages import Answer, Command, LinkReport, Message, Telemetry
-from tests.unit.plant.realtime.realtime_lab import KEYS, Lab, running
+from tests.unit.plant.plant_lab import KEYS
+from tests.unit.plant.realtime.realtime_lab import Lab, running
 
 
 class Link:
@@ -81,7 +82,7 @@ def test_a_recorder_that_was_cut_off_has_all_rows_and_reports_in_order_and_once(
     for _ in range(300):
         lab.step()
         link.carry()
-    lab.side.close("enough", lab.now)
+    lab.node.close("enough", lab.now)
     for name in lab.toy.inverters:
         lab.token(name, gone=True)
     link.carry()
@@ -97,7 +98,7 @@ def test_a_recorder_that_was_cut_off_has_all_rows_and_reports_in_order_and_once(
 def test_what_the_plant_has_no_more_is_a_gap_that_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its memory is bounded: after a longer absence the recorder goes on with what there is, and knows it."""
     lab = running(end=None)
-    monkeypatch.setattr(lab.side.feed, "_limit", 4_000)
+    monkeypatch.setattr(lab.node.feed, "_limit", 4_000)
     link = Link(lab)
     lab.step(50)
     link.carry()
@@ -154,21 +155,21 @@ def test_a_plant_waits_at_its_end_for_a_recorder_that_is_out_of_reach() -> None:
     ends: list[Any] = []
     for lost in (True, False):
         lab = Lab(end=None, recorders=("me",))
-        lab.side.appeared(KEYS.alive_recorder("me"), lab.now)
+        lab.node.appeared(KEYS.alive_recorder("me"), lab.now)
         lab.join(*lab.toy.inverters)
         lab.step(5)
         if lost:
-            lab.side.vanished(KEYS.alive_recorder("me"), lab.now)
+            lab.node.vanished(KEYS.alive_recorder("me"), lab.now)
         lab.step(5)
-        lab.side.close("enough", lab.now)
+        lab.node.close("enough", lab.now)
         for name in lab.toy.inverters:
             lab.token(name, gone=True)
         if not lost:
-            lab.side.vanished(KEYS.alive_recorder("me"), lab.now)
-        ends.append(lab.side.finished)
+            lab.node.vanished(KEYS.alive_recorder("me"), lab.now)
+        ends.append(lab.node.finished)
         for _ in range(2):  # what is waited for agents, then for recorders
-            lab.side.expire(lab.side.deadline)
-        ends.append(lab.side.finished)
+            lab.node.expire(lab.node.deadline)
+        ends.append(lab.node.finished)
 
     assert ends == [False, True, True, True]
 
@@ -203,7 +204,7 @@ def test_the_end_of_a_run_does_not_wait_for_what_is_published_again(end: str) ->
     lab.step(2000)
     assert lab.ask("telemetry", "0").ok
     lab.step(2)
-    (lab.side.close if end == "close" else lab.side.interrupt)("enough", lab.now)
+    (lab.node.close if end == "close" else lab.node.interrupt)("enough", lab.now)
     lab.do()
     told: list[Telemetry] = lab.take(Telemetry)
 

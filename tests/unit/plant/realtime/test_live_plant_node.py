@@ -11,7 +11,8 @@ from gridpeers.plant.plant_config import ScheduledAction
 from gridpeers.wire.messages import Measurement, Stop, Telemetry
 from gridpeers.wire.node import Log
 from tests.toy.toy_configs import agent_config
-from tests.unit.plant.realtime.realtime_lab import KEYS, Lab, running
+from tests.unit.plant.plant_lab import KEYS
+from tests.unit.plant.realtime.realtime_lab import Lab, running
 
 
 def test_who_leaves_takes_its_inverter_off_and_who_returns_puts_it_on() -> None:
@@ -23,8 +24,8 @@ def test_who_leaves_takes_its_inverter_off_and_who_returns_puts_it_on() -> None:
     lab.step()
     away = lab.toy.measure()["inv2"].P
     assert [m.to for m in lab.take(Measurement)] == ["inv1", "inv3"]
-    lab.join("inv2", instance="b", life=2)
-    lab.state("inv2", 0, 55e3, life=2)
+    lab.join("inv2", instance="b", epoch=2)
+    lab.state("inv2", 0, 55e3, epoch=2)
     lab.step()
 
     assert away == 0.0
@@ -44,7 +45,7 @@ def test_who_dies_stays_on_primary_droop() -> None:
 
     held = lab.toy.measure()["inv2"].P
     assert held == pytest.approx(60e3)
-    assert lab.side.phase == "running"
+    assert lab.node.phase == "running"
     assert "inv2 died; its inverter stays on primary droop" in lab.events("roster")[-1].text
 
 
@@ -66,7 +67,7 @@ def test_a_second_agent_of_a_name_and_one_of_no_inverter_are_refused() -> None:
     lab = running()
     lab.token("inv2", "b")
     lab.token("inv9", "c")
-    lab.leave("inv2", life=9)
+    lab.leave("inv2", epoch=9)
     lab.step()
     keys = [key for key, message in lab.sent if isinstance(message, Stop)]
     stops: list[Stop] = lab.take(Stop)
@@ -76,7 +77,7 @@ def test_a_second_agent_of_a_name_and_one_of_no_inverter_are_refused() -> None:
     assert stops[0].reason.startswith("inv2: another agent of this name takes part in run toy already")
     assert stops[1].reason == "inv9: no inverter of this name; inverters are inv1, inv2, inv3"
     assert len(lab.take(Measurement)) == 3
-    assert lab.side.rejects.counts["ghost"] == 1
+    assert lab.node.rejects.counts["ghost"] == 1
 
 
 def test_who_leaves_by_the_scenario_is_asked_to_and_who_joins_is_awaited() -> None:
@@ -93,9 +94,9 @@ def test_who_leaves_by_the_scenario_is_asked_to_and_who_joins_is_awaited() -> No
     off = lab.toy.measure()["inv2"].P
     lab.step(6)
     awaited = [(m.t, m.awaited) for m in lab.take(Telemetry) if m.awaited]
-    lab.join("inv2", instance="b", life=2)
+    lab.join("inv2", instance="b", epoch=2)
 
-    assert stops == [(KEYS.stop_request("inv2", "a"), False)]
+    assert stops == [(KEYS.stop_request("inv2", "inv2"), False)]
     assert off == 0.0
     assert awaited == [(0.2, ("inv2",))]
     assert lab.toy.measure()["inv2"].P != 0.0
@@ -107,12 +108,12 @@ def test_a_nameplate_that_does_not_come_is_asked_for_again() -> None:
     lab.token("inv2", gone=True)
     lab.token("inv2", "b")
     lab.step(60)
-    asked = lab.fetched.count(KEYS.nameplate("inv2", "b"))
+    asked = lab.fetched.count(("inv2", "b"))
     lab.hear(KEYS.nameplate("inv2", "b"), replace(Agent(agent_config("inv2")).nameplate, epoch=2))
     lab.step(60)
 
     assert asked == 2
-    assert lab.fetched.count(KEYS.nameplate("inv2", "b")) == 2
+    assert lab.fetched.count(("inv2", "b")) == 2
     assert [m.to for m in lab.take(Measurement)][-1] == "inv2"
 
 
@@ -120,7 +121,7 @@ def test_an_agent_that_comes_while_the_run_ends_is_told_so() -> None:
     """An agent whose session was renewed just then has not heard the end; else it would seek a plant for minutes."""
     lab = Lab()
     lab.join("inv1", "inv2", "inv3")
-    lab.side.abort("the end of it", lab.now)
+    lab.node.abort("the end of it", lab.now)
     lab.do()
     lab.token("inv2", gone=True)
     lab.sent.clear()
@@ -138,17 +139,17 @@ def test_of_thousands_that_are_refused_some_are_told() -> None:
     lab = running(3)
     lab.take(Stop)
     for i in range(5_000):
-        lab.side.appeared(KEYS.alive_agent("inv2", f"x{i}"), lab.now)
-        lab.side.appeared(KEYS.alive_agent(f"who{i}", "x"), lab.now)
-    logged = [action.text for action in lab.side.post.actions if isinstance(action, Log)]
+        lab.node.appeared(KEYS.alive_agent("inv2", f"x{i}"), lab.now)
+        lab.node.appeared(KEYS.alive_agent(f"who{i}", "x"), lab.now)
+    logged = [action.text for action in lab.node.post.actions if isinstance(action, Log)]
     lab.do()
     told = lab.take(Stop)
     lab.now += 1.0
-    lab.side.appeared(KEYS.alive_agent("inv2", "y"), lab.now)
+    lab.node.appeared(KEYS.alive_agent("inv2", "y"), lab.now)
     lab.do()
 
     assert len(told) == REFUSALS
     assert [line.split(": ")[1] for line in logged] == ["refused inv2", "refused who0"]
     assert all(stop.refused for stop in told)
-    assert lab.side.rejects.counts["excess"] == 10_000 - REFUSALS
+    assert lab.node.rejects.counts["excess"] == 10_000 - REFUSALS
     assert len(lab.take(Stop)) == 1

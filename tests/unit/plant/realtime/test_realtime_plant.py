@@ -11,18 +11,19 @@ from gridpeers.plant.realtime.run_commands import COMMANDS
 from gridpeers.wire.driver.drive import StoppedError
 from gridpeers.wire.messages import Answer, Command, Measurement, Stop, Telemetry, Waiting
 from tests.toy.toy_configs import toy_configs
-from tests.unit.plant.realtime.realtime_lab import KEYS, T_C, Lab, running
+from tests.unit.plant.plant_lab import KEYS
+from tests.unit.plant.realtime.realtime_lab import T_C, Lab, running
 
 
 def test_it_begins_when_all_are_there() -> None:
     """Step 0 is due a moment later, and goes to every agent, without a roster."""
     lab = running()
-    assert lab.side.deadline == lab.now + LEAD
+    assert lab.node.deadline == lab.now + LEAD
     lab.step()
     measurements: list[Measurement] = lab.take(Measurement)
 
     assert [(m.to, m.seq, m.t, m.roster) for m in measurements] == [(f"inv{i}", 0, 0.0, ()) for i in (1, 2, 3)]
-    assert lab.side.deadline == pytest.approx(lab.now + T_C)
+    assert lab.node.deadline == pytest.approx(lab.now + T_C)
 
 
 def test_it_waits_only_as_long_as_told() -> None:
@@ -30,7 +31,7 @@ def test_it_waits_only_as_long_as_told() -> None:
     lab = Lab(wait_for_agents=4.0)
     lab.join("inv1", "inv3")
     words = []
-    while lab.side.phase == "gathering":
+    while lab.node.phase == "gathering":
         lab.step()
         words.append([m.waits_for for m in lab.take(Waiting)])
     assert lab.now == pytest.approx(54.0)
@@ -57,7 +58,7 @@ def test_the_last_state_heard_is_held_from_the_next_step_on() -> None:
 
     readings = lab.toy.measure()
     assert [readings[name].P_set for name in lab.toy.inverters] == [61e3, 50e3, 50e3]
-    assert lab.side.rejects.counts["stale"] == 1
+    assert lab.node.rejects.counts["stale"] == 1
 
 
 def test_the_run_lasts_end_over_speed_and_all_are_told() -> None:
@@ -72,18 +73,18 @@ def test_the_run_lasts_end_over_speed_and_all_are_told() -> None:
     assert [stop.reason for stop in lab.take(Stop)] == ["end of the scenario"]
     for name in ("inv1", "inv2", "inv3"):
         lab.token(name, gone=True)
-    assert lab.side.finished
-    assert lab.side.stepper.outcome == ""
+    assert lab.node.finished
+    assert lab.node.stepper.outcome == ""
 
 
 def test_an_interrupted_plant_leaves_its_agents_to_the_next_one() -> None:
     """SIGTERM: the last telemetry goes out, but no Stop."""
     lab = running()
     lab.step()
-    lab.side.interrupt("asked to leave: SIGTERM", 0.0)
+    lab.node.interrupt("asked to leave: SIGTERM", 0.0)
     lab.do()
 
-    assert lab.side.finished
+    assert lab.node.finished
     assert lab.take(Stop) == []
     assert lab.take(Telemetry)[-1].outcome == "asked to leave: SIGTERM"
 
@@ -95,7 +96,7 @@ def test_it_says_once_that_it_cannot_keep_pace() -> None:
     lab.step(10)
     warnings = lab.events("warning")
 
-    assert lab.side.ticks.pacer.report().late == 10
+    assert lab.node.ticks.pacer.report().late == 10
     assert len(warnings) == 1
     assert warnings[0].text.startswith("cannot keep pace at speed 1: 2 of 2 steps (100.0 %) more than")
 
@@ -105,7 +106,7 @@ def test_strict_breaks_the_run_that_cannot_keep_pace() -> None:
     lab = running(strict=True)
     lab.step(2, delay=0.03)
 
-    assert lab.side.stepper.outcome.startswith("plant: cannot keep pace at speed 1: ")
+    assert lab.node.stepper.outcome.startswith("plant: cannot keep pace at speed 1: ")
     assert len(lab.take(Stop)) == 1
 
 
@@ -113,12 +114,12 @@ def test_far_behind_it_puts_its_schedule_off_and_says_how_much() -> None:
     """A frozen plant does not rush through what it has missed; telemetry tells the slip."""
     lab = running()
     lab.step(3)
-    due = lab.side.deadline
+    due = lab.node.deadline
     lab.step(1, delay=3.0)
 
-    assert lab.side.deadline == pytest.approx(due + 3.0 + T_C)
+    assert lab.node.deadline == pytest.approx(due + 3.0 + T_C)
     assert lab.events("warning")[0].text.startswith("fell 3.000 s of wall time behind")
-    assert lab.side.ticks.pacer.report().slipped == pytest.approx(3.0)
+    assert lab.node.ticks.pacer.report().slipped == pytest.approx(3.0)
 
 
 def test_the_end_has_the_number_of_the_warnings_that_came_too_often() -> None:
@@ -126,7 +127,7 @@ def test_the_end_has_the_number_of_the_warnings_that_came_too_often() -> None:
     lab = running()
     for _ in range(7):
         lab.step(1, delay=0.5)
-    lab.side.close("the run was ended by command", lab.now)
+    lab.node.close("the run was ended by command", lab.now)
     lab.do()
     slips = [event.text for event in lab.events("warning") if "behind" in event.text]
 
@@ -140,8 +141,8 @@ def test_a_plant_without_solution_breaks_the_run() -> None:
     lab = running(settings=config.settings)
     lab.step(6)
 
-    assert "no solution at t = 0.1 s" in lab.side.stepper.outcome
-    assert lab.side.stepper.cause is not None
+    assert "no solution at t = 0.1 s" in lab.node.stepper.outcome
+    assert lab.node.stepper.cause is not None
     assert len(lab.take(Stop)) == 1
 
 
@@ -163,27 +164,27 @@ def test_an_ended_run_stays_for_a_recorder_that_stood_still() -> None:
     """One that comes back five seconds after the end still gets all of it, the last telemetry too."""
     lab = Lab(recorders=("r",))
     recorder = KEYS.alive_recorder("r")
-    lab.side.appeared(recorder, lab.now)
+    lab.node.appeared(recorder, lab.now)
     lab.join("inv1", "inv2", "inv3")
     lab.step(10)
-    lab.side.vanished(recorder, lab.now)
+    lab.node.vanished(recorder, lab.now)
     lab.ask("down")
     for name in ("inv1", "inv2", "inv3"):
         lab.token(name, gone=True)
     lab.take(Telemetry)
     lab.now += 5.0
-    lab.side.expire(lab.now)
-    lab.side.appeared(recorder, lab.now)
+    lab.node.expire(lab.now)
+    lab.node.appeared(recorder, lab.now)
     lab.do()
-    assert lab.side.phase == "recording"
+    assert lab.node.phase == "recording"
 
     lab.ask("telemetry", "0")
     again = lab.take(Telemetry)
-    lab.side.vanished(recorder, lab.now)
+    lab.node.vanished(recorder, lab.now)
 
     assert [message.seq for message in again] == list(range(len(again)))
     assert again[-1].final
-    assert lab.side.finished
+    assert lab.node.finished
 
 
 def test_pace_is_not_kept_if_more_than_one_percent_is_late() -> None:
@@ -271,5 +272,5 @@ def test_who_asks_without_end_is_answered_a_bounded_number_of_times() -> None:
     lab.step(3)
 
     assert len(answers) == COMMANDS
-    assert lab.side.rejects.counts["excess"] == 10_000 - COMMANDS
+    assert lab.node.rejects.counts["excess"] == 10_000 - COMMANDS
     assert end.ok

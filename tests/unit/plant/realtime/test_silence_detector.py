@@ -9,7 +9,8 @@ from msgspec.structs import replace
 
 from gridpeers.plant.realtime.silence_detector import SilenceDetector
 from gridpeers.wire.messages import AgentStatus
-from tests.unit.plant.realtime.realtime_lab import KEYS, T_C, Lab, running
+from tests.unit.plant.plant_lab import KEYS
+from tests.unit.plant.realtime.realtime_lab import T_C, Lab, running
 
 NAMES = ("inv1", "inv2", "inv3")
 MAX_AGE = 0.25
@@ -42,7 +43,7 @@ def all_tick(lab: Lab, steps: int, names: Iterable[str] = NAMES) -> None:
     """Steps of the plant, before each of which these agents send a state."""
     for _ in range(steps):
         for name in names:
-            lab.state(name, lab.side.stepper.tick, 50e3)
+            lab.state(name, lab.node.stepper.tick, 50e3)
         lab.step()
 
 
@@ -55,7 +56,7 @@ def test_an_agent_whose_law_has_failed_is_silent_for_that_reason() -> None:
     """It says so in its last state; nobody looks for a broken path then."""
     lab = running(end=None)
     all_tick(lab, 100)
-    lab.state("inv2", lab.side.stepper.tick, 50e3, fault="law mine:Mine: step raised")
+    lab.state("inv2", lab.node.stepper.tick, 50e3, fault="law mine:Mine: step raised")
     all_tick(lab, 20, ("inv1", "inv3"))
 
     assert [text.partition(", at")[0] for _, text in told(lab)] == [
@@ -69,9 +70,9 @@ def test_an_agent_on_the_roster_that_is_not_heard_is_told_once_and_once_when_it_
     all_tick(lab, 100)
     all_tick(lab, 10, ("inv1", "inv3"))
     all_tick(lab, 50)
-    frozen = lab.side.stepper.t - T_C
+    frozen = lab.node.stepper.t - T_C
     all_tick(lab, 60, ("inv1", "inv3"))
-    woken = lab.side.stepper.t
+    woken = lab.node.stepper.t
     all_tick(lab, 10)
 
     (silent_at, silent), (again_at, again) = told(lab)
@@ -101,7 +102,7 @@ def test_two_agents_that_cannot_hear_each_other_are_told_though_the_plant_hears_
     """A cut between hosts: the neighbour's ages say so. It holds on when the token of the one is gone at the other."""
     lab = running(end=None)
     all_tick(lab, 100)
-    cut = lab.side.stepper.t
+    cut = lab.node.stepper.t
     lab.hear(KEYS.status("inv1"), status("inv1", {"inv2": 0.27, "inv3": 0.01}))
     lab.hear(KEYS.status("inv2"), status("inv2", {"inv1": 0.27, "inv3": 0.01}))
     all_tick(lab, 100)

@@ -26,6 +26,7 @@ from gridpeers.wire.post import Post
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
 from tests.unit.agents import realtime_lab as agent_side
+from tests.unit.plant.plant_lab import KEYS
 from tests.unit.plant.realtime import realtime_lab as plant_side
 
 SETUP = EmulationConfig(netem=Netem(), microgrids={"inv1": "mg1", "inv2": "mg1", "inv3": "mg1"})
@@ -102,19 +103,20 @@ def test_a_command_holds_from_one_control_period_later_on_and_is_sent_before_the
     """The plant tells everybody in the wake in which it hears of it; who joins later hears all before he measures."""
     lab = plant_side.Lab(2)
     config, _ = toy_configs(2, end=2.0)
-    lab.side = PlantNode(replace(config, clock="wall"), lab.toy, EmulatedLinks("plant", SETUP))
-    lab.side.start(lab.now)
+    lab.node = PlantNode(replace(config, clock="wall"), lab.toy, EmulatedLinks("plant", SETUP))
+    lab.node.start(lab.now)
     lab.join("inv1")
     lab.join("inv2")
     lab.step(3)
     lab.sent.clear()
-    lab.now = lab.side.deadline
+    assert lab.node.deadline is not None
+    lab.now = lab.node.deadline
     answer = lab.ask("link", CUT)
     lab.step()
     kinds = [type(message) for key, message in lab.sent if key.endswith("/inv1")]
     requests = lab.take(LinkRequest)
     lab.token("inv2", gone=True)
-    lab.join("inv2", instance="b", life=2)
+    lab.join("inv2", instance="b", epoch=2)
     lab.step()
     again = [(key, m.seq) for key, m in lab.sent if isinstance(m, LinkRequest)]
 
@@ -123,7 +125,7 @@ def test_a_command_holds_from_one_control_period_later_on_and_is_sent_before_the
     assert answer.data == {"number": 1, "t": 0.08, "asked": ["inv1", "inv2"], "receivers": ["inv1"]}
     assert kinds == [LinkRequest, Measurement]
     assert [(m.seq, m.t, m.link_command) for m in requests] == [(1, 0.08, CUT)] * len(requests) != []
-    assert again == [(plant_side.KEYS.link_request("inv2"), 1)]
+    assert again == [(KEYS.link_request("inv2"), 1)]
     assert not lab.ask("link", LinkCommand(fault=Fault(on="inv2 -> inv1", loss=20.0)).to_tree()).ok
     assert [event.text for event in lab.events("command")] == ["link command 1: inv2 -> inv1: cut, from t = 0.08 s on"]
 
@@ -135,8 +137,8 @@ def test_a_heal_counts_the_links_that_have_a_fault_and_says_so_if_there_is_none(
     lab = plant_side.Lab(2)
     config, _ = toy_configs(2, end=9.0)
     links = EmulatedLinks("plant", setup)
-    lab.side = PlantNode(replace(config, clock="wall"), ToyPlant(config), links)
-    lab.side.start(lab.now)
+    lab.node = PlantNode(replace(config, clock="wall"), ToyPlant(config), links)
+    lab.node.start(lab.now)
     lab.join("inv1", "inv2")
     lab.ask("link", CUT)
     lab.step()
