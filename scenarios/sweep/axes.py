@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import random
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
@@ -13,10 +12,9 @@ import numpy as np
 
 from gridpeers.scenarios.schema.scenario_errors import Problems
 from gridpeers.scenarios.sweep.paths import flatten
-from gridpeers.scenarios.sweep.sweep_model import GraphAxis, RandomAxis, Sweep, ValueRange
+from gridpeers.scenarios.sweep.sweep_model import GraphAxis, Sweep, ValueRange
 from gridpeers.wire.schema.table_reading import read_table
 from gridpeers.wire.schema.table_schema import fields_of, problems_of
-from gridpeers.wire.wording import suggestion
 
 Edges = tuple[tuple[int, int], ...]  # Pairs i < j, sorted
 
@@ -98,12 +96,12 @@ def of_values(values: Mapping[str, Sequence[Any]]) -> Sequence[Setting]:
 
 
 def own_axes(sweep: Sweep, problems: Problems) -> list[Axis]:
-    """Return the axes of the tables [grid], [zip] and [random]."""
+    """Return the axes of the tables [grid] and [zip]."""
     grid = [
         Axis({path: f"grid.{path}"}, partial(of_values, {path: values}))
         for path, values in _values_of(sweep.grid, "grid", problems).items()
     ]
-    return [*grid, *_zip_axes(sweep.zip, problems), *_random_axes(sweep.random, problems)]
+    return [*grid, *_zip_axes(sweep.zip, problems)]
 
 
 def _zip_axes(table: Mapping[str, Any], problems: Problems) -> list[Axis]:
@@ -180,67 +178,5 @@ def _twice(items: Sequence[Any]) -> Any:
     return None
 
 
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-
-
 def _is_range(value: Any) -> bool:
     return isinstance(value, Mapping) and any(key in value for key in _RANGE)
-
-
-DISTRIBUTIONS = ("uniform", "loguniform", "choice")
-
-
-class Distribution(NamedTuple):
-    name: str
-    of: Sequence[Any]
-    """Bounds, or the choices."""
-
-    def at(self, u: float) -> Any:
-        if self.name == "choice":
-            return self.of[int(u * len(self.of))]
-        low, high = self.of
-        raw = low + (high - low) * u if self.name == "uniform" else low * (high / low) ** u
-        return float(f"{raw:.12g}")
-
-
-def _random_axes(axis: RandomAxis, problems: Problems) -> list[Axis]:
-    keys = {path: _distribution(path, value, problems) for path, value in flatten(axis.keys, _is_distribution)}
-    if keys and not axis.samples and not problems.touch("random.samples"):
-        problems.add("random.samples", "no sample is drawn; write how many, e.g. samples = 100")
-    elif axis.samples and not keys:
-        problems.add("random", "samples are asked for, but no key is drawn; write a table [random.keys]")
-    return [Axis({path: f"random.keys.{path}" for path in keys}, lambda: draw(axis, keys))] if keys else []
-
-
-def draw(axis: RandomAxis, keys: Mapping[str, Distribution]) -> Sequence[Setting]:
-    if axis.method == "latin-hypercube":
-        from scipy.stats import qmc  # takes longer to import than a run takes
-
-        unit = qmc.LatinHypercube(len(keys), rng=axis.seed).random(axis.samples)
-    else:
-        unit = np.random.default_rng(axis.seed).random((axis.samples, len(keys)))
-    columns = zip(keys.items(), unit.T.tolist(), strict=True)
-    return of_values({path: [distribution.at(u) for u in column] for (path, distribution), column in columns})
-
-
-def _distribution(path: str, value: Any, problems: Problems) -> Distribution:
-    """Return the distribution of a key, of use only when no problem is noted."""
-    name, of = next(iter(value.items()), ("", ())) if isinstance(value, Mapping) else ("", ())
-    text = ""
-    if name not in DISTRIBUTIONS or len(value) != 1:
-        hint = suggestion(name, DISTRIBUTIONS, "distributions")
-        text = f"must be one distribution such as {{ uniform = [0.5, 2.0] }}, got {value!r}; {hint}"
-    elif name == "choice":
-        text = "" if isinstance(of, list) and of else f"choice needs a list of values, got {of!r}"
-    elif not (isinstance(of, list) and len(of) == 2 and all(map(_is_number, of)) and of[0] < of[1]):
-        text = f"{name} needs [low, high], two numbers in this order, got {of!r}"
-    elif name == "loguniform" and of[0] <= 0:
-        text = f"loguniform needs bounds above 0, got {of!r}; or use uniform"
-    if text:
-        problems.add(f"random.keys.{path}", text)
-    return Distribution(name, of)
-
-
-def _is_distribution(table: Mapping[str, Any]) -> bool:
-    return not any(isinstance(below, Mapping) for below in table.values())

@@ -39,19 +39,6 @@ class ValueRange(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
         return [float(f"{value:.12g}") for value in raw]
 
 
-class RandomAxis(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Table `[random]`: keys that are drawn together, once per sample."""
-
-    samples: Annotated[int, Range(0, 1_000_000)] = 0
-    """How many samples are drawn."""
-    seed: Annotated[int, Range(low=0)] = 1
-    """Seed of the draws; it has nothing to do with the seed of the scenario."""
-    method: Literal["latin-hypercube", "plain"] = "latin-hypercube"
-    """How: "latin-hypercube" spreads each key's samples evenly over its distribution, "plain" draws each by itself."""
-    keys: dict[str, Any] = {}
-    """Table `[random.keys]`, distributions: {uniform = [low, high]}, {loguniform = [low, high]}, {choice = [...]}."""
-
-
 class GraphAxis(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Table `[graph]`: random connected communication graphs of all inverters, for every case of the sweep."""
 
@@ -84,7 +71,5 @@ class Sweep(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     """Table `[grid]`: every combination of these keys' values: [...] or {from, to, count, spacing = "lin" | "log"}."""
     zip: dict[str, Any] = {}
     """Table `[zip]`: keys that go together, first values with first, so all of one length."""
-    random: RandomAxis = RandomAxis()
-    """Table `[random]`."""
     graph: GraphAxis = GraphAxis()
     """Table `[graph]`."""

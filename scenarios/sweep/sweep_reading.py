@@ -152,7 +152,7 @@ def _own_axes(sweep: Sweep, problems: Problems) -> list[Axis]:
         problems.add(*problem)
     axes = own_axes(sweep, problems)
     if not (axes or sweep.graph.links or sweep.seeds > 1):
-        problems.add("", "nothing is varied; write a table [grid], [zip], [random] or [graph], or seeds = n")
+        problems.add("", "nothing is varied; write a table [grid], [zip] or [graph], or seeds = n")
     return axes
 
 

@@ -6,7 +6,6 @@ import random
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -78,28 +77,6 @@ def test_seeds_follow_that_of_the_scenario(sweep_file: Write) -> None:
     assert mixed == ["mine.toml:1: seeds: seed is set by set.seed already; leave one of them out"]
 
 
-def test_a_latin_hypercube_has_one_sample_in_every_slice(sweep_file: Write) -> None:
-    """Each key's 8 samples fall into the 8 slices of equal probability, by its law; the draws are the seed's."""
-    text = """
-[random]
-samples = 8
-seed = 5
-[random.keys]
-"gains.alpha" = { uniform = [1.0, 3.0] }
-"gains.k_p" = { loguniform = [1e-4, 1e-2] }
-"plant.load_set" = { choice = ["main", "event2"] }
-"""
-    plan, again = read_sweep(sweep_file(text)), read_sweep(sweep_file(text))
-    other = read_sweep(sweep_file(text.replace("seed = 5", "seed = 6")))
-    alpha = np.array([run.scenario.gains.alpha for run in plan.runs])
-    k_p = np.array([run.scenario.gains.k_p for run in plan.runs])
-
-    assert sorted(((alpha - 1.0) / 2.0 * 8).astype(int)) == list(range(8))
-    assert sorted((np.log10(k_p / 1e-4) / 2.0 * 8).astype(int)) == list(range(8))
-    assert sorted(run.scenario.plant.load_set for run in plan.runs) == ["event2"] * 4 + ["main"] * 4
-    assert plan.fingerprint == again.fingerprint != other.fingerprint
-
-
 def test_all_problems_of_samples_are_told_at_once_with_their_values(sweep_file: Write) -> None:
     """An unknown key has a suggestion; a bad value, and one that is bad beside another, name key, line and sample."""
     path = sweep_file('[grid]\n"gains.alpa" = [1.0]\n"time.T_c_s" = [0.02, 20]\n"time.record_s" = [0.01, 0.008]\n')
@@ -133,9 +110,6 @@ BAD: list[tuple[str, str]] = [
     ('[grid]\n"event[1].t_s" = [0.2]', "there is no event[1]; event has 1 entries, from event[0]"),
     ('[grid]\n"case.VI.graph" = ["ring"]', "there is no case.VI; did you mean"),
     ('[grid]\n"gains..k_p" = [1]', "is no path of a key"),
-    ('[random]\nsamples = 3\n[random.keys]\n"gains.k_p" = { unifrom = [1, 2] }', 'did you mean "uniform"?'),
-    ('[random]\nsamples = 3\n[random.keys]\n"gains.k_p" = { uniform = [2, 1] }', "needs [low, high]"),
-    ('[random.keys]\n"gains.k_p" = { uniform = [1, 2] }', "random.samples: no sample is drawn; write how many"),
     ("[graph]\nlinks = [7, 37]", "9 inverters have 8 to 36 links, got 7: fewer cannot join them"),
 ]
 
