@@ -39,7 +39,6 @@ from gridpeers.scenarios.results.run_files import (
     write_whole,
 )
 from gridpeers.scenarios.run_request import Driver
-from gridpeers.scenarios.schema.plugin_keys import with_relative_folders
 from gridpeers.scenarios.schema.scenario_writing import to_toml
 from gridpeers.scenarios.sweep.workers import on_workers
 from gridpeers.wire.driver.command_line import command_line
@@ -216,7 +215,6 @@ class Campaign:
             name=f"{self.base.scenario.name[:16]}-{violated}"[:31],
             title="",
         )
-        scenario = with_relative_folders(scenario, file.parent)
         write_whole(file, to_toml(scenario, {}, [remark.replace("\n", " ") for remark in remarks], terse=True))
         return file
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, get_args
 
@@ -66,11 +65,25 @@ def judges_laws(scenario: ScenarioModel) -> bool:
 def with_folders(scenario: ScenarioModel, folder: Path) -> ScenarioModel:
     """Return the scenario with the folder of each plug-in beside its file, so that any process can find it."""
 
-    def change(key: PluginKey, registry: Registry[Any]) -> PluginKey:
-        named = _labelled(key, registry) if registry in (METRICS, CHECKS) else key
-        return placed(named, registry, folder)
+    def place(key: PluginKey, registry: Registry[Any]) -> PluginKey:
+        return placed(key, registry, folder)
 
-    return with_keys(scenario, change)
+    cases = {
+        name: replace(
+            case, graph=place(case.graph, GRAPHS), law=place(case.law, LAWS), netem=_with_faults(case.netem, folder)
+        )
+        for name, case in scenario.cases.items()
+    }
+    return replace(
+        scenario,
+        paper=place(scenario.paper, BENCHMARKS),
+        law=place(scenario.law, LAWS),
+        metrics=tuple(place(_labelled(key, METRICS), METRICS) for key in scenario.metrics),
+        claims=tuple(place(key, CLAIMS) for key in scenario.claims),
+        checks=tuple(place(_labelled(key, CHECKS), CHECKS) for key in scenario.checks),
+        netem=_with_faults(scenario.netem, folder),
+        cases=cases,
+    )
 
 
 def with_model_folders(data: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
@@ -92,28 +105,6 @@ def with_model_folders(data: Mapping[str, Any], folder: Path) -> Mapping[str, An
     return {**data, "plant": {**plant, **tables}}
 
 
-def with_keys(scenario: ScenarioModel, change: Callable[[PluginKey, Registry[Any]], PluginKey]) -> ScenarioModel:
-    cases = {
-        name: replace(
-            case,
-            graph=change(case.graph, GRAPHS),
-            law=change(case.law, LAWS),
-            netem=_with_faults(case.netem, change),
-        )
-        for name, case in scenario.cases.items()
-    }
-    return replace(
-        scenario,
-        paper=change(scenario.paper, BENCHMARKS),
-        law=change(scenario.law, LAWS),
-        metrics=tuple(change(key, METRICS) for key in scenario.metrics),
-        claims=tuple(change(key, CLAIMS) for key in scenario.claims),
-        checks=tuple(change(key, CHECKS) for key in scenario.checks),
-        netem=_with_faults(scenario.netem, change),
-        cases=cases,
-    )
-
-
 def placed(key: PluginKey, registry: Registry[Any], folder: Path) -> PluginKey:
     """Return a key with the folder of its module, program or FMU, and a decorator's name as `module:Name`."""
     table = table_of(key)
@@ -125,11 +116,11 @@ def placed(key: PluginKey, registry: Registry[Any], folder: Path) -> PluginKey:
     return table | ({"use": use, "folder": folder_of(use, place)} if ":" in use else {"folder": place})
 
 
-def _with_faults(netem: Netem, change: Callable[[PluginKey, Registry[Any]], PluginKey]) -> Netem:
+def _with_faults(netem: Netem, folder: Path) -> Netem:
     links = []
     for fault in netem.links:
         keys = ({**dict(it.parameters), "use": it.use, "folder": it.folder} for it in fault.own)
-        links.append(replace(fault, own=tuple(plugin_of(change(key, FAULTS)) for key in keys)))
+        links.append(replace(fault, own=tuple(plugin_of(placed(key, FAULTS, folder)) for key in keys)))
     return replace(netem, links=tuple(links))
 
 
@@ -260,32 +251,3 @@ def _rosters(scenario: ScenarioModel, feeder: Tables, case: str) -> Iterator[dic
         if event.leave or event.join:
             present = (present - set(event.leave)) | set(event.join)
             yield {row.name: row for row in rows if row.name in present}
-
-
-def with_relative_folders(scenario: ScenarioModel, folder: Path) -> ScenarioModel:
-    """Return a checked scenario for a file that moves with the plug-ins and feeder beside it, by relative paths."""
-    here = folder.resolve()
-
-    def change(key: PluginKey, registry: Registry[Any]) -> PluginKey:
-        table = table_of(key)
-        return table | {"folder": relative(str(table["folder"]), here)} if table.get("folder") else key
-
-    plant = replace(scenario.plant, feeder=relative(scenario.plant.feeder, here))
-    for kind in ("gfm", "gfl"):
-        if place := getattr(plant, kind).folder:
-            plant = replace(plant, **{kind: replace(getattr(plant, kind), folder=relative(place, here))})
-    units = {
-        name: replace(it, own=replace(it.own, folder=relative(place, here)))
-        if (place := given(it.own).get("folder"))
-        else it
-        for name, it in plant.inverter.items()
-    }
-    plant = replace(plant, inverter=units)
-    return with_keys(replace(scenario, plant=plant), change)
-
-
-def relative(place: str, here: Path) -> str:
-    """Return a folder as it is named from another one; the same where they have nothing but the root in common."""
-    if not Path(place).is_absolute() or os.path.commonpath([place, here]) == os.sep:
-        return place
-    return os.path.relpath(place, here)

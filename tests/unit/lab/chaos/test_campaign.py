@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
-import sys
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -12,14 +10,12 @@ import pytest
 
 from gridpeers.lab.chaos import schedules as schedules_of_chaos
 from gridpeers.lab.chaos.campaign import Campaign
-from gridpeers.lab.chaos.chaos_run import ChaosRow
-from gridpeers.plant.tables.read import DATA
 from gridpeers.scenarios.catalogue_files import CATALOGUE
 from gridpeers.scenarios.checks.check_registry import ALWAYS
 from gridpeers.scenarios.schema import load_scenario
 from tests.command_line import invoke
 from tests.unit.lab.chaos.bases import base_in, run_scenario
-from tests.unit.lab.chaos.small_campaign import SMALL, rows_of, small
+from tests.unit.lab.chaos.small_campaign import rows_of, small
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
 
@@ -61,34 +57,6 @@ def test_a_planted_bug_is_found_and_shrunk(elsewhere: Path, monkeypatch: pytest.
     assert f"frequency, run {failure.row.number}: {failure.simplest.violated['frequency']}" in [*campaign.lines()]
     assert again == base_in(failure.file).scenario
     assert "frequency" in run_scenario(base_in(failure.file)).violated
-
-
-def test_a_failure_can_be_moved_with_the_law_check_and_feeder_that_it_names(
-    elsewhere: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """No path of this machine is in its file: in another place it loads what stands beside it there."""
-    study = elsewhere / "here" / "study"
-    shutil.copytree(DATA / "microgrid123", study / "feeder")
-    (study / "breaks.py").write_text(f"{BREAKS}\n\ndef calm(case):\n    yield from ()\n", encoding="utf-8")
-    text = SMALL.format(extra='law = "breaks:Breaks"\nchecks = ["breaks:calm"]')
-    text = text.replace("[plant]\n", '[plant]\nfeeder = "feeder"\n')
-    (study / "small.toml").write_text(text, encoding="utf-8")
-    row = ChaosRow(number=0, schedule=(), violated={"frequency": "60.1 Hz; too high"})
-    base = base_in(study / "small.toml")
-    found = elsewhere / "here" / "found"
-    found.mkdir()
-    file = Campaign(base=base, seed=8, runs=9, path=found).write_failure("frequency", row, row)
-
-    kept = [line for line in file.read_text().splitlines() if not line.startswith("#")]
-    assert str(elsewhere) not in "\n".join(kept)
-    shutil.copytree(elsewhere / "here", elsewhere / "there")
-    monkeypatch.delitem(sys.modules, "breaks")  # as in another process
-    monkeypatch.setattr(sys, "path", [path for path in sys.path if str(elsewhere) not in path])
-    moved, _ = load_scenario(elsewhere / "there" / file.relative_to(elsewhere / "here"))
-    there = str(elsewhere / "there" / "study")
-    assert moved.law == {"use": "breaks:Breaks", "folder": there}
-    assert {"use": "breaks:calm", "folder": there} in moved.checks
-    assert moved.plant.feeder == f"{there}/feeder"
 
 
 @pytest.mark.usefixtures("few_schedules")
