@@ -46,7 +46,8 @@ class SweepFolder:
     def __init__(self, folder: Path, plan: Plan) -> None:
         self.path, self._size = folder, len(plan.runs)
         self.done: dict[int, SweepRow] = {}
-        whole = {"name": plan.name, "runs": len(plan.runs), "fingerprint": plan.fingerprint, "versions": _versions()}
+        whole = {"name": plan.name, "runs": len(plan.runs), "fingerprint": plan.fingerprint} | versions()
+        del whole["eclipse-zenoh"]  # it has no part in a run in one process
         try:
             _check(folder, whole)
             folder.mkdir(parents=True, exist_ok=True)
@@ -104,29 +105,15 @@ def _check(folder: Path, whole: Mapping[str, object]) -> bool:
         return False
     try:
         found = json.loads(manifest.read_text(encoding="utf-8"))
-        name, runs, mark, made_with = (found[key] for key in ("name", "runs", "fingerprint", "versions"))
-    except (ValueError, KeyError, TypeError):
+        other = [f"{key} {found.get(key)}, here is {now}" for key, now in whole.items() if found.get(key) != now]
+    except (ValueError, AttributeError):
         raise FolderError(f"{where}: its {MANIFEST} cannot be read; give another folder by --out") from None
-    if mark != whole["fingerprint"]:
-        same = "as it was before its file, its scenario or its feeder was changed" if name == whole["name"] else "now"
+    if other:
         raise FolderError(
-            f'{where}: holds the sweep "{name}" of {runs} runs {same}, not "{whole["name"]}" of {whole["runs"]}; '
-            "give another folder by --out, or remove this one"
-        )
-    now = _versions()
-    if other := [
-        f"{key} {was}, here is {now.get(key, 'none')}" for key, was in made_with.items() if now.get(key) != was
-    ]:
-        raise FolderError(
-            f"{where}: was begun with {'; '.join(other)}: rows of both would not compare to the last digit; go on with "
-            "the same versions, or begin in another folder by --out"
+            f"{where}: holds another sweep, or this one before its file, scenario, feeder or a version changed, so "
+            f"that rows of both would not compare: {'; '.join(other)}; give another folder by --out, or remove this one"
         )
     return True
-
-
-def _versions() -> dict[str, str]:
-    """Return the versions that the numbers depend on: Zenoh has no part in a run in one process."""
-    return {name: version for name, version in versions().items() if name != "eclipse-zenoh"}
 
 
 @dataclass(frozen=True, kw_only=True)

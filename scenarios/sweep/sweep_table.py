@@ -3,53 +3,25 @@
 from __future__ import annotations
 
 import json
-import re
-import typing
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
-import msgspec
 import pandas as pd
 
 from gridpeers.scenarios.results.run_files import write_whole
-from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.scenarios.sweep.sweep_case import FATE, SweepRow
 from gridpeers.scenarios.sweep.sweep_reading import Plan
-from gridpeers.wire.schema.table_schema import INLINE, Field, fields_of
 
-_SUFFIXES = ("s", "Hz", "pu", "W", "var", "V")
+_UNITS = ("s", "Hz", "pu", "kW", "kvar", "W", "var", "V")
 
 
 def unit_of(name: str) -> str:
-    """Return the unit of a column: of a key of the scenario its own, of an index the end of its name."""
-    field = _field_at(re.sub(r"^case\.[^.]+\.|\[\d+\]", "", name))
-    if field is not None and field.unit:
-        return field.unit
-    parts = name.split(".")
-    if parts[-1] == "V_error" or parts[-2:-1] == ["p"]:
+    """Return the unit of a column, with which the name of a key or an index ends."""
+    *above, last = name.split(".")
+    if last == "V_error" or above[-1:] == ["p"]:
         return "pu"
-    suffix = parts[-1].rpartition("_")[2]
-    return suffix if suffix in _SUFFIXES and suffix != parts[-1] else ""
-
-
-def _field_at(key: str) -> Field | None:
-    struct: Any = ScenarioModel
-    found = None
-    for step in key.split("."):
-        fields = fields_of(struct) if struct is not None else ()
-        inline = (inner for field in fields if INLINE in field.marks for inner in fields_of(field.type))
-        found = next((field for field in (*fields, *inline) if step in (field.key, field.name)), None)
-        if found is None:
-            return None
-        struct = _struct_in(found.type)
-    return found
-
-
-def _struct_in(annotation: Any) -> type[msgspec.Struct] | None:
-    if isinstance(annotation, type) and issubclass(annotation, msgspec.Struct):
-        return annotation
-    return next((found for part in typing.get_args(annotation) if (found := _struct_in(part))), None)
+    rest, _, unit = last.rpartition("_")
+    return unit if rest and unit in _UNITS else ""
 
 
 FILE = "results.csv"

@@ -10,8 +10,7 @@ import os
 import signal
 import threading
 import warnings
-from collections.abc import Callable, Generator, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Generator, Iterable
 from multiprocessing import resource_tracker
 from typing import Any, TypeVar
 
@@ -21,8 +20,6 @@ Task = Callable[..., T]
 
 Calls = Iterable[tuple[Any, ...]]
 """Arguments of the task for each run, such as its number, its scenario and its case; taken as workers become free."""
-
-_WARNINGS = "PYTHONWARNINGS"
 
 
 class WorkersError(RuntimeError):
@@ -55,9 +52,13 @@ def _parallel(runs: Calls, task: Task[T]) -> Generator[T, None, None]:
     from joblib import Parallel, delayed
 
     tasks = (delayed(task)(*call) for call in runs)
-    with _without_interrupts():
+    resource_tracker.ensure_running()  # before, as it lets SIGINT through again
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # workers inherit it
+    try:
         # one run a batch: each result is kept at once
         results: Any = Parallel(return_as="generator_unordered", batch_size=1)(tasks)
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
     try:
         # not `yield from`, which would close the results, with a warning, before we can
         for done in results:  # noqa: UP028
@@ -69,25 +70,6 @@ def _parallel(runs: Calls, task: Task[T]) -> Generator[T, None, None]:
     except (OSError, RuntimeError) as error:  # joblib's TerminatedWorkerError is a BrokenProcessPool, a RuntimeError
         first = str(error).partition("\n")[0]
         raise WorkersError(f"a worker has gone ({type(error).__name__}: {first})") from error
-
-
-@contextmanager
-def _without_interrupts() -> Iterator[None]:
-    """Hold Ctrl-C back in this thread and in all that it starts, until it leaves.
-
-    The tracker of the workers' semaphores, started here too, else warns of those of workers that were ended.
-    """
-    inherited = os.environ.get(_WARNINGS)
-    os.environ[_WARNINGS] = ",".join(filter(None, [inherited, "ignore:resource_tracker:UserWarning"]))
-    resource_tracker.ensure_running()  # Python lets SIGINT through when it has started it: workers come after
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        os.environ.pop(_WARNINGS)
-        if inherited is not None:
-            os.environ[_WARNINGS] = inherited
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _prepare(parent: int) -> None:
