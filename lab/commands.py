@@ -48,7 +48,7 @@ def predict(
     """
     spec, feeder = load(scenario)
     spec = chosen(spec, case, None)
-    require({"numba": "the plant", "scipy": "the theory", "threadpoolctl": "the plant"})
+    require({"numba": "the plant", "scipy": "the theory"})
 
     from gridpeers.lab.predict.prediction import predictions
     from gridpeers.scenarios.run_request import BrokenRunError

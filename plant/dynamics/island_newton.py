@@ -15,7 +15,6 @@ from gridpeers.plant.dynamics.circuit import LoadLaw
 from gridpeers.plant.dynamics.kept_network import WEAK, BlockPattern
 from gridpeers.plant.dynamics.kernel.compiled import Complex, Real
 from gridpeers.plant.dynamics.kernel.network_arrays import factorise_blocks, solve_blocks
-from gridpeers.plant.dynamics.threads import one_thread
 
 ITERATIONS = 40  # of Newton's method; it takes 4 to 10
 SHORTEST_STEP = 2.0**-10  # smallest part of a Newton step, and of the load in the continuation
@@ -66,7 +65,6 @@ class _Equations:
         return dV, not small or positive
 
 
-@one_thread()
 def solve_island(island: Island, from_sources: Complex, right: Complex, guess: Complex) -> Complex | None:
     """Return the voltages (V) of an island, from a guess (V); None if there are none.
 

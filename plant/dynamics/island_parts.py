@@ -7,6 +7,7 @@ without inverters keep their voltages. The parts depend on the network alone, so
 from __future__ import annotations
 
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,9 +16,10 @@ from gridpeers.plant.dynamics.kernel.compiled import Flags, Integers, Real
 from gridpeers.plant.dynamics.kernel.controller_pass import ADVANCED, READING, Units
 from gridpeers.plant.dynamics.kernel.network_arrays import BlockFactors, Reduced, SparseMaps
 from gridpeers.plant.dynamics.kernel.step import run_steps_unlocked
-from gridpeers.plant.dynamics.threads import each_on_a_core
+from gridpeers.wire.driver.machine import usable_cores
 
 PART = 1000  # nodes from which on a part is large enough: 0.3 MB of factors, and some 50 inverters
+MOST_THREADS = 4  # threads, as far as there are cores: more of them share one path to the memory
 Which = Integers | slice  # some of the inverters: a slice where they are neighbours, which needs no copy
 
 
@@ -60,7 +62,8 @@ class IslandParts:
             own_x, own_out = np.concatenate([x[at], x[m + at]]), np.zeros((steps, part.size, READING))
             return run_steps_unlocked(0, steps, h, tolerance, part.net, own, own_x, own_out), own, own_x, own_out
 
-        done = each_on_a_core(step, self.parts)
+        with ThreadPoolExecutor(min(usable_cores(), MOST_THREADS)) as pool:
+            done = list(pool.map(step, self.parts))
         if any(status < 0 for status, *_ in done):
             return -1
         for part, (_, own, own_x, own_out) in zip(self.parts, done, strict=True):

@@ -18,7 +18,6 @@ from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Integers, R
 from gridpeers.plant.dynamics.kernel.network_arrays import Reduced
 from gridpeers.plant.dynamics.kernel.solve import NO_NETWORK, settle_powers
 from gridpeers.plant.dynamics.reduction import Reduction
-from gridpeers.plant.dynamics.threads import one_thread
 
 MOST_ROUNDS = 500  # rounds between network and inverters, within which the changes of injections must end or halve
 NEAR = 4  # rounds after which the voltages are near enough to the solution for a tangent that serves to the end
@@ -203,8 +202,7 @@ def _at_places(
 
     solution = None
     if free.size > MOST_BY_DIFFERENCES:
-        with one_thread():
-            solution = root(mismatch, np.zeros(free.size), method="krylov", options=KRYLOV)
+        solution = root(mismatch, np.zeros(free.size), method="krylov", options=KRYLOV)
     if solution is None or not solution.success:
         solution = root(mismatch, np.zeros(free.size), method="hybr", options={"xtol": 1e-13})
     if not solution.success and float(np.max(np.abs(solution.fun))) > 1e-10:

@@ -137,8 +137,8 @@ _OF_PLANTS = (
 )
 """Agents have another server, because they do not load numpy."""
 
-_SET_BY_US = {"ZENOH_RUNTIME", "KMP_DUPLICATE_LIB_OK"}
-"""Variables that loading Zenoh, and threadpoolctl, sets here as it does there."""
+_SET_BY_US = {"ZENOH_RUNTIME"}
+"""Variables that loading Zenoh sets here as it does there."""
 
 _kept: dict[tuple[str, ...], tuple[tuple[int, str, dict[str, str]], ForkServer]] = {}
 """By modules: what the server has inherited (owner, folder, variables; once it differs, another is needed), and it."""

@@ -9,7 +9,6 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from gridpeers.plant.dynamics.threads import one_thread
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import Method, PlantConfig, SwitchEvent
@@ -53,7 +52,6 @@ def _plant(network: Network, config: PlantConfig, method: Method) -> Plant:
     return Plant(network, replace(config.settings, method=method), config.T_c, config.record_step)
 
 
-@one_thread()
 def _rows(
     case: str, h: float, end: float, make: Callable[[Network, PlantConfig], Plant]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

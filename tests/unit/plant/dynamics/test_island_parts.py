@@ -1,18 +1,14 @@
-"""The islands of a large network, advanced in parts on several threads; one thread for linear algebra."""
+"""The islands of a large network, advanced in parts on several threads."""
 
 from __future__ import annotations
-
-from threading import Event, Thread
 
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from threadpoolctl import threadpool_info, threadpool_limits
 
-from gridpeers.plant.dynamics import Circuit, Dynamics, island_parts, threads
+from gridpeers.plant.dynamics import Circuit, Dynamics, island_parts
 from gridpeers.plant.dynamics.circuit import LoadLaw
 from gridpeers.plant.dynamics.kernel.compiled import Real
-from gridpeers.plant.dynamics.threads import one_thread
 from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, GFM_D, S_B, V_B, Z_B, inverter
 
 ISLANDS = 5
@@ -87,7 +83,7 @@ def test_the_number_of_cores_does_not_move_a_byte(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(island_parts, "PART", 6)
     found = []
     for cores in (1, 3):
-        monkeypatch.setattr(threads, "usable_cores", lambda cores=cores: cores)
+        monkeypatch.setattr(island_parts, "usable_cores", lambda cores=cores: cores)
         found.append(readings(islands()).tobytes())
 
     assert found[0] == found[1]
@@ -103,28 +99,3 @@ def test_an_island_without_solution_ends_as_it_does_among_all_at_once(monkeypatc
     assert readings(parts) == pytest.approx(expected, rel=1e-9, abs=1e-9 * S_B)
     assert [trip[:3] for trip in parts.take_trips()] == [trip[:3] for trip in at_once.take_trips()]
     assert parts.network.reduction.online.tolist() == [i not in (4, 5) for i in range(2 * ISLANDS)]
-
-
-def _threads() -> set[int]:
-    return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
-
-
-def test_a_thread_that_is_through_does_not_lift_the_limit_under_another() -> None:
-    """Runs in several threads of a notebook give the bytes that each gives alone; the last lifts the limit."""
-    inside, leave = Event(), Event()
-
-    def first() -> None:
-        with one_thread():
-            inside.set()
-            leave.wait(100.0)
-
-    with threadpool_limits(2, user_api="blas"):
-        before = _threads()
-        thread = Thread(target=first)
-        thread.start()
-        assert inside.wait(100.0)
-        with one_thread():
-            leave.set()
-            thread.join()
-            assert _threads() == {1}
-        assert _threads() == before
