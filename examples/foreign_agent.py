@@ -73,7 +73,7 @@ class ForeignAgent:
     def __init__(self, config: dict, session: zenoh.Session) -> None:
         self.config, self.session, self.name = config, session, config["name"]
         self.wall, self.root = config["clock"] == "wall", f"gridpeers/{config['run']}/"
-        self.head = {"sender": self.name, "epoch": time.time_ns() // 1_000_000, "seq": 0, "t": 0.0}
+        self.head = {"sender": self.name, "epoch": time.time_ns() // 1_000_000, "seq": 0, "t": 0.0}  # noqa: TID251
         self.own = self.head | {"type": "Nameplate"}
         self.own |= {key: config[key] for key in ("kind", "microgrid", "P_rated", "V_nom", "f_nom", "m_p", "m_q")}
         self.inbox, me = queue.SimpleQueue(), f"{self.name}/{session.zid()}"

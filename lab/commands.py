@@ -229,7 +229,7 @@ def _counterfactual(record: RunRecord, changes: Changes, out: Path | None) -> bo
     rule = changed_rule(record, changes)  # it refuses wrong changes before a folder is made
 
     typer.echo(f"{_about(record)}: {changes}")
-    folder = new_folder(out, f"{record.info.scenario}-replay", datetime.now().astimezone())
+    folder = new_folder(out, f"{record.info.scenario}-replay", datetime.now().astimezone())  # noqa: TID251  # folders are named by the day
     with ended_by_signals(f"what came until then is in {shown(folder)}/"), broken_if_ended(folder):
         with progress(terminal(), (record.info.case,)) as tell:
             done = counterfactual_in(record, rule, folder, tell)

@@ -141,7 +141,7 @@ def run_case(
         inverters=tuple(row.name for row in inverters_of(scenario, request.feeder)),
         plant=plant,
         agents=agents,
-        started=datetime.now().astimezone().isoformat(timespec="milliseconds") if real else "",
+        started=datetime.now().astimezone().isoformat(timespec="milliseconds") if real else "",  # noqa: TID251  # the record says when a run began
     )
     ahead = request.lasting and not real  # in real time nothing else may take a core
     with Recorder(request.folder / case, record=record) as recorder:

@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from time import time
+from time import time  # noqa: TID251  # how long ago a file was written: whether to look again
 from typing import TYPE_CHECKING, Any, Literal
 
 import msgspec

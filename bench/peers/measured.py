@@ -56,7 +56,7 @@ def measure_in_turns(
     make, or fail, too.
     """
     part = PartRun(
-        began=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        began=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),  # noqa: TID251
         commit=commit(),
         machine=machine(),
         loads=[os.getloadavg()[0]],

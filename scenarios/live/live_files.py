@@ -34,7 +34,7 @@ def folders(out: Path | None, scenario: ScenarioModel) -> Iterator[Folders]:
     if out is None:
         yield Folders(Path(tempfile.mkdtemp(prefix="gridpeers-")))
         return
-    whole = new_folder(out, scenario.name, datetime.now().astimezone())
+    whole = new_folder(out, scenario.name, datetime.now().astimezone())  # noqa: TID251  # folders are named by the day
     begun = "A live run begins with it; how long it lasted, and what people did, is in events.csv and run.mcap."
     try:
         write_whole(whole / "scenario.toml", to_toml(scenario, {"driver": LIVE} | versions(), [begun]))
@@ -62,5 +62,5 @@ def live_record(
         inverters=inverters,
         plant=replace(plant, agent_configs={}),
         agents=agents,
-        started=datetime.now().astimezone().isoformat(timespec="milliseconds"),
+        started=datetime.now().astimezone().isoformat(timespec="milliseconds"),  # noqa: TID251  # the record says when a run began
     )

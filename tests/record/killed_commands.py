@@ -15,7 +15,7 @@ import tempfile
 from collections.abc import Callable
 from math import inf
 from pathlib import Path
-from time import monotonic, sleep, time
+from time import monotonic, sleep, time  # noqa: TID251  # beside the time of a file
 from typing import Literal, NamedTuple
 
 from gridpeers.lab.replay.recomputation import recomputed

@@ -1,6 +1,6 @@
-"""Somebody who reaches a run and sends without end: ``python -m tests.resources.attack WHAT < ATTACK.json``.
+"""Somebody who reaches a run and sends without end: ``python -m tests.resources.attack < ATTACK.json``.
 
-It says "linked" once it has links, then sends until standard input ends, and says what it has sent.
+It says "linked" once it has links, then sends until standard input ends.
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ from gridpeers.wire.messages import Command, Measurement, State, Stop
 from tests.hostile.cases import packed, sound
 
 LINKED = "linked"
+RATE = 10_000.0
+"""Messages a second."""
 
 
 class Attack(msgspec.Struct, kw_only=True):
@@ -32,19 +34,7 @@ class Attack(msgspec.Struct, kw_only=True):
     names: tuple[str, ...]
     """Inverters."""
     kind: str
-    """A key of `KINDS`, or tokens."""
-    rate: float = 0.0
-    """Messages a second; 0 is as fast as it goes."""
-    epochs: dict[str, int] = {}
-    """True epochs, for whoever copies them."""
-    size: int = 0
-    """Bytes of a long message."""
-    tokens: int = 0
-    """Tokens to hold."""
-    links: int = 1
-    """Links to wait for."""
-    star: bool = False
-    """Whether the run is a star: then one link leads to all."""
+    """A key of `KINDS`, or "tokens": 400 processes that claim a name of the run, or one that nobody knows."""
 
 
 Sending = Iterator[tuple[str, bytes]]
@@ -65,18 +55,6 @@ def foreign(attack: Attack, keys: Keys) -> Sending:
         yield rng.choice(made)
 
 
-def copied(attack: Attack, keys: Keys) -> Sending:
-    """Yield states in true epochs, as of somebody who listens and sends old ones again."""
-    made = [
-        (keys.state(name), packed(sound(State, sender=name, epoch=attack.epochs[name], seq=seq, t=0.0)))
-        for name in attack.names
-        for seq in range(20)
-    ]
-    rng = random.Random(1)
-    while True:
-        yield rng.choice(made)
-
-
 def commands(attack: Attack, keys: Keys) -> Sending:
     """Yield questions for the plant's status, each of another client."""
     for number in count():
@@ -86,50 +64,31 @@ def commands(attack: Attack, keys: Keys) -> Sending:
         yield keys.request, packed(question)
 
 
-def long(attack: Attack, keys: Keys) -> Sending:
-    """Yield long messages of zeros on all keys of states."""
-    payload = bytes(attack.size)
-    while True:
-        for name in attack.names:
-            yield keys.state(name), payload
-
-
-KINDS = {"foreign": foreign, "copied": copied, "commands": commands, "long": long}
-
-
-def tokens(attack: Attack, keys: Keys, session: Session) -> int:
-    """Hold tokens of thousands of processes that claim names of the run, and of others."""
-    for i in range(attack.tokens):
-        session.hold_token(keys.alive_agent(attack.names[i % len(attack.names)] if i % 2 else f"who{i}", f"x{i}"))
-    return attack.tokens
+KINDS = {"foreign": foreign, "commands": commands}
 
 
 def main() -> None:
     """Attack until standard input ends."""
     attack = msgspec.json.decode(sys.stdin.readline(), type=Attack)
-    keys = Keys(attack.run)
+    keys, names = Keys(attack.run), attack.names
     ending = threading.Event()
-    if attack.star:
-        session = Session("attacker", connect=(attack.endpoint,), star=True)
-    else:
-        session = Session("attacker", listen=("tcp/127.0.0.1:0",), connect=(attack.endpoint,), clock="wall")
-    while session.peers() < attack.links:
+    session = Session("attacker", listen=("tcp/127.0.0.1:0",), connect=(attack.endpoint,), clock="wall")
+    while session.peers() <= len(names):
         session.take(1, 0.05)
     print(LINKED, flush=True)
     threading.Thread(target=lambda: (sys.stdin.read(), ending.set()), daemon=True).start()
-    sent = tokens(attack, keys, session) if attack.kind == "tokens" else 0
-    began = monotonic()
-    if attack.kind in KINDS:
-        for key, payload in KINDS[attack.kind](attack, keys):
+    if attack.kind == "tokens":
+        for i in range(400):
+            session.hold_token(keys.alive_agent(names[i % len(names)] if i % 2 else f"who{i}", f"x{i}"))
+        ending.wait()
+    else:
+        began = monotonic()
+        for sent, (key, payload) in enumerate(KINDS[attack.kind](attack, keys)):
             if ending.is_set():
                 break
             session.publish(key, payload)
-            sent += 1
-            ahead = began + sent / attack.rate - monotonic() if attack.rate else 0.0
-            if ahead > 0.002:
+            if (ahead := began + sent / RATE - monotonic()) > 0.002:
                 sleep(ahead)
-    ending.wait()
-    print(sent, flush=True)
     session.close()
 
 

@@ -1,8 +1,10 @@
-"""No host's clock of the day decides anything: it may jump, stand still, or be far off."""
+"""No host's clock of the day decides anything: it may jump, stand still, or be far off.
+
+Ruff bans them (TID251): who asks for the time of the day says there what for.
+"""
 
 from __future__ import annotations
 
-import ast
 import time
 from itertools import pairwise
 from pathlib import Path
@@ -12,25 +14,6 @@ import pytest
 from gridpeers.wire.driver.process import new_epoch
 from gridpeers.wire.messages import MOST_COUNT
 from tests.toy.town import Town
-
-ROOT = Path(__file__).parents[2]
-
-DAY_CLOCKS = {
-    "time": {"time", "time_ns", "localtime", "gmtime", "ctime", "asctime", "strftime", "clock_gettime"},
-    "datetime.datetime": {"now", "utcnow", "today"},
-    "datetime.date": {"today"},
-}
-"""Clocks of the day by the module or class that has them."""
-
-ALLOWED = {
-    "wire/driver/process.py": "tells two processes of one name apart, with random bits",
-    "wire/trust/key_folder.py": "ends of certificates are dates",
-    "wire/trust/site_authority.py": "the same",
-    "scenarios/run.py": "the record says when a run began",
-    "scenarios/live/live_files.py": "names of folders, and the same",
-    "viewer/record_pages.py": "how long ago a file was written, which only says whether to look again",
-}
-"""Files that may ask for the time of the day, and what for."""
 
 BROKEN = """
 import random
@@ -47,53 +30,6 @@ def jumping():
 time.time = jumping
 time.time_ns = lambda: int(1e9 * jumping())
 """
-
-
-def asked_for(source: str) -> set[str]:
-    """Return the clocks of the day that a program calls or passes on, by what its names were imported as."""
-    tree = ast.parse(source)
-    meant: dict[str, str] = {}
-    for node in ast.walk(tree):
-        match node:
-            case ast.Import(names=names):
-                meant |= {alias.asname or alias.name: alias.name for alias in names}
-            case ast.ImportFrom(module=str(module), names=names):
-                meant |= {alias.asname or alias.name: f"{module}.{alias.name}" for alias in names}
-
-    def meaning(node: ast.AST) -> str:
-        match node:
-            case ast.Name(id=name):
-                return meant.get(name, "")
-            case ast.Attribute(value=value, attr=attr):
-                return f"{meaning(value)}.{attr}"
-        return ""
-
-    clocks = {f"{where}.{clock}" for where, clocks in DAY_CLOCKS.items() for clock in clocks}
-    return clocks & {meaning(node) for node in ast.walk(tree)}
-
-
-@pytest.mark.parametrize(
-    ("source", "clock"),
-    [
-        ("from time import time as clock\nclock()", "time.time"),
-        ("import time\ndef f(clock=time.time): pass", "time.time"),
-        ("from datetime import datetime as D\nD.now()", "datetime.datetime.now"),
-        ("import time\nfrom time import monotonic\ntime.monotonic(); monotonic()", ""),
-        ("from gridpeers.wire.timing import time_of\nself.time(); self.now(); now = 1; now", ""),
-    ],
-)
-def test_a_clock_of_the_day_is_found_under_any_name(source: str, clock: str) -> None:
-    """However it was imported, called at once or passed on; a clock that never jumps is none, nor is another `now`."""
-    assert asked_for(source) == ({clock} if clock else set())
-
-
-def test_the_processes_of_a_run_ask_only_a_clock_that_never_jumps() -> None:
-    """Deadlines, ages, ticks and leases count on `monotonic`; who asks for the time of the day is listed here."""
-    rooms = ("wire", "agents", "plant", "netem", "scenarios", "viewer")
-    files = [path for room in rooms for path in (ROOT / room).rglob("*.py")]
-    asking = {str(path.relative_to(ROOT)) for path in files if asked_for(path.read_text())}
-
-    assert asking == set(ALLOWED)
 
 
 def test_a_run_does_not_notice_clocks_that_jump(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -65,7 +65,7 @@ def test_with_an_expired_certificate_nobody_gets_a_link(town: Town, lab: Path, t
 
     site = tmp_path / "lab"
     shutil.copytree(lab, site)
-    issue(site, "inv3", days=1.0, now=datetime.now(UTC) - timedelta(days=2))
+    issue(site, "inv3", days=1.0, now=datetime.now(UTC) - timedelta(days=2))  # noqa: TID251
 
     assert handshake(town.endpoint, site / "inv3.pem", site / "inv3.key") == "SSLV3_ALERT_CERTIFICATE_EXPIRED"
     wait_for(town.folder / "plant.log", "certificate expired")

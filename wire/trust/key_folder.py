@@ -100,7 +100,7 @@ def open_credentials(
     Without a name the member is the first of these roles, the preferred one first, whose key is there. Raise KeysError
     if anything about the files is wrong.
     """
-    now = now or datetime.now(UTC)
+    now = now or datetime.now(UTC)  # noqa: TID251  # ends of certificates are dates
     known, either = read_list(folder), " or ".join(roles)
     there = [member for member in known.members if not member.revoked and (folder / f"{member.name}.key").is_file()]
     preferred = next((each for role in roles for each in there if each.role == role), None)

@@ -93,7 +93,7 @@ def show(keys: _Keys = Path()) -> None:
     Example:  gridpeers keys show --keys lab
     """
     _check()
-    known, now = read_list(keys), f"{datetime.now(UTC):{DATE_AND_TIME}}"
+    known, now = read_list(keys), f"{datetime.now(UTC):{DATE_AND_TIME}}"  # noqa: TID251  # ends of certificates are dates
     authority = f"; {CA_KEY} is here: certificates are issued in this folder" if (keys / CA_KEY).is_file() else ""
     typer.echo(f"site {known.site}, {LIST} is version {known.version}{authority}")
     width = max(len(member.name) for member in known.members)

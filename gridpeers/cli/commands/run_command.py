@@ -93,7 +93,7 @@ def _carry_out(
         require_loadable(simulator.package, simulator.words)
     if driver == "processes":
         free_endpoint(local_endpoint(spec.processes.port), option="processes.port")
-    folder = new_folder(out, spec.name, datetime.now().astimezone())
+    folder = new_folder(out, spec.name, datetime.now().astimezone())  # noqa: TID251  # folders are named by the day
     request = Request(scenario=spec, feeder=feeder, driver=driver, folder=folder, **pace)
     console, left = terminal(), f"what came until then is in {shown(folder)}/"
     try:

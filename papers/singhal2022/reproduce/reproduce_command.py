@@ -53,7 +53,7 @@ def reproduce(
 
     if only is not None:
         check_choice("--only: ", "part", only, CHOICES)
-    now, console = datetime.now().astimezone(), terminal()
+    now, console = datetime.now().astimezone(), terminal()  # noqa: TID251  # folders are named by the day
     folder = new_folder(out, "reproduce", now)
     work = Work(chosen(only), driver, folder, seed, jobs)
     left = f"what came until then is in {shown(folder)}/"

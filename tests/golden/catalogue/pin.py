@@ -53,7 +53,7 @@ def main(reason: str) -> None:
         write(pinned)
         return
     scenarios = " ".join(sorted({name for name, _ in changed}))
-    pinned.moved.append({"date": datetime.now(UTC).date().isoformat(), "scenarios": scenarios, "reason": reason})
+    pinned.moved.append({"date": datetime.now(UTC).date().isoformat(), "scenarios": scenarios, "reason": reason})  # noqa: TID251
     stay = {key: pin for key, pin in pinned.pins.items() if key in new and key not in changed}
     otherwise = {
         level: {key: pin for key, pin in pins.items() if key in stay} for level, pins in pinned.otherwise.items()

@@ -65,7 +65,7 @@ def test_show_says_to_the_minute_until_when_certificates_are_valid(elsewhere: Pa
     from gridpeers.wire.trust.site_authority import issue
 
     assert invoke("keys", "init", "lab")[0] == 0
-    now = datetime.now(UTC)
+    now = datetime.now(UTC)  # noqa: TID251
     issue(Path("lab"), "inv1", days=1.0, now=now - timedelta(days=3))
     issue(Path("lab"), "inv2", days=0.25, now=now)
     rows = {row.split()[1]: row.split(maxsplit=2)[2] for row in invoke("keys", "show", "--keys", "lab")[1].splitlines()}

@@ -225,7 +225,7 @@ def test_the_end_that_refuses_a_link_and_its_reason_are_told(tmp_path: Path) -> 
         issue(site, "inv1")
     shutil.copytree(lab, late)
     for name in ("plant", "inv1"):
-        issue(late, name, days=1.0, now=datetime.now(UTC) - timedelta(days=2))
+        issue(late, name, days=1.0, now=datetime.now(UTC) - timedelta(days=2))  # noqa: TID251
     for plant, agent, said in (
         (lab, shown(lab), "$"),
         (other, shown(lab), "shows a certificate that .*lab/ca.pem does not accept "),
