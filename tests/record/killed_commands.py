@@ -1,19 +1,12 @@
-"""Kill commands at random moments, see what their records lack, and read them by every command that reads a record.
-
-python -m tests.record.killed_commands 20               so many runs of each clock
-python -m tests.record.killed_commands 5 plant inv1     kills the plant, and an agent, instead of the command
-"""
+"""Recorded runs of which a process is killed, and what their records must have then."""
 
 from __future__ import annotations
 
 import os
-import random
 import signal
 import subprocess
 import sys
-import tempfile
 from collections.abc import Callable
-from math import inf
 from pathlib import Path
 from time import monotonic, sleep, time  # noqa: TID251  # beside the time of a file
 from typing import Literal, NamedTuple
@@ -22,7 +15,6 @@ from gridpeers.lab.replay.recomputation import recomputed
 from gridpeers.scenarios.record.record_file import RecordFile, RecordFileError
 from gridpeers.scenarios.record.record_info import FILE
 from gridpeers.scenarios.record.record_reader import RunRecord
-from tests.record.reader_commands import assert_commands_read
 
 LONG = """
 [time]
@@ -47,9 +39,6 @@ Clock = Literal["simulated", "one process", "wall"]
 CLOCKS: tuple[Clock, ...] = ("simulated", "one process", "wall")
 """Kinds of runs: in simulated time with processes and without, and in real time."""
 
-LATEST: dict[Clock, float] = {"simulated": 2.0, "one process": 0.6, "wall": 4.0}
-"""Latest time (s) of a kill after the first row: some 30 s of run time, more of which would take minutes to be read."""
-
 
 class Left(NamedTuple):
     """What a killed command has left behind."""
@@ -59,11 +48,11 @@ class Left(NamedTuple):
     """Wall time (s) from the record's last chunk to the kill; its nodes had kept the first of it for 0.2 s."""
 
 
-def killed(folder: Path, clock: Clock, after: float, who: str = "command", most: float = inf) -> Left:
+def killed(folder: Path, clock: Clock, after: float, who: str = "command", *, most: float) -> Left:
     """Run a case until its first row is there, kill a process some time (s) later, and open what is left.
 
-    With `most` (s of run time) it is killed earlier, once the run has come so far, as a busy machine may wake this
-    process late; but not before its record has a chunk with rows.
+    It is killed earlier once the run has gone on by `most` (s of run time), as a busy machine may wake this process
+    late; but not before its record has a chunk with rows.
     """
     folder.mkdir(parents=True)
     (folder / "long.toml").write_text(LONG + ("" if clock == "one process" else LOSSY), encoding="utf-8")
@@ -73,11 +62,8 @@ def killed(folder: Path, clock: Clock, after: float, who: str = "command", most:
     file = folder / "out" / "IV" / FILE
     try:
         t = wait_for_rows(command, file)
-        if most == inf:
-            sleep(after)
-        else:
-            until = monotonic() + after
-            wait_for_rows(command, file, lambda now: now > t and (now >= t + most or monotonic() >= until))
+        until = monotonic() + after
+        wait_for_rows(command, file, lambda now: now > t and (now >= t + most or monotonic() >= until))
         process = command.pid if who == "command" else _process(command.pid, who)
         t = _last_time(file)
         killed_at = time()
@@ -130,30 +116,3 @@ def assert_usable(left: Left, *, complete: bool = False) -> None:
         again = list(recomputed(record, agent))
         assert all(each.agrees for each in again)
         assert not begun or again
-
-
-def main() -> None:
-    """Kill as many runs of each clock as asked for, and tell the most that was lost."""
-    draws = random.Random(15)
-    whom = sys.argv[2:] or ["command"]
-    lost: dict[Clock, list[float]] = {clock: [] for clock in CLOCKS}
-    for number in range(int(sys.argv[1])):
-        for clock in CLOCKS:
-            after, who = draws.uniform(0.0, LATEST[clock]), whom[number % len(whom)]
-            if clock == "one process" and who != "command":
-                continue
-            with tempfile.TemporaryDirectory() as folder:
-                left = killed(Path(folder) / "run", clock, after, who)
-                assert_usable(left, complete=who == "plant")
-                assert_commands_read(left.record)
-                ends = f"record to {left.record.t_end:.2f} s, last chunk {left.lost:.2f} s before"
-                print(f"{number} {clock}: {who} killed after {after:.2f} s; {ends}", flush=True)
-                lost[clock].append(left.lost)
-    for clock, of in ((clock, of) for clock, of in lost.items() if of):
-        load = os.getloadavg()[0]
-        chunk = f"last chunk at most {max(of):.2f} s before"
-        print(f"{clock}: {len(of)} records opened and were read; {chunk}; load {load:.1f}")
-
-
-if __name__ == "__main__":
-    main()

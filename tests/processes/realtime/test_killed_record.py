@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import resource
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from gridpeers.scenarios.record.record_reader import RunRecord
 from tests.command_line import invoke
-from tests.record.full_disk import CALM, has_namespaces
 from tests.record.killed_commands import CLOCKS, Clock, assert_usable, killed
 from tests.record.reader_commands import assert_commands_read
 
@@ -35,33 +32,50 @@ def test_a_killed_command_leaves_a_record(clock: Clock, tmp_path: Path) -> None:
         assert_commands_read(left.record)
 
 
-@pytest.mark.skipif(not has_namespaces(), reason="no file system can be mounted in a namespace of its own here")
-def test_on_a_full_disk_a_record_ends_and_is_read() -> None:
-    """On a small disk that is filled under way a live run breaks, says so once, and leaves no empty file."""
-    command = [sys.executable, "-m", "tests.record.full_disk", "live"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=250)
-
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert done.stdout.count("and is read") == 1
-
+CALM = """
+[time]
+end_s = 7.0
+record_s = 0.02
+[[event]]
+label = "islanding"
+t_s = 0.5
+open = ["13-152"]
+[case.calm]
+secondary = "all"
+graph = "full"
+without_agent = ["inv3", "inv5", "inv6", "inv8", "inv9"]
+"""
 
 ROOM = 180_000
 """Greatest size (bytes) of any file of a run, which its record reaches after some seconds."""
 
 
-def test_a_run_without_room_for_its_record_breaks_and_has_what_came_until_then(elsewhere: Path) -> None:
-    """Its last words name the file and the reason, and what is in it can be read."""
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("run", "--clock", "wall"), "here/calm/run.mcap: cannot be written: File too large"),
+        (("up", "--run", "full", "--for", "7", "--listen", "tcp/127.0.0.1:0"), "s: File too large"),
+    ],
+)
+def test_a_run_without_room_for_its_record_ends_and_has_what_came_until_then(
+    words: tuple[str, ...], said: str, elsewhere: Path
+) -> None:
+    """Its last words name the reason, no file is empty, and what is in the record can be read."""
     (elsewhere / "calm.toml").write_text(CALM)
+    command, *options = words
     unlimited = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (ROOM, unlimited[1]))
     try:
-        code, text = invoke("run", "calm.toml", "--clock", "wall", "--out", "here")
+        code, text = invoke(command, "calm.toml", *options, "--out", "here")
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, unlimited)
 
     here = elsewhere / "here"
     assert code == 3, text
-    assert (here / "status.txt").read_text() == "broken: here/calm/run.mcap: cannot be written: File too large\n"
+    assert "Traceback" not in text
+    status = (here / "status.txt").read_text()
+    assert (status.startswith("broken: "), status.endswith(f"{said}\n")) == (True, True), status
+    assert [file for file in here.rglob("*.*") if file.suffix != ".log" and not file.stat().st_size] == []
     record = RunRecord.open(here / "calm")
     assert 1.0 < record.t_end < 6.9
     assert any("cut off" in text for text in record.damage)
