@@ -170,13 +170,3 @@ def test_a_schedule_that_makes_no_sense_is_refused_at_the_start() -> None:
         plant(loads=(LoadEvent(t=0.02, load="4800", setting=LoadSetting(factor=0.5)),))
     with pytest.raises(ValueError, match="load 48: the real power of a load must not be negative"):
         plant(loads=(LoadEvent(t=0.02, load="48", setting=LoadSetting(P=-1.0)),))
-
-
-def test_events_say_the_power_that_was_set() -> None:
-    """Checks take the power of a load from the plant's event."""
-    board = LoadBoard(Network(read_feeder("microgrid123")))
-    for S in (complex(123_456.7, -65_432.1), 0j):
-        board.put("48", LoadSetting(P=S.real, Q=S.imag))
-        _, (event,) = board.apply(0)
-
-        assert (S.real, S.imag) == (event.P, event.Q)

@@ -116,16 +116,6 @@ def test_opening_a_switch_ends_its_wait(network: Network) -> None:
     assert len(told) == 3
 
 
-def test_closing_by_hand_out_of_step_is_refused(network: Network) -> None:
-    """After a refusal nothing is operated; without the check it is."""
-    p = plant(network)
-    run(p, 2.5)
-
-    assert apart(p)[0] > 90.0
-    assert run(p, 2.6) == []
-    assert not p.switch("13-152", "close")
-
-
 def test_one_island_or_a_dead_side_needs_no_synchronism(network: Network) -> None:
     """A loop within one island, and a side without voltage, close at once and without a warning."""
     zone = (SwitchEvent(t=0.5, switch="60-160", action="open"), SwitchEvent(t=0.5, switch="61-61s", action="open"))
@@ -169,3 +159,4 @@ def test_the_command_to_close_in_step_is_answered_with_the_differences(network: 
     assert not answer.ok
     assert "switch 13-152 not closed: its sides are " in answer.text
     assert run(p, 2.6) == []
+    assert not p.switch("13-152", "close"), "without the check it is operated"
