@@ -124,27 +124,33 @@ def test_the_default_filter_is_critically_damped() -> None:
     assert np.abs(np.array(filtered) - expected).max() < 0.02
 
 
-def test_two_gfm_share_by_their_set_points() -> None:
-    """Row 9: equal droops split what set-points leave over equally."""
-    plant = pair(GFM_A, GFM_A, 1.8)
-    plant.inverters.set_points[:, 0] = 0.9, 0.5
-
-    end = plant.run(5000)[-1]
-
-    assert end[:, 1] / S_B == pytest.approx([1.1, 0.7], abs=1e-3)
-    assert end[:, 0] == pytest.approx(59.880, abs=0.001)
-
-
-def test_the_overload_limiter_hands_over() -> None:
-    """Row 10: with Pmax 1 the first unit stays at 1 pu, the second takes the rest and sets the frequency."""
-    plant = pair(replace(GFM_A, P_max=1.0), GFM_A, 1.8)
-    plant.inverters.set_points[:, 0] = 0.9, 0.5
+@pytest.mark.parametrize(
+    ("first", "second", "load", "P_set", "p", "x_over"),
+    [
+        (GFM_A, GFM_A, 1.8, (0.9, 0.5), (1.1, 0.7), 0.0),
+        (replace(GFM_A, P_max=1.0), GFM_A, 1.8, (0.9, 0.5), (1.0, 0.8), -0.754),
+        (REGFM_A1, replace(REGFM_A1, P_max=2.0), 1.2, (1.1, 0.1), (0.9, 0.3), -1.508),
+    ],
+    ids=["row 9: by their set-points", "row 10: the overload limiter hands over", "the same of REGFM_A1"],
+)
+def test_two_gfm_share_a_load(
+    first: GfmDroop,
+    second: GfmDroop,
+    load: float,
+    P_set: tuple[float, float],
+    p: tuple[float, float],
+    x_over: float,
+) -> None:
+    """Equal droops split what set-points leave; a unit at its P_max leaves the rest, and f, to the other."""
+    plant = pair(first, second, load)
+    plant.inverters.set_points[:, 0] = P_set
 
     end = plant.run(10000)[-1]
+    got = end[:, 1] / S_B
 
-    assert end[:, 1] / S_B == pytest.approx([1.000, 0.800], abs=1e-3)
-    assert end[:, 0] == pytest.approx(59.820, abs=0.001)
-    assert plant.inverters.state_of(0)["x_over"] == pytest.approx(-0.754, abs=0.004)
+    assert got == pytest.approx(p, abs=1e-3)
+    assert end[:, 0] == pytest.approx(60.0 + 0.6 * (P_set[1] - got[1]), abs=1e-5)
+    assert plant.inverters.state_of(0)["x_over"] == pytest.approx(x_over, abs=0.004)
 
 
 @pytest.mark.parametrize(
@@ -260,18 +266,6 @@ def test_it_droops_by_the_positive_sequence(parameters: GfmDroop, method: Method
     assert min(abs(total.real - S.real), abs(total.imag - S.imag)) > 0.002
     assert f - 60.0 == pytest.approx(0.6 * (P_set - S.real), abs=1e-7)
     assert (v if parameters.voltage_control else E) == pytest.approx(V_set - 0.05 * S.imag, abs=1e-7)
-
-
-def test_the_overload_limiter_of_regfm_a1_hands_over() -> None:
-    """The first unit stays at P_max = 0.9 pu, the second takes the rest and sets the frequency."""
-    dynamics = pair(REGFM_A1, replace(REGFM_A1, P_max=2.0), 1.2)
-    dynamics.inverters.set_points[:, 0] = 1.1, 0.1
-
-    end = dynamics.run(10000)[-1]
-    p = end[:, 1] / S_B
-
-    assert p[0] == pytest.approx(0.9, abs=1e-4)
-    assert end[:, 0] == pytest.approx(60.0 + 0.6 * (0.1 - p[1]), abs=1e-5)
 
 
 @pytest.mark.parametrize(("V_set", "Q"), [(1.1, 0.44), (0.9, -0.44)])

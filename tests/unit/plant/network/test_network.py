@@ -59,48 +59,22 @@ def test_aliases_are_not_names(network: Network) -> None:
         network.admittance(frozenset({"sw1_2"}))
 
 
-def test_all_is_one_island_at_first(network: Network) -> None:
-    """Grid-connected, every bus hangs together."""
-    assert network.islands(network.closed0) == (frozenset(bus.name for bus in network.feeder.buses),)
+SWITCHES = {
+    (): [("rest", "passive", "MG1", "MG2", "MG3")],
+    ("13-152",): [("rest",), ("passive", "MG1", "MG2", "MG3")],
+    ("13-152", "60-160"): [("rest",), ("passive",), ("MG1", "MG2", "MG3")],
+    ("60-160",): [("rest", "passive"), ("MG1", "MG2", "MG3")],
+    PAPER_ISLANDS: [("rest",), ("passive", "MG1"), ("MG2",), ("MG3",)],
+}
+"""Switches that are opened, and the zones of each island then."""
 
 
-def test_event_1_islands_the_microgrids(network: Network) -> None:
-    """Opening 13-152 leaves 1-34 with the substation and islands everything beyond."""
-    assert network.islands(opened(network, "13-152")) == (
-        zones(network, "rest"),
-        zones(network, "passive", "MG1", "MG2", "MG3"),
-    )
+@pytest.mark.parametrize("switches", SWITCHES)
+def test_open_switches_part_the_zones(network: Network, switches: tuple[str, ...]) -> None:
+    islands = network.islands(opened(network, *switches))
 
-
-def test_event_2_drops_the_passive_zone(network: Network) -> None:
-    """Opening 60-160 as well leaves the passive zone dead and the three microgrids together."""
-    assert set(network.islands(opened(network, "13-152", "60-160"))) == {
-        zones(network, "rest"),
-        zones(network, "passive"),
-        zones(network, "MG1", "MG2", "MG3"),
-    }
-
-
-def test_opening_60_160_alone_keeps_the_passive_zone_on_the_grid(network: Network) -> None:
-    """With 13-152 closed, opening 60-160 leaves the passive zone with the substation."""
-    assert set(network.islands(opened(network, "60-160"))) == {
-        zones(network, "rest", "passive"),
-        zones(network, "MG1", "MG2", "MG3"),
-    }
-
-
-def test_three_microgrids(network: Network) -> None:
-    """sw1_2 and sw2_3 split the island into MG1 with the passive zone, MG2 and MG3, one GFM in each."""
-    islands = network.islands(opened(network, *PAPER_ISLANDS))
-
-    assert set(islands) == {
-        zones(network, "rest"),
-        zones(network, "passive", "MG1"),
-        zones(network, "MG2"),
-        zones(network, "MG3"),
-    }
-    grid_forming = {inverter.bus for inverter in network.inverters if inverter.kind == "GFM"}
-    assert sorted(len(grid_forming & island) for island in islands) == [0, 1, 1, 1]
+    assert len(islands) == len(SWITCHES[switches])
+    assert set(islands) == {zones(network, *names) for names in SWITCHES[switches]}
 
 
 def test_islands_are_ordered_by_their_first_bus(network: Network) -> None:
