@@ -70,7 +70,6 @@ def chaos(
     from gridpeers.scenarios.results.run_files import (
         broken_if_ended,
         new_folder,
-        require_folder,
         set_status,
         shown,
     )
@@ -88,7 +87,6 @@ def chaos(
     words = ["--case", campaign.base.case, "--runs", str(runs), "--seed", str(seed), "--driver", driver]
     campaign.command = command_line("chaos", scenario, *words)
     with _told_if_ended(campaign):
-        require_folder(out, name)
         _try_undisturbed(console, campaign)
         # the folder is made only once the scenario has passed without disturbances
         path = campaign.path = new_folder(out, name, datetime.now().astimezone())  # noqa: TID251  # folders are named by the day

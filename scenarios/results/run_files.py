@@ -57,17 +57,6 @@ def new_folder(out: Path | None, scenario: str, now: datetime) -> Path:
     return folder
 
 
-def require_folder(out: Path | None, scenario: str) -> None:
-    """Raise FolderError if `new_folder` would, and make nothing."""
-    if out is not None:
-        _require_empty(out, f"--out {out}")
-    folder = out if out is not None else RUNS / scenario
-    place = next(place for place in (folder, *folder.absolute().parents) if place.exists())
-    why = "" if os.access(place, os.W_OK | os.X_OK) else "Permission denied"
-    if why := why if place.is_dir() else "Not a directory":
-        raise FolderError(_unmade(folder, why, "--out"))
-
-
 def empty_folder(folder: Path, option: str = "", status: str = "") -> Path:
     """Make a folder for results, and return it; of two commands that take it at once for their status, one gets it.
 
