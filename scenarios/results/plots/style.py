@@ -7,6 +7,7 @@ curves can be told in a black-and-white print too.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import zip_longest
 from math import inf
 from pathlib import Path
 from types import MappingProxyType
@@ -105,22 +106,11 @@ def legend_below(figure: Figure, axes: Axes, *, one_row: bool = False) -> None:
     figure.legend(handles, labels, loc="outside lower center", ncols=-(-len(labels) // rows) if labels else 1)
 
 
-TextSide = Literal["left", "center", "right"]  # Which part of a text stands at the line
-
 LETTER = 0.056  # Width of a letter of these texts (inches), a little more than the mean of DejaVu Sans at 7 pt
 LONGEST = 20  # Letters of a word that is written whole
 GAP = 0.06  # Least distance between two texts (inches)
 MOST = 12.0  # Lines in an inch of a frame that leave its curves to be seen
 FRAME = 0.78  # Part of a column of panels that is the frame of one; the rest are its axis and margins
-
-_SIDES: dict[TextSide, float] = {"center": 0.5, "left": 0.0, "right": 1.0}
-"""Sides, the preferred one first, with the part of a text that stands before its line."""
-
-
-class EventText(NamedTuple):
-    text: str
-    mark: Mark
-    side: TextSide
 
 
 def mark_events(
@@ -134,47 +124,45 @@ def mark_events(
     assert figure is not None
     columns = 1 if place is None else place.get_gridspec().ncols
     width = float(figure.get_size_inches()[0]) / columns * FRAME  # roughly: the layout is made when it is drawn
-    texts = place_texts(drawing.events, width / max(drawing.end, 1e-9))
+    texts = event_texts(drawing.events, width / max(drawing.end, 1e-9))
     crowded = len(drawing.events) > MOST * width
-    for mark in (one.mark for one in texts) if crowded else drawing.events:
+    for mark in texts if crowded else drawing.events:
         axes.axvline(mark.t, color=colours.get(mark, BLACK), linewidth=0.7, linestyle=(0, (1, 2)), zorder=1)
     lines = 0
-    for text, mark, side in texts if labelled else ():
+    for mark, text in texts.items() if labelled else ():
         colour = colours.get(mark, BLACK)
-        note_above(axes, text, mark.t, "data", side, colour=GREY if colour == BLACK else colour)
+        note_above(axes, text, mark.t, "data", "left", colour=GREY if colour == BLACK else colour)
         lines = max(lines, text.count("\n") + 1)
     axes.set_title(axes.get_title(loc="left"), loc="left", pad=5.0 + 9.0 * lines)
 
 
-def note_above(axes: Axes, text: str, x: float, of: str, side: TextSide, *, colour: str = GREY) -> None:
-    """Write small words above the frame, at x of the data or of the frame."""
+def note_above(axes: Axes, text: str, x: float, of: str, side: Literal["left", "right"], *, colour: str = GREY) -> None:
+    """Write small words above the frame, to the right of x, or with their right side there; x of the data or frame."""
     at: Any = {"xycoords": (of, "axes fraction"), "xytext": (0, 2), "textcoords": "offset points"}
     axes.annotate(text, (x, 1.0), **at, ha=side, fontsize=7, color=colour)
 
 
-def place_texts(marks: Sequence[Mark], inches_per_s: float) -> list[EventText]:
-    """Place texts so that none covers another: first all labels that have room, then more words where there is more."""
-    placed: dict[int, tuple[float, float, EventText]] = {}
-    """Left and right edge (inches) and text, by the number of the mark."""
-    for kind in range(3):
-        for number, mark in enumerate(marks):
-            text = _texts(mark)[kind]
-            width = LETTER * max(map(len, text.split("\n")))
-            around = [edges for other, (*edges, _) in placed.items() if other != number]
-            for side, before in _SIDES.items() if text else ():
-                start = mark.t * inches_per_s - before * width
-                end = start + width
-                if all(start >= right + GAP or end <= left - GAP for left, right in around):
-                    placed[number] = start, end, EventText(text, mark, side)
-                    break
-    return [text for *_, text in sorted(placed.values(), key=lambda each: each[0])]
+def event_texts(marks: Iterable[Mark], inches_per_s: float) -> dict[Mark, str]:
+    """Return the text that begins at each mark: what happens if it ends before the next mark, else its label.
+
+    A mark at which another text still goes on has none.
+    """
+    found: dict[Mark, str] = {}
+    end, ordered = -inf, sorted(marks, key=lambda mark: mark.t)
+    for mark, following in zip_longest(ordered, ordered[1:]):
+        start = mark.t * inches_per_s
+        room = (following.t * inches_per_s if following else inf) - start - GAP
+        words = " ".join(word if len(word) <= LONGEST else f"{word[:9]}...{word[-8:]}" for word in mark.what.split(" "))
+        full = ("\n".join(filter(None, (mark.label, text))) for text in (words, words.replace(" ", "\n", 1)))
+        text = next((text for text in full if _width(text) <= room), mark.label)
+        if text and start >= end:
+            found[mark] = text
+            end = start + _width(text) + GAP
+    return found
 
 
-def _texts(mark: Mark) -> tuple[str, str, str]:
-    """Return what can be written at a mark: its label, the event below it in two lines, the event in one."""
-    what = " ".join(word if len(word) <= LONGEST else f"{word[:9]}...{word[-8:]}" for word in mark.what.split(" "))
-    narrow, both = ("\n".join(filter(None, (mark.label, text))) for text in (what.replace(" ", "\n", 1), what))
-    return mark.label, narrow, both
+def _width(text: str) -> float:
+    return LETTER * max(map(len, text.split("\n")))
 
 
 Format = Literal["png", "pdf", "svg"]  # Kind of file, as its name ends
