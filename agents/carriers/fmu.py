@@ -4,12 +4,7 @@ What is compiled cannot be interrupted, and may take its process with it: so an 
 to which the lines of a law program go (docs/law-programs.md): `python -m gridpeers.agents.carriers.fmu PATH FOLDER`.
 What the FMU prints goes to standard error.
 
-All its variables are scalar, Real (FMI 2) or Float64 (FMI 3), by these names; an FMU declares those that it uses:
-
-- inputs: own_P, own_e and so on (`Own`); neighbours, how many there are; neighbour_1_P_set and so on (`Neighbour`),
-  neighbour_1_shared_NAME for what a neighbour shares, for as many neighbours as the FMU has room for;
-- outputs: P_set, V_set, and send (1 or 0), shared_NAME;
-- parameters: those of the law, as a scenario gives them.
+docs/laws.md has the names and types of its variables; an FMU declares those that it uses.
 """
 
 from __future__ import annotations
@@ -123,24 +118,14 @@ class FmuLaw(ProgramLaw):
 
     def __init__(self, choice: LawChoice) -> None:
         path = (Path(choice.folder) / choice.fmu).absolute()
-        try:
-            self._unpacked = mkdtemp(prefix="gridpeers-fmu-")
-        except OSError as error:
-            raise ValueError(f"law {path.name}: there is nowhere to unpack it: {error.strerror}; set TMPDIR") from None
+        self._unpacked = mkdtemp(prefix="gridpeers-fmu-")
         command = (sys.executable, "-P", "-m", "gridpeers.agents.carriers.fmu", str(path), self._unpacked)
-        try:
-            super().__init__(replace(choice, command=command), path.name, self._unpacked)
-        except ValueError:
-            shutil.rmtree(self._unpacked, ignore_errors=True)
-            raise
+        super().__init__(replace(choice, command=command), path.name, self._unpacked)
         self._patience = max(10.0, self._patience)  # s, to be loaded
 
     def close(self) -> None:
         super().close()
         shutil.rmtree(self._unpacked, ignore_errors=True)
-
-    def _says(self, error: str, what: str) -> str:
-        return printable(error, 300)
 
 
 class LoadedFmu(Law):
@@ -241,12 +226,8 @@ def main(path: str, folder: str) -> None:
         except LawError as error:
             answer = {"error": str(error)}
         os.write(answers, msgspec.json.encode(answer) + b"\n")
-    try:
-        if law is not None:
-            law.close()
-    except ANYTHING as error:  # the run is over
-        print(f"{Path(path).name}: cannot be freed: {named(error)}", file=sys.stderr)
-    shutil.rmtree(folder, ignore_errors=True)
+    if law is not None:
+        law.close()
 
 
 def _answer(law: LoadedFmu, asked: dict[str, Any]) -> dict[str, Any]:

@@ -54,9 +54,8 @@ def _command_problems(command: tuple[str, ...]) -> list[str]:
         return ["is empty; write the program first"]
     if is_no_path(command[0]):
         return ["begins with what can be no name of a program"]
-    if not all(word.isprintable() or word.isascii() for word in command):
-        return ["has a character in it that is no text"]
-    return ["has the character 0 in it, which no command can have"] if any("\0" in word for word in command) else []
+    wrong = any("\0" in word or not (word.isprintable() or word.isascii()) for word in command)
+    return ["has a character in it that no command can have"] if wrong else []
 
 
 def _class_problems(choice: LawChoice, parameters: Mapping[str, Any]) -> list[Problem]:

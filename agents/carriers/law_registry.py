@@ -22,10 +22,7 @@ KEYS = (*CARRIERS, "shared", "folder", "time_limit_s")
 
 
 def _objection(it: Any) -> str:
-    if wrong := class_objection(it, Law, "step", ("own", "neighbours", "T"), KEYS):
-        return wrong
-    method = next((name for name in ("start", "close") if not callable(getattr(it, name))), "")
-    return f"its {method} is no method; give the parameter another name" if method else ""
+    return class_objection(it, Law, "step", ("own", "neighbours", "T"), KEYS)
 
 
 LAWS: Registry[type[Law]] = Registry(

@@ -14,7 +14,7 @@ import subprocess
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from time import monotonic
-from typing import Any, Literal
+from typing import Any
 
 import msgspec
 
@@ -90,17 +90,17 @@ LONGEST_LINE = 100_000
 EXAMPLE = '{"P_set": 0.5, "V_set": 1.0}'
 
 
-class ProgramReady(msgspec.Struct, frozen=True, kw_only=True):
-    type: Literal["ready"] = "ready"
-    error: str = ""
+class ProgramAnswer(msgspec.Struct, frozen=True, kw_only=True):
+    """Answer to a step; that to a start says no more than `error`."""
 
-
-class ProgramDecision(msgspec.Struct, frozen=True, kw_only=True):
     P_set: float | None = None
     V_set: float | None = None
     shared: dict[str, float] = {}
     send: bool = True
     error: str = ""
+
+
+_decode = msgspec.json.Decoder(ProgramAnswer).decode
 
 
 class ProgramLaw(Law):
@@ -131,12 +131,12 @@ class ProgramLaw(Law):
         self._patience = FIRST * choice.time_limit
 
     def start(self, own: Own) -> None:
-        self._ask({"type": "start", "own": own._asdict(), "parameters": self._choice.parameters}, ProgramReady, own.t)
+        self._ask({"type": "start", "own": own._asdict(), "parameters": self._choice.parameters}, own.t)
 
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
         around = [other._asdict() | {"shared": dict(other.shared)} for other in neighbours]
         line = {"type": "step", "own": own._asdict(), "neighbours": around, "T": T}
-        decision = self._ask(line, ProgramDecision, own.t)
+        decision = self._ask(line, own.t)
         if decision.P_set is None or decision.V_set is None:
             missing = "P_set" if decision.P_set is None else "V_set"
             raise LawError(f"{self._name} answered a step at t = {own.t:.6g} s without {missing}; e.g. {EXAMPLE}")
@@ -159,7 +159,7 @@ class ProgramLaw(Law):
         self._group.program.stdout.close()
         self._group = None
 
-    def _ask(self, line: dict[str, Any], answer: type[Any], t: float) -> Any:
+    def _ask(self, line: dict[str, Any], t: float) -> ProgramAnswer:
         """Send a line and return the answer; raise LawError if there is none in time, or something else."""
         what = f"{line['type']} at t = {t:.6g} s"
         if self._group is None:
@@ -170,17 +170,14 @@ class ProgramLaw(Law):
         except BrokenPipeError:
             raise LawError(self._ended(what)) from None
         try:
-            decoded = decode_foreign(msgspec.json.Decoder(answer).decode, reply)
+            decoded = decode_foreign(_decode, reply)
         except msgspec.DecodeError:
             shown = printable(reply.decode(errors="replace"), 100)
             raise LawError(f"{self._name} answered the {what} with {shown!r}, which is none; e.g. {EXAMPLE}") from None
         if decoded.error:
-            raise LawError(self._says(decoded.error, what))
+            raise LawError(f"{self._name} says: {printable(decoded.error, 300)} ({what})")
         self._patience = self._choice.time_limit
         return decoded
-
-    def _says(self, error: str, what: str) -> str:
-        return f"{self._name} says: {printable(error, 200)} ({what})"
 
     def _put(self, line: bytes, what: str) -> None:
         """Write a line to the program; one that does not read fills the pipe, and then would block."""
