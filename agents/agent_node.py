@@ -125,7 +125,6 @@ class AgentNode:
         self.name, self.watched, self.token = name, keys.any_alive, keys.alive_agent(name, instance)
         self.tokens = (self.token,)
         self.siblings: set[str] = set()
-        """Agents of the same process, whose messages do not come from outside."""
 
         phases = self.phases = Phases(AGENT_PHASES)
         self.stopped = ""
@@ -140,8 +139,7 @@ class AgentNode:
         """Key of the own queryable, and its answer."""
         heard = self.heard = Hearing(agent, links)
         reports = self._reports = AgentReports(post, heard, instance, empty=links is not None and not realtime)
-        self._reason = ""
-        """Why it leaves."""
+        self._reason = ""  # why it leaves
         self._timed: Traffic | None = None
         self._decisions: DecisionJournal | None = None
         if config.record != "physics":
@@ -156,8 +154,7 @@ class AgentNode:
             self.policy = AgentTimer(config, post, phases, heard, open_meeting, reports, self._timed)
         else:
             known.add(agent.nameplate)
-            roster = RosterMeeting(post, phases, known, agent, instance)
-            roster.on_state = self._on_state
+            roster = RosterMeeting(post, phases, known, agent, instance, self._on_state)
             self.policy = AgentBarrier(config, post, phases, heard, roster, reports, self.siblings)
         post.on_nameplate = self.policy.meeting.on_nameplate
         self.routes[keys.stop_request(name, instance)] = Route(PLANT, (Stop,), self._on_stop)
@@ -254,7 +251,6 @@ class AgentNode:
     def _follow(self, epoch: int) -> None:
         """Begin anew with another plant; one whose token was gone for a while goes on where it was."""
         if self._plant_epoch not in (0, epoch):
-            self.policy.hold("the plant restarted; starts from its measurement")
             self.policy.new_plant()
         self._plant_epoch = epoch
 

@@ -26,8 +26,7 @@ AgentProcess = AgentConfig | tuple[AgentConfig, ...]
 """Configuration of a process: one agent, or several."""
 
 OPENED_AGAIN, OPENED_WITHIN = 1.0, 60.0
-"""Time (s) between two tries to open a session in place of a broken one, and time (s) for all of them: meanwhile keys
-are copied, or files closed."""
+"""Time (s) between two tries to open a session in place of a broken one, and time (s) for all of them."""
 
 
 def run_agents(process: AgentProcess, make_links: MakeLinks = no_links) -> str:

@@ -41,10 +41,7 @@ class DecisionJournal:
             else:
                 if agent.saturated == _NOT_SATURATED:
                     return False
-        try:
-            states: list[int | None] = [tick - heard[name].seq for name in neighbours]
-        except KeyError:
-            states = [tick - heard[name].seq if name in heard else None for name in neighbours]
+        states = [tick - heard[name].seq if name in heard else None for name in neighbours]
         unused = [] if len(used) == len(neighbours) else self._reasons(neighbours, states)
         weights = [neighbour.weight for neighbour in used] if self._weighs else []
         others = (measurement, unused, weights, agent.saturated)

@@ -72,15 +72,16 @@ class KnownAgents:
 
 
 class RosterMeeting:
-    """The roster of one agent, and what is missing until it is `ready` for it.
+    """The roster of one agent, and what is missing until it is `ready` for it; states go to `on_state`.
 
     It stays ready if an agent dies: the next roster changes that.
     """
 
-    def __init__(self, post: Post, phases: Phases, known: KnownAgents, agent: Agent, instance: str) -> None:
+    def __init__(
+        self, post: Post, phases: Phases, known: KnownAgents, agent: Agent, instance: str, on_state: Handler
+    ) -> None:
         self._post, self._phases, self._known, self._agent, self._instance = post, phases, known, agent, instance
-        self.on_state: Handler
-        """Takes the states of in-neighbours."""
+        self._on_state = on_state
         self.on_ready: Callable[[int, float], None]
         """Takes the number of a roster for which the agent is ready, and the time; again if the plant asks again."""
         self._pairwise = is_pairwise(known.control)
@@ -175,7 +176,7 @@ class RosterMeeting:
         post, instance = self._post, self._known.members.instance(name)
         post.admission.bind(name, self._known.nameplate(name).epoch)
         self._proofs[name, instance] = False
-        post.listen(post.keys.state(name), Route(name, (State,), self.on_state))
+        post.listen(post.keys.state(name), Route(name, (State,), self._on_state))
         post.ask(name, instance)
 
     def _meet_neighbours(self) -> dict[str, str]:

@@ -144,6 +144,7 @@ class AgentTimer:
             self.upkeep.missing_agents = message.waits_for
 
     def new_plant(self) -> None:
+        self.hold("the plant restarted; starts from its measurement")
         self._ran = False
         self.upkeep.new_plant()
 

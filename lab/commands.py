@@ -91,9 +91,6 @@ def _tell_notes(notes: Iterable[str]) -> None:
         typer.echo(f"NOTE  {note}")
 
 
-# -------------------------------------------------------------------- gridpeers trace
-
-
 def trace(
     run: RecordedRun,
     out: Annotated[Path | None, option("FILE", "The trace; trace.pftrace beside the record when left out.")] = None,
@@ -119,9 +116,6 @@ def trace(
         arrows = write_perfetto_trace(record, target)
     _tell_notes(record.damage)
     typer.echo(f"{shown(target)}: {arrows} messages")
-
-
-# -------------------------------------------------------------------- gridpeers replay
 
 
 CHANGES = "--without, --law or --set"

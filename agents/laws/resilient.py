@@ -8,14 +8,9 @@ m_q q in (14), (15), each by itself. The leaders' own errors stay as they are: n
 **Claim of the paper.** With at most F liars among the neighbours of each honest agent, consensus never leaves the range
 of the honest agents' values, on any graph. They agree if the graph is (2F + 1)-robust; `gridpeers predict` has r.
 
-Before the trimming come three defences of ours, each of them off at 0:
-
-- `tolerance`: a state is implausible that no inverter can have. All inverters of an island see one frequency, so a
-  neighbour on its droop delivers p_j = P_set,j - e/m_p,j, e being the own frequency error. P_set,j and p_j must be
-  within P_set_min and P_set_max, and q_j within -1 and 1, each give or take the tolerance (pu).
-- `rate`: what counts of a neighbour's P_set and Q moves by at most this much a second (pu/s).
-- `T_out`: whoever is implausible does not count at that tick, and is trusted less: its weight falls to 1/e in T_out.
-  It comes back ten times as slowly, so that one who lies at every other tick stays out as well.
+Before the trimming come three defences of ours, each of them off at 0: `tolerance`, `rate` and `T_out` (docs/laws.md).
+All inverters of an island see one frequency, so a neighbour on its droop delivers p_j = P_set,j - e/m_p,j, e being the
+own frequency error: by that it is plausible or not.
 """
 
 from __future__ import annotations
