@@ -6,6 +6,7 @@ The driver decides nothing about the run. It takes the plant's telemetry as any 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from math import inf
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -112,8 +113,10 @@ class _ProcessDriver:
         self._began = self._ended_at = monotonic()
         self._started: float | None = None
         self._plant_ready = self._ended = False
-        self._plant_left: float | None = None
-        """When (s, monotonic) the plant's process ended in order, so that its last telemetry is still to come."""
+        self._left: Child | None = None
+        """The process that ended in order, so that the plant's last telemetry is still to come."""
+        self._left_at = inf
+        """When it did so (s, monotonic)."""
         self._events: list[PlantEvent] = []
         self._awaited: list[str] = []
         self._notes: dict[str, str] = {}
@@ -133,7 +136,7 @@ class _ProcessDriver:
         client, since = self.client, self._began
         while not self._ended:
             deadline = self._plant_deadline if self._plant_ready else BUILD_DEADLINE
-            limit = min(deadline, supervisor.faults.wait, LAST_TELEMETRY if self._plant_left is not None else deadline)
+            limit = min(deadline, supervisor.faults.wait, LAST_TELEMETRY if self._left is not None else deadline)
             asked = monotonic()
             words = client.take(limit)
             now = monotonic()
@@ -149,8 +152,8 @@ class _ProcessDriver:
                     self._note_exit(next(one for one in supervisor.children if str(one.pid) == word), supervisor)
             if client.progress is not None:
                 supervisor.faults.note_time(*client.progress)
-            if self._plant_left is not None and not self._ended and now - self._plant_left > LAST_TELEMETRY:
-                self._end(supervisor.children[PLANT].report(self._when))
+            if self._left is not None and not self._ended and now - self._left_at > LAST_TELEMETRY:
+                self._end(self._left.report(self._when))
             if not self._ended:
                 supervisor.work(self._awaited)
                 self._awaited.clear()
@@ -174,8 +177,11 @@ class _ProcessDriver:
 
     def _note_exit(self, child: Child, supervisor: Supervisor) -> None:
         begun = self.client.latest is not None
-        if child.name == PLANT and child.status == 0 and begun:
-            self._plant_left = monotonic()
+        # in simulated time a run does not begin without one of its agents
+        ends_it = child.name == PLANT if begun else child.name != PLANT and not self._wall
+        if child.status == 0 and ends_it:
+            if self._left is None:
+                self._left, self._left_at = child, monotonic()
         elif child.name == PLANT or (supervisor.failed(child) and not self._wall and (child.crashed or not begun)):
             self._end(child.report(self._when))
         elif supervisor.failed(child):

@@ -161,6 +161,16 @@ def test_who_cannot_start_ends_the_run_at_once(tmp_path: Path) -> None:
     assert "cannot open a Zenoh session (listening on tcp/256.0.0.1:0)" in outcome.broke
 
 
+def test_an_agent_that_is_asked_to_leave_before_the_start_ends_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its exit status is 0, and the plant would wait for it until the deadline."""
+    run = ProcessRun(*toy_configs(3), tmp_path)
+    monkeypatch.setattr(run, "_started", lambda children: children["inv2"].signal(signal.SIGINT))
+
+    assert run().broke.startswith("inv2 exited with status 0 before t = 0. Its last lines:")
+
+
 def test_a_plant_that_cannot_start_ends_the_run_at_once(tmp_path: Path) -> None:
     """The plant's last lines name the mistake in its configuration."""
     plant, agents = toy_configs(2)
