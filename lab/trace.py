@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gridpeers.netem.ledger import Outcome, copies_of
+from gridpeers.scenarios.console import in_order
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.results.run_files import write_whole
 from gridpeers.scenarios.results.sharing_index import sharing_index
-from gridpeers.scenarios.short_texts import in_order
 from gridpeers.wire.codec import sound
 from gridpeers.wire.journal import EACH_TICK, MessageReference, ReceivedMessage, SentMessage, kind_of
 from gridpeers.wire.messages import PLANT, State

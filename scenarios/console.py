@@ -1,4 +1,4 @@
-"""Where text for people goes: the terminal of a command, or a string. Every text is printed as it is.
+"""Text for people: the terminal or string that it goes to, where it is printed as it is; and what is made short.
 
 Names and titles are a user's: "[bold]" and ":boom:" are no markup and no picture. A notebook's kernel shows what is
 printed, and returns what is a string: rich would show both, and return nothing.
@@ -6,8 +6,10 @@ printed, and returns what is a string: rich would show both, and return nothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from io import StringIO
+import math
+import re
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
+from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -26,6 +28,52 @@ def terminal(**options: Any) -> Console:
 
 def text_of(print_on: Callable[[Console], None]) -> str:
     """Return the text that a function prints on a console, without blanks at the ends of lines."""
-    text = StringIO()
-    print_on(terminal(file=text, width=_WIDE, color_system=None, force_terminal=False))
-    return "\n".join(line.rstrip() for line in text.getvalue().split("\n"))
+    console = terminal(width=_WIDE, color_system=None, force_terminal=False)
+    with console.capture() as printed:
+        print_on(console)
+    return "\n".join(line.rstrip() for line in printed.get().split("\n"))
+
+
+def in_order(names: Iterable[str]) -> list[str]:
+    """Names in the order in which people count: inv2 before inv10."""
+    return sorted(names, key=lambda name: (name.rstrip("0123456789"), len(name), name))
+
+
+def short(names: tuple[str, ...] | list[str]) -> str:
+    """Return names of one stem and running numbers in few characters, as "inv1,3-5 north"; "-" for none."""
+    parts = [re.fullmatch(r"(.*?)(\d*)", name, re.DOTALL) for name in names]
+    split = [(match[1], match[2]) for match in parts if match is not None]
+    words = []
+    for stem, group in groupby(split, key=lambda part: (part[0], bool(part[1]))):
+        if not stem[1]:
+            words += [name for name, _ in group]
+            continue
+        numbers = sorted(int(number) for _, number in group)
+        runs = [
+            [number for _, number in run]
+            for _, run in groupby(enumerate(numbers), key=lambda place: place[1] - place[0])
+        ]
+        words.append(
+            stem[0] + ",".join(f"{run[0]}-{run[-1]}" if len(run) > 2 else ",".join(map(str, run)) for run in runs)
+        )
+    return " ".join(words) or "-"
+
+
+_UNITS = ((120, 1, "s"), (7200, 60, "min"), (172_800, 3600, "h"), (math.inf, 86_400, "days"))
+
+
+def duration(seconds: float) -> str:
+    """Return a length of time (s) in words, of two digits: more would promise too much."""
+    unit, name = next((unit, name) for bound, unit, name in _UNITS if seconds < bound)
+    return f"{float(f'{seconds / unit:.2g}'):g} {name}"
+
+
+def aligned(rows: Sequence[Sequence[str]], right: Container[int]) -> Iterator[str]:
+    """Yield the lines of a table, two blanks between its columns; `right` has those that end in line."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        cells = (
+            cell.rjust(width) if i in right else cell.ljust(width)
+            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
+        )
+        yield "  ".join(cells).rstrip()

@@ -11,9 +11,9 @@ from gridpeers.agents.laws.call import objection_to
 from gridpeers.agents.laws.law import Neighbour
 from gridpeers.lab.explanation.law_step import LawStep, law_step
 from gridpeers.netem.ledger import Outcome, copies_of
+from gridpeers.scenarios.console import short
 from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
 from gridpeers.scenarios.record.recorded_decision import NeighbourInput, RecordedDecision
-from gridpeers.scenarios.short_texts import short
 from gridpeers.wire.journal import MessageReference, ReceivedMessage, RejectedCount, kind_of, name_of
 from gridpeers.wire.messages import OFF, VALUES, PlantEvent, State
 from gridpeers.wire.wording import counted

@@ -40,10 +40,10 @@ from gridpeers.lab.replay.recorded_process import (
     tick_message,
 )
 from gridpeers.plant.build import start_plant
+from gridpeers.scenarios.console import in_order
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.results.case_tables import QUANTITIES
-from gridpeers.scenarios.short_texts import in_order
 from gridpeers.wire.codec import decode
 from gridpeers.wire.messages import PLANT, AnyMessage, Measurement, Telemetry
 

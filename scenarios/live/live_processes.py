@@ -19,7 +19,7 @@ from gridpeers.plant.known_names import COMPILING, READY
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_process import run_plant
 from gridpeers.plant.realtime.pacer import sentence
-from gridpeers.scenarios.console import terminal
+from gridpeers.scenarios.console import short, terminal
 from gridpeers.scenarios.drivers.children import Child
 from gridpeers.scenarios.drivers.forking import release
 from gridpeers.scenarios.drivers.supervisor import Supervisor
@@ -34,7 +34,6 @@ from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.scenarios.results.record import Recorded, Recorder, RecordError
 from gridpeers.scenarios.results.run_files import set_broken, set_complete, shown
 from gridpeers.scenarios.run_request import Request
-from gridpeers.scenarios.short_texts import short
 from gridpeers.wire.driver.drive import StoppedError
 from gridpeers.wire.driver.ending import stop_at_signals
 from gridpeers.wire.driver.machine import keep_out_of_the_heap

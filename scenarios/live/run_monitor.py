@@ -14,7 +14,7 @@ from typing import Any
 import msgspec
 
 from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.scenarios.short_texts import in_order, short
+from gridpeers.scenarios.console import in_order, short
 from gridpeers.wire.keys import Keys, epoch_of, run_of_plant
 from gridpeers.wire.membership import MOST_PROCESSES
 from gridpeers.wire.messages import MOST_INVERTERS, AgentStatus, Pacing, PlantEvent, Telemetry

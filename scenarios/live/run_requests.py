@@ -13,11 +13,11 @@ import msgspec
 
 from gridpeers.agents.agent_config import AgentConfig, check_nameplate
 from gridpeers.plant.equipment.named_loads import FACTOR
+from gridpeers.scenarios.console import in_order
 from gridpeers.scenarios.emulation.link_data import EmulationConfig, LinkCommand
 from gridpeers.scenarios.live.run_address import UsageError
 from gridpeers.scenarios.live.run_client import NobodyError, RunClient
 from gridpeers.scenarios.live.run_monitor import PlantStatus
-from gridpeers.scenarios.short_texts import in_order
 from gridpeers.wire.codec import decode_foreign, encode
 from gridpeers.wire.driver.command_line import command_line
 from gridpeers.wire.messages import MOST_COUNT, PLANT, Answer, Command, LinkAcknowledgement, LoadSetting

@@ -13,10 +13,10 @@ from rich.table import Table
 from rich.text import Text
 
 from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.scenarios.console import aligned, short
 from gridpeers.scenarios.live.run_client import RunClient
 from gridpeers.scenarios.live.run_monitor import InverterStatus, RunMonitor, Snapshot
 from gridpeers.scenarios.live.run_requests import plant_status, read_config
-from gridpeers.scenarios.short_texts import aligned, short
 from gridpeers.wire.messages import MOST_INVERTERS, PLANT, AgentStatus, Telemetry
 from gridpeers.wire.timing import SessionDeadline
 

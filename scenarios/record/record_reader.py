@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from gridpeers.netem.ledger import LinkCounts, LinkTrace
+from gridpeers.scenarios.console import short
 from gridpeers.scenarios.emulation.link_data import LinkReportData, data_of
 from gridpeers.scenarios.record.decision_reader import DecisionReader
 from gridpeers.scenarios.record.message_index import MessageIndex
@@ -22,7 +23,6 @@ from gridpeers.scenarios.record.record_file import RecordFile, RecordFileError, 
 from gridpeers.scenarios.record.recorded_decision import RecordedDecision
 from gridpeers.scenarios.results.history import History
 from gridpeers.scenarios.results.record import canonical
-from gridpeers.scenarios.short_texts import short
 from gridpeers.wire.journal import Entry
 from gridpeers.wire.messages import LinkReport, LinkRequest, Message, PlantEvent, Telemetry
 

@@ -18,11 +18,11 @@ import msgspec
 from gridpeers.plant.equipment import Tables
 from gridpeers.plant.tables import read_feeder
 from gridpeers.scenarios.catalogue_files import SWEEPS, names_in
+from gridpeers.scenarios.console import duration
 from gridpeers.scenarios.schema import ScenarioError, ScenarioModel, find_scenario, load_scenario
 from gridpeers.scenarios.schema.loading import check_tables, find_file, read_toml
 from gridpeers.scenarios.schema.participants import inverters_of
 from gridpeers.scenarios.schema.scenario_errors import Problems
-from gridpeers.scenarios.short_texts import duration
 from gridpeers.scenarios.sweep.axes import Axis, Setting, graph_axes, of_values, own_axes, samples
 from gridpeers.scenarios.sweep.paths import PathError, Tree, flatten, put, steps
 from gridpeers.scenarios.sweep.sweep_model import Sweep

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
+from gridpeers.scenarios.console import in_order, short
 from gridpeers.scenarios.results.history import History, Nameplates, as_they_came
 from gridpeers.scenarios.results.island_membership import IslandInterval, Islands, RecordedIsland
 from gridpeers.scenarios.schema import ScenarioModel
@@ -13,7 +14,6 @@ from gridpeers.scenarios.schema.configs import limits_of
 from gridpeers.scenarios.schema.participants import without_agent
 from gridpeers.scenarios.schema.plugin_keys import law_of
 from gridpeers.scenarios.schema.scenario_model import Event, LoadChange
-from gridpeers.scenarios.short_texts import in_order, short
 
 if TYPE_CHECKING:
     from gridpeers.scenarios.checks.checked_case import CheckedCase

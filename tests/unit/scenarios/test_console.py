@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 from gridpeers.cli.progress import progress
-from gridpeers.scenarios.console import terminal
-from gridpeers.scenarios.short_texts import duration, short
+from gridpeers.scenarios.console import duration, short, terminal
 
 ROOT = Path(__file__).parents[3]
 USERS = "law boom:Boom: [red]of[/red] [bus 7] C:\\feeders\\[a]"
