@@ -140,8 +140,13 @@ _OF_PLANTS = (
 _SET_BY_US = {"ZENOH_RUNTIME"}
 """Variables that loading Zenoh sets here as it does there."""
 
-_kept: dict[tuple[str, ...], tuple[tuple[int, str, dict[str, str]], ForkServer]] = {}
-"""By modules: what the server has inherited (owner, folder, variables; once it differs, another is needed), and it."""
+_kept: dict[tuple[str, ...], ForkServer] = {}
+"""Servers by the modules that they have imported."""
+
+_inherited: tuple[int, str, dict[str, str]] | None = None
+"""Owner, folder and variables that these servers have inherited; once they differ, others are needed."""
+
+_lock = threading.RLock()
 
 
 def agent_server(module: str = "gridpeers.agents", *, start: bool = True) -> ForkServer | None:
@@ -149,7 +154,7 @@ def agent_server(module: str = "gridpeers.agents", *, start: bool = True) -> For
 
 
 def plant_server() -> ForkServer | None:
-    return _server(_OF_PLANTS, start=True)
+    return _server(_OF_PLANTS)
 
 
 def prepare() -> None:
@@ -158,32 +163,28 @@ def prepare() -> None:
     agent_server()
 
 
+@atexit.register
 def release() -> None:
     """End the servers of this process: it goes on for long and starts few others from now on, or it ends."""
-    for preload, ((owner, *_), server) in list(_kept.items()):
-        if owner == os.getpid():  # else it is the server of the process that has forked this one
-            del _kept[preload]
-            server.close()
-
-
-def _server(preload: tuple[str, ...], *, start: bool) -> ForkServer | None:
-    """Return the server with these modules, started if so wished; None if there is none, or this system cannot fork."""
-    if not AVAILABLE or not (start or preload in _kept):
-        return None
-    variables = {name: value for name, value in os.environ.items() if name not in _SET_BY_US}
-    try:
-        surroundings = os.getpid(), str(Path.cwd()), variables
-        if preload in _kept:
-            before, server = _kept.pop(preload)
-            if before == surroundings and server.lives:
-                _kept[preload] = before, server
-                return server
-            if before[0] == os.getpid():
+    with _lock:
+        if _inherited is not None and _inherited[0] == os.getpid():  # else they are of the process that forked this one
+            for server in _kept.values():
                 server.close()
-        server = ForkServer(preload)
-    except (ForkServerError, OSError):  # among others, the working directory has been deleted
-        return None
-    atexit.unregister(release)
-    atexit.register(release)
-    _kept[preload] = surroundings, server
-    return server
+        _kept.clear()
+
+
+def _server(preload: tuple[str, ...], *, start: bool = True) -> ForkServer | None:
+    """Return the server with these modules, started if so wished; None if there is none, or this system cannot fork."""
+    global _inherited
+    variables = {name: value for name, value in os.environ.items() if name not in _SET_BY_US}
+    with _lock:
+        try:
+            now = os.getpid(), str(Path.cwd()), variables
+            if now != _inherited:
+                release()
+                _inherited = now
+            if start and AVAILABLE and not (preload in _kept and _kept[preload].lives):
+                _kept[preload] = ForkServer(preload)
+        except (ForkServerError, OSError):  # among others, the working directory has been deleted
+            return None
+        return _kept.get(preload)

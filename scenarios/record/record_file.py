@@ -11,17 +11,17 @@ import struct
 from collections.abc import Collection, Iterator
 from io import BytesIO
 from pathlib import Path
-from typing import BinaryIO, NamedTuple, get_args
+from typing import BinaryIO, NamedTuple
 
 import msgspec
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, Header, Message, Metadata
+from mcap.records import Chunk, Header, Message, Metadata
 from mcap.stream_reader import breakup_chunk
 
-from gridpeers.scenarios.record.record_info import FILE, FORMAT, METADATA, PROFILE, RecordInfo, Topic
+from gridpeers.scenarios.record.record_info import FILE, FORMAT, METADATA, PROFILE, TOPICS, RecordInfo, Topic
 from gridpeers.wire.codec import decode_foreign
 from gridpeers.wire.wording import InputError, suggestion
 
@@ -30,6 +30,7 @@ _FRAME = struct.Struct("<BQ")
 _TIMES = struct.Struct("<QQ")
 _FOOTER = 20  # Bytes of the record that ends a file
 RECENT = 8  # Chunks whose messages stay in memory
+_TOPICS = dict(enumerate(TOPICS.values(), 1))  # By channel, as our writer numbers them
 
 _BROKEN = (
     McapError, struct.error, ValueError, KeyError, OverflowError, MemoryError, zstandard.ZstdError, RuntimeError,
@@ -69,8 +70,6 @@ class RecordFile:
         """True once a damaged chunk was met: the file ends there then."""
         self._offset = 0
         """Where the first record begins that could not be read yet."""
-        self._topics: dict[int, Topic] = dict(enumerate(get_args(Topic), 1))
-        """Topic of each channel: those of our writer, as the first chunk, which names them, may not be read yet."""
         self._chunks: list[_ChunkPlace] = []
         self.ends: list[float] = []
         """Latest run time (s) up to the end of each part that can be read on its own, in the order of the file."""
@@ -201,10 +200,8 @@ class RecordFile:
             return ()
         messages = []
         for record in records:
-            if isinstance(record, Channel):
-                self._topics[record.id] = record.topic  # type: ignore[assignment]  # a topic that is none of ours is never asked for
-            elif isinstance(record, Message) and record.channel_id in self._topics:
-                topic = self._topics[record.channel_id]
+            if isinstance(record, Message) and record.channel_id in _TOPICS:
+                topic = _TOPICS[record.channel_id]
                 messages.append(RecordMessage(topic, record.log_time, record.sequence, record.data))
         return tuple(messages)
 
@@ -214,8 +211,6 @@ def record_path(path: str | Path, case: str = "") -> Path:
 
     Raise RecordFileError if the folder has no record, none of that case, or those of several cases and none is chosen.
     """
-    if not isinstance(path, str | Path):
-        raise RecordFileError(f'{path!r:.60}: needs the path of a record, as "runs/islanding/latest/IV"')
     first, *others = records_in(Path(path), case)
     if others:
         cases = ", ".join(file.parent.name for file in (first, *others))

@@ -83,17 +83,9 @@ class RecordInfo(msgspec.Struct, frozen=True, kw_only=True):
         return next((config for config in self.agents if config.name == name), None)
 
     def to_metadata(self) -> dict[str, str]:
-        """Return the metadata of the file: all as JSON, and what people look for first."""
-        return {
-            "format": str(self.format),
-            "info": msgspec.json.encode(self).decode(),
-            "scenario": self.scenario,
-            "case": self.case,
-            "run": self.run,
-            "clock": self.clock,
-            "seed": str(self.seed),
-            "gridpeers": self.versions.get("gridpeers", ""),
-        }
+        """Return the metadata of the file: all as JSON, and what a reader of another version looks at."""
+        by = self.versions.get("gridpeers", "")
+        return {"format": str(self.format), "info": msgspec.json.encode(self).decode(), "gridpeers": by}
 
 
 Topic = Literal["telemetry", "journal", "link_reports", "link_requests"]
