@@ -29,7 +29,6 @@ _MAGIC = bytes((137, 77, 67, 65, 80, 48, 13, 10))
 _FRAME = struct.Struct("<BQ")
 _TIMES = struct.Struct("<QQ")
 _FOOTER = 20  # Bytes of the record that ends a file
-RECENT = 8  # Chunks whose messages stay in memory
 _TOPICS = dict(enumerate(TOPICS.values(), 1))  # By channel, as our writer numbers them
 
 _BROKEN = (
@@ -50,11 +49,6 @@ class RecordMessage(NamedTuple):
     data: bytes
 
 
-class _ChunkPlace(NamedTuple):
-    offset: int
-    length: int
-
-
 class RecordFile:
     """The file of one record, opened.
 
@@ -70,7 +64,8 @@ class RecordFile:
         """True once a damaged chunk was met: the file ends there then."""
         self._offset = 0
         """Where the first record begins that could not be read yet."""
-        self._chunks: list[_ChunkPlace] = []
+        self._chunks: list[tuple[int, int]] = []
+        """Place and length (bytes) of each chunk."""
         self.ends: list[float] = []
         """Latest run time (s) up to the end of each part that can be read on its own, in the order of the file."""
         self._info: RecordInfo | None = None
@@ -78,8 +73,6 @@ class RecordFile:
         if self._info is None:
             raise RecordFileError(f"{path}: it ends before it says what was recorded: {self._size} bytes")
         self.info: RecordInfo = self._info
-        self._recent: dict[int, tuple[RecordMessage, ...]] = {}
-        """Messages of the chunks that were read last, as readers go back and forth."""
 
     @property
     def damage(self) -> tuple[str, ...]:
@@ -99,12 +92,26 @@ class RecordFile:
         """Return the messages of a part; none if it is damaged, or behind a damaged one: the file ends there then."""
         if index >= len(self.ends):
             return ()
-        # not an lru_cache of a method: in a cycle with its file it would stay in memory long after
-        messages = self._recent.pop(index) if index in self._recent else self._load_chunk(index)
-        self._recent[index] = messages
-        if len(self._recent) > RECENT:
-            del self._recent[next(iter(self._recent))]
-        return messages
+        place, length = self._chunks[index]
+        try:
+            with self.path.open("rb") as file:
+                file.seek(place)
+                data = file.read(length)
+            records = breakup_chunk(Chunk.read(ReadDataStream(BytesIO(data))), validate_crc=True)
+        except OSError as error:
+            raise RecordFileError(f"{self.path}: cannot be read: {error.strerror}") from None
+        except _BROKEN as error:
+            del self.ends[index:], self._chunks[index:]
+            self.damaged, self.complete = True, False
+            why = str(error)[:100] or type(error).__name__
+            self._end = f"the file is damaged after t = {self.t_end:.2f} s, and read up to there: {why}"
+            return ()
+        messages = []
+        for record in records:
+            if isinstance(record, Message) and record.channel_id in _TOPICS:
+                topic = _TOPICS[record.channel_id]
+                messages.append(RecordMessage(topic, record.log_time, record.sequence, record.data))
+        return tuple(messages)
 
     def refresh(self) -> None:
         """Note what was written since, of a run that is still recorded."""
@@ -138,7 +145,7 @@ class RecordFile:
                 return ""
             if opcode == Opcode.CHUNK and length > _TIMES.size:
                 _, until = _TIMES.unpack(file.read(_TIMES.size))
-                self._chunks.append(_ChunkPlace(start, length))
+                self._chunks.append((start, length))
                 self.ends.append(max(self.t_end, until / 1e9))  # a part may have late messages alone
             elif opcode == Opcode.HEADER:
                 self._check_header(file.read(length))
@@ -182,28 +189,6 @@ class RecordFile:
             raise RecordFileError(
                 f"{self.path}: what it says about its run (written by gridpeers {by[:40]}) cannot be read: {error}"
             ) from None
-
-    def _load_chunk(self, index: int) -> tuple[RecordMessage, ...]:
-        place = self._chunks[index]
-        try:
-            with self.path.open("rb") as file:
-                file.seek(place.offset)
-                data = file.read(place.length)
-            records = breakup_chunk(Chunk.read(ReadDataStream(BytesIO(data))), validate_crc=True)
-        except OSError as error:
-            raise RecordFileError(f"{self.path}: cannot be read: {error.strerror}") from None
-        except _BROKEN as error:
-            del self.ends[index:], self._chunks[index:]
-            self.damaged, self.complete = True, False
-            why = str(error)[:100] or type(error).__name__
-            self._end = f"the file is damaged after t = {self.t_end:.2f} s, and read up to there: {why}"
-            return ()
-        messages = []
-        for record in records:
-            if isinstance(record, Message) and record.channel_id in _TOPICS:
-                topic = _TOPICS[record.channel_id]
-                messages.append(RecordMessage(topic, record.log_time, record.sequence, record.data))
-        return tuple(messages)
 
 
 def record_path(path: str | Path, case: str = "") -> Path:
