@@ -194,11 +194,6 @@ class Post:
         if self.vouches is not None and not self.vouches(name):
             raise RejectedError("impostor", f"{name} says who it is, but no link has the certificate of {name}")
 
-    def release(self) -> None:
-        """Let go of the node after its end: in a cycle all that the run had would stay in memory."""
-        self.routes.clear()
-        self.on_nameplate, self.plant = _ignore, None
-
     def _on_nameplate(self, instance: str, nameplate: Nameplate, payload: bytes, now: float) -> None:
         self.check_certificate(nameplate.sender)
         self.on_nameplate(instance, nameplate, self.members.meet(instance, nameplate), now)

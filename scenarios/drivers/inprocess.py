@@ -211,8 +211,6 @@ def run_inprocess(
             stepper = _run_direct(plant_config, tuple(known.values()), laws, plant, note, on_other)
     failed = tuple(agent.failed for agent in agents if agent.failed)
     rejects = tuple(line for each in nodes for line in each.rejects.take_lines())
-    for each in nodes:
-        each.post.release()
     return Outcome(
         broke=stepper.outcome,
         reproducible=stepper.reproducible,
