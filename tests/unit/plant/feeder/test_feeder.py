@@ -142,6 +142,17 @@ def test_a_gfl_alone_stops_and_comes_back() -> None:
     assert pytest.approx(2401.8, rel=0.05) == on.V
 
 
+def test_both_gfl_representations_settle_alike() -> None:
+    """Voltage-source and current-source GFL end at the same operating point on the feeder."""
+    ends = []
+    for model in ("voltage_source", "current_source"):
+        p = plant(*opened(0.1, "13-152"), gfl=Gfl(model=model))
+        run(p, 6.0)
+        ends.append([(r.P, r.Q) for r in p.measure().values()])
+
+    assert np.array(ends[0]) == pytest.approx(np.array(ends[1]), abs=50.0)
+
+
 def test_rows_come_at_the_recording_step_and_an_event_between_ticks_acts_at_its_own() -> None:
     """A switch operated at 0.03 s, between two ticks of 0.02 s, shows in the row of 0.032 s and not before."""
     p = plant(*opened(0.03, "13-152"), record=0.002)
