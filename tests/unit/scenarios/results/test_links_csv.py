@@ -20,7 +20,8 @@ from gridpeers.scenarios.results.case_tables import LINKS, write_tables
 from gridpeers.scenarios.results.history import History
 from gridpeers.scenarios.results.link_record import LinkRecord
 from gridpeers.scenarios.results.record import Recorder
-from gridpeers.wire.messages import LinkReport, Telemetry
+from gridpeers.wire.messages import LinkReport
+from tests.unit.scenarios.results.test_record import row, telemetry
 
 NO_ROWS = History.of((), b"")
 
@@ -31,16 +32,21 @@ def test_every_row_of_links_csv_has_the_header_s_columns_whatever_befell_the_mes
     receiver = Receiver("inv2", Netem(seed=3, links=(fault,)), {"inv1": "MG1", "inv2": "MG1"})
     for k in range(60):
         receiver.offer("inv1", k, 0.02 * k, 0.02 * k, bytes(100))
-    record = LinkRecord()
-    for data in report_data(receiver.take_trace(), receiver.counts(), receiver.trace_sha256):
-        record(LinkReport(sender="inv2", epoch=1, seq=0, t=1.2, data=data))
-    write_tables(tmp_path, NO_ROWS, (), record.traces)
+    with Recorder(tmp_path / "IV") as recorder:
+        recorder(telemetry((row(0.0),)))
+        for data in report_data(receiver.take_trace(), receiver.counts(), receiver.trace_sha256):
+            recorder(LinkReport(sender="inv2", epoch=1, seq=0, t=1.2, data=data))
+        record = recorder.finish(0.0, 0.02).links
 
-    with (tmp_path / "links.csv").open(newline="") as file:
+    files = {path.name for path in (tmp_path / "IV").iterdir()}
+    assert files == {"history.csv", "events.csv", "links.csv", "links.json"}
+    assert json.loads((tmp_path / "IV" / "links.json").read_text())["accounts"][0]["sent"] == 60
+    assert next(record.lines()).startswith("emulated links: 60 messages over 1 links")
+    with (tmp_path / "IV" / "links.csv").open(newline="") as file:
         rows = list(csv.DictReader(file, strict=True))
     assert tuple(rows[0]) == LINKS
-    assert {len(row) for row in rows} == {len(LINKS)}  # DictReader keeps what is too much under the key None
-    found = {(int(row["seq"]), row["delay_s"], row["fate"]) for row in rows}
+    assert {len(each) for each in rows} == {len(LINKS)}  # DictReader keeps what is too much under the key None
+    found = {(int(each["seq"]), each["delay_s"], each["fate"]) for each in rows}
     expected = set()
     for trace in record.traces:
         for seq, outcome in zip(trace.seq, trace.outcome, strict=True):
@@ -52,36 +58,7 @@ def test_every_row_of_links_csv_has_the_header_s_columns_whatever_befell_the_mes
                 flipped = "" if bit is None else f", bit {bit} flipped"
                 expected.add((seq, str(delay_s), ("copy" if copy else "passed") + flipped))
     assert found == expected
-    assert any("passed, bit" in row["fate"] for row in rows)
-    assert any("copy, bit" in row["fate"] for row in rows)
-
-
-def test_the_recorder_of_a_case_writes_the_files_of_its_links(tmp_path: Path) -> None:
-    """Telemetry and link reports go into one record."""
-    receiver = Receiver("inv2", Netem(seed=3, links=(Fault(on="* -> inv2", loss=0.2),)), {"inv1": "MG1", "inv2": "MG1"})
-    receiver.offer("inv1", 0, 0.0, 0.0, b"state")
-    telemetry = Telemetry(
-        sender="plant",
-        epoch=1,
-        seq=0,
-        t=0.0,
-        inverters=("inv1",),
-        rows=((0.0,) * 7,),
-        events=(),
-        final=True,
-        outcome="",
-        reproducible=True,
-    )
-    with Recorder(tmp_path / "IV") as recorder:
-        recorder(telemetry)
-        for data in report_data(receiver.take_trace(), receiver.counts(), receiver.trace_sha256):
-            recorder(LinkReport(sender="inv2", epoch=1, seq=0, t=0.0, data=data))
-        recorded = recorder.finish(0.0, 0.02)
-
-    files = {path.name for path in (tmp_path / "IV").iterdir()}
-    assert files == {"history.csv", "events.csv", "links.csv", "links.json"}
-    assert json.loads((tmp_path / "IV" / "links.json").read_text())["accounts"][0]["sent"] == 1
-    assert next(recorded.links.lines()).startswith("emulated links: 1 messages over 1 links")
+    assert all(any(f"{kind}, bit" in each["fate"] for each in rows) for kind in ("passed", "copy"))
 
 
 def test_the_line_of_the_report_says_whose_states_were_false(tmp_path: Path) -> None:
@@ -122,14 +99,3 @@ def test_verdicts_are_sorted_by_link_and_take_no_memory(tmp_path: Path, monkeypa
     assert peak < 300_000
     assert written == [("inv1", "inv2", k) for k in range(20_000)] + [("inv3", "inv1", k) for k in range(20_000)]
     assert {path.name for path in tmp_path.iterdir()} == {"history.csv", "events.csv", "links.csv"}
-
-
-def test_without_keeping_there_are_counts_and_no_verdicts() -> None:
-    """Where a record has the verdicts, none is in memory."""
-    receiver = Receiver("inv2", Netem(seed=3, links=(Fault(on="* -> inv2", loss=0.2),)), {"inv1": "MG1", "inv2": "MG1"})
-    receiver.offer("inv1", 0, 0.0, 0.0, b"state")
-    record = LinkRecord(keep=False)
-    for data in report_data(receiver.take_trace(), receiver.counts(), receiver.trace_sha256):
-        record(LinkReport(sender="inv2", epoch=1, seq=0, t=0.0, data=data))
-
-    assert (record.sent, record.traces) == (1, [])

@@ -116,19 +116,15 @@ def no_room(*_: object) -> int:
     raise OSError(errno.ENOSPC, "No space left on device")
 
 
-def test_a_history_with_a_gap_is_no_history(tmp_path: Path) -> None:
-    """Lost telemetry is an error that says how much came."""
-    with Recorder(tmp_path / "I") as recorder:
-        recorder(telemetry((row(0.0), row(1.0))))
-        with pytest.raises(RecordError, match=r"2 rows, but 1 s in steps of 0.5 s are 3; the last one is of 1 s"):
-            recorder.finish(1.0, 0.5)
-
-
-def test_a_gap_that_is_allowed_is_known_by_its_times(tmp_path: Path) -> None:
-    """In real time a recorder may be out of reach for too long: then it says which rows are missing."""
-    with Recorder(tmp_path / "I", gaps=True) as recorder:
-        recorder(telemetry(tuple(row(0.5 * k) for k in (0, 1, 2, 7, 8))))
-        recorded = recorder.finish()
+def test_a_history_with_a_gap_is_no_history_unless_the_recorder_may_be_out_of_reach(tmp_path: Path) -> None:
+    """Lost telemetry is an error that says how much came; in real time the times of what is missing are known."""
+    rows = tuple(row(0.5 * k) for k in (0, 1, 2, 7, 8))
+    with Recorder(tmp_path / "I") as strict, Recorder(tmp_path / "II", gaps=True) as lenient:
+        for recorder in (strict, lenient):
+            recorder(telemetry(rows))
+        recorded = lenient.finish()
+        with pytest.raises(RecordError, match=r"5 rows, but 4 s in steps of 0.5 s are 9; the last one is of 4 s"):
+            strict.finish(4.0, 0.5)
 
     assert recorded.missing == [(1.0, 3.5)]
     assert (recorded.ended, recorded.history.t.tolist()) == (4.0, [0.0, 0.5, 1.0, 3.5, 4.0])

@@ -1,22 +1,17 @@
 """The report at the end of a run: plain text for files and pipes, colours on a terminal only."""
 
 import io
-import json
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
 from gridpeers.papers.singhal2022.paper_benchmarks import CLAIMS, ISLANDING
 from gridpeers.papers.singhal2022.tables import tables_of
 from gridpeers.scenarios.console import terminal
-from gridpeers.scenarios.measured_run import metrics_json
 from gridpeers.scenarios.results.claims import NO_BENCHMARK, judge
 from gridpeers.scenarios.results.findings import Findings
 from gridpeers.scenarios.results.metrics import Steady
 from gridpeers.scenarios.results.report import RunReport, plain, show
-from gridpeers.scenarios.run_request import Request
-from gridpeers.scenarios.schema import load_scenario
 
 
 def report(*, judged: bool = True, f_error: float = 0.137) -> RunReport:
@@ -103,20 +98,3 @@ def test_what_several_islands_share_together_is_not_told() -> None:
     assert [row[4:] for row in rows if row[1:2] == ["island"]] == [["0.041", "0.019", "0.37", "s"], ["0.0900", "0.135"]]
     assert text.count("-: where there are several islands, each shares for itself") == 2
     assert "-:" not in plain(report())
-
-
-def test_metrics_of_several_islands_together_are_null() -> None:
-    """metrics.json has no number either that means nothing; what the islands share is beside it."""
-    whole = Steady(f_error_Hz=0.027, MPSI=0.093, V_error=0.01, MQSI=0.492, t_restore_s=2.0, p={})
-    scenario, feeder = load_scenario("microgrid-switching")
-    ran = Request(scenario=scenario, feeder=feeder, driver="inprocess", folder=Path("here"))
-    found = Findings(
-        results={"IV": {"event1": whole, "event2": whole}}, islands={"IV": {"event2": {"inv1": whole, "inv4": whole}}}
-    )
-    case = json.loads(metrics_json(ran, found, {"IV": {"history_sha256": "f00"}}))["cases"]["IV"]
-
-    shared = ("MPSI", "MQSI", "t_restore_s")
-    assert [case["event1"][name] for name in shared] == [0.093, 0.492, 2.0]
-    assert [case["event2"][name] for name in shared] == [None, None, None]
-    assert case["event2"]["f_error_Hz"] == 0.027
-    assert [case["event2"]["islands"]["inv4"][name] for name in shared] == [0.093, 0.492, 2.0]
