@@ -80,28 +80,6 @@ def test_on_hold_an_agent_follows_the_plant() -> None:
     assert (first.P_set, first.V_set) == (pytest.approx(64.7e3), pytest.approx(280.0))
 
 
-def test_set_points_accumulate_in_the_island() -> None:
-    """In an island the next step starts from the own last set-points and not from what the plant reports."""
-    agent = met()
-    first = agent.tick(measurement(0))
-    second = agent.tick(measurement(1, P_set=0.0, V_set=0.0))
-
-    assert second.P_set > first.P_set > 50e3
-
-
-@pytest.mark.parametrize(("secondary", "name", "moves"), [
-    ("none", "inv1", False), ("GFM", "inv1", True), ("GFM", "inv2", False), ("all", "inv1", True),
-    (("inv1",), "inv1", True), (("inv2",), "inv1", False),
-])  # fmt: skip
-def test_only_who_takes_part_moves(secondary: Any, name: str, moves: bool) -> None:
-    """Cases I to IV: the others keep the set-points that the plant holds (inv1 is a GFM, inv2 a GFL)."""
-    agent = met(Control(secondary=secondary, graph="full"), name)
-
-    decided = agent.tick(measurement(0))
-
-    assert ((decided.P_set, decided.V_set) != (50e3, 277.0)) == moves
-
-
 def test_out_of_service_an_agent_stands_still_and_begins_again_from_what_the_plant_holds() -> None:
     """While the inverter is off there is nothing to control; then the law starts from the held set-points."""
     agent = met()

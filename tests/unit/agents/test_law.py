@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 
 from gridpeers.agents.agent_config import DegradedCommunication, Gains
 from gridpeers.agents.degraded_communication import gains_in_force
-from gridpeers.agents.laws.call import decide
-from gridpeers.agents.laws.consensus import Consensus, alpha_in_force, towards
-from gridpeers.agents.laws.law import Neighbour, Own
+from gridpeers.agents.laws.consensus import Consensus, alpha_in_force
 from gridpeers.wire.schema.table_schema import fields_of
 from tests.unit.agents.law_steps import P_set_step, V_set_step
 
@@ -264,51 +262,12 @@ def test_frequency_and_sharing_rest_where_the_papers_law_rests(
     assert np.linalg.matrix_rank(np.eye(len(A)) - as_matrix(A, leader, w, T), tol=1e-12) == len(A)
 
 
-@given(st.floats(0.1, 100.0), st.floats(0.0, 40.0), PERIODS)
-def test_nobody_goes_more_than_half_of_the_way(rate: float, d: float, T: float) -> None:
-    """However long the period and however many the neighbours, they come to meet."""
-    assert 0.0 <= towards(rate, d, T) <= 0.5
-
-
 def test_a_pair_moves_as_in_continuous_time() -> None:
     """Two linked followers approach each other by exp(-2 kappa T) exactly."""
     A, T = np.array([[0.0, 1.0], [1.0, 0.0]]), 0.3
     y = step_all(np.array([0.002, 0.008]), A, np.zeros(2, bool), np.zeros(2), T)
 
     assert y == pytest.approx(0.005 + np.array([-0.003, 0.003]) * np.exp(-2.0 * KAPPA * T), rel=1e-12)
-
-
-def test_euler_would_diverge_where_this_does_not() -> None:
-    """Nine fully meshed agents at 20 ms: explicit Euler has a mode beyond -1, the law none."""
-    A = 1.0 - np.eye(9)
-    leader = np.arange(9) % 3 == 0
-    w = np.full(9, 1.0 / 9.0)
-    euler = np.eye(9) - KAPPA * 0.02 * (np.diag(A.sum(axis=1)) - A + np.outer(leader, w))
-
-    assert np.abs(np.linalg.eigvals(euler)).max() > 1.5
-    assert np.abs(np.linalg.eigvals(as_matrix(A, leader, w, 0.02))).max() < 0.95
-
-
-def test_many_neighbours_do_not_slow_the_frequency_down() -> None:
-    """The frequency mode of nine meshed agents decays at nearly kappa n_L/N, as in continuous time."""
-    A, T = 1.0 - np.eye(9), 0.02
-    leader = np.arange(9) % 3 == 0
-    slowest = np.abs(np.linalg.eigvals(as_matrix(A, leader, np.full(9, 1.0 / 9.0), T))).max()
-
-    assert -np.log(slowest) / T == pytest.approx(KAPPA * 3.0 / 9.0, rel=0.15)
-
-
-@given(st.floats(-10.0, 10.0), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.booleans())
-def test_set_points_stay_within_their_limits(P_set: float, y_bar: float, e: float, leader: bool) -> None:
-    """P_set and V_set do not wind up, for any inputs."""
-    law = Consensus(P_set_min=0.1, P_set_max=0.9, V_set_min=0.95, V_set_max=1.05)
-    own = Own("inv1", leader, 1.0, 0.5, 0.0, 1.0 + e, e, 0.0, P_set, P_set, 0.01, 0.05, 6e5, 277.0, 60.0)
-    other = Neighbour("inv2", False, 0.02, 1.0, y_bar / 0.01, 1.0, e, 0.01, 0.05, 3e5)
-
-    decided = decide(law, own, (other,), 0.02)
-
-    assert 0.1 <= decided.P_set <= 0.9
-    assert 0.95 <= decided.V_set <= 1.05
 
 
 def test_the_papers_law_has_the_parameters_and_defaults_of_its_table() -> None:

@@ -5,7 +5,9 @@ from itertools import pairwise
 import pytest
 from msgspec.structs import replace
 
+from gridpeers.agents.agent_config import DegradedCommunication
 from gridpeers.wire.messages import Leave, Stop
+from tests.toy.toy_configs import ALL_FULL
 from tests.unit.agents.realtime_lab import KEYS, T_C, Lab, running
 
 
@@ -73,6 +75,19 @@ def test_a_silent_neighbour_is_out_after_max_age_and_back_with_its_next_state() 
     assert 0.25 / T_C - 4 <= moving <= 0.25 / T_C
     assert all(step == 0.0 for step in steps[moving:])
     assert lab.decided()[0].P_set > aged[-1].P_set
+
+
+@pytest.mark.parametrize(("max_age", "pulls"), [(0.0, False), (0.5, True)])
+def test_the_age_at_which_a_state_is_out_is_an_option(max_age: float, pulls: bool) -> None:
+    """A state that came 0.3 s ago is out by default, and counts where `max_age` is more."""
+    lab = running("inv2", control=replace(ALL_FULL, degraded_communication=DegradedCommunication(max_age=max_age)))
+    lab.state("inv2", 0)
+    for k in range(1, 16):
+        lab.measure(k)
+        lab.go(T_C)
+    *_, before, last = lab.decided()
+
+    assert (last.P_set > before.P_set) == pulls
 
 
 def test_a_neighbour_in_another_island_is_left_out() -> None:
