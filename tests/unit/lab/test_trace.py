@@ -52,16 +52,6 @@ def test_in_ticks_a_message_arrives_with_the_decision_that_can_use_it() -> None:
     assert judged((0.1, 0.003), clock="wall")[0].arrived == pytest.approx(0.103)
 
 
-def test_a_message_that_was_judged_anew_has_its_last_verdict() -> None:
-    """A cut that kept it was healed early."""
-    record = record_of(LinkTrace("inv2", "inv1", (5, 5), (0.1, 0.1), (float("inf"), 0.2)), clock="wall")
-
-    (flow,) = flows(record)
-    assert (flow.fate, flow.arrived) == ("", pytest.approx(0.3))
-    assert flows(record, since=0.11) == []
-    assert flows(record, until=0.09) == []
-
-
 def test_in_real_time_messages_arrive_when_their_receivers_noted_them(tmp_path: Path) -> None:
     """Every message in the record that was heard, from its sender to its receiver, after the time that it took."""
 

@@ -43,13 +43,6 @@ def test_the_quantile_is_that_of_the_law(name: str) -> None:
         assert model.quantile(u) == pytest.approx(law.ppf(u), rel=1e-6)
 
 
-@steady
-@given(st.sampled_from(list(LAWS)), st.floats(2.0**-53, 1.0 - 2.0**-53))
-def test_no_delay_is_negative_or_endless(name: str, u: float) -> None:
-    """The delay is finite and not below zero for every drawn number."""
-    assert 0.0 <= LAWS[name][0].quantile(u) < math.inf
-
-
 @pytest.mark.parametrize("phi", [0.5, 0.95])
 @pytest.mark.parametrize("name", ["normal, truncated", "pareto"])
 def test_correlated_delays_keep_their_law_and_are_autoregressive_beneath_it(name: str, phi: float) -> None:

@@ -20,11 +20,6 @@ from tests.unit.netem.link_messages import channel, fates, steady
 
 N = 20_000
 
-CHAINS = {
-    "gilbert": GilbertElliott(p=0.05, r=0.25),
-    "gilbert-elliott": GilbertElliott(p=0.02, r=0.2, loss_good=0.01, loss_bad=0.6),
-    "markov": Markov(p13=0.03, p31=0.2, p32=0.3, p23=0.4, p14=0.02),
-}
 
 PATTERNS = {
     "gilbert": GilbertElliott(p=0.2, r=0.4),
@@ -49,25 +44,6 @@ def test_independent_losses_are_as_frequent_as_configured(p: float) -> None:
 
     assert stats.binomtest(sum(drawn), N, p).pvalue > 0.01
     assert stats.binomtest(pairs[True, True], sum(drawn[:-1]), p).pvalue > 0.01
-
-
-@pytest.mark.parametrize("name", CHAINS)
-def test_states_follow_each_other_as_the_transition_matrix_says(name: str) -> None:
-    """Losses after a received and a lost message are as frequent as two steps of the chain make them."""
-    model = CHAINS[name]
-    drawn = lost(model)
-    # joint probability of (n lost or not, n + 1 lost), from the model's own matrix, summed by hand
-    states = range(len(model.stationary))
-    for first in (False, True):
-        here = [model.loss_in_state[s] if first else 1 - model.loss_in_state[s] for s in states]
-        weight = sum(model.stationary[s] * here[s] for s in states)
-        both = sum(
-            model.stationary[s] * here[s] * model.transitions[s][z] * model.loss_in_state[z]
-            for s in states
-            for z in states
-        )
-        follows = Counter(after for before, after in pairwise(drawn) if before == first)
-        assert stats.binomtest(follows[True], follows.total(), both / weight).pvalue > 0.01
 
 
 @pytest.mark.parametrize("name", PATTERNS)
@@ -105,32 +81,6 @@ def probability(model: LossModel, numbers: Sequence[int], lost: Sequence[bool]) 
 
 
 @steady
-@given(share, st.floats(0.01, 1.0), share, share)
-def test_gilbert_elliotts_stationary_law_is_left_by_one_step_as_it_was(
-    p: float, r: float, good: float, bad: float
-) -> None:
-    """The law from which chains start is that of the chain, so no message is special."""
-    _assert_stationary(GilbertElliott(p=p, r=r, loss_good=good, loss_bad=bad))
-
-
-@steady
-@given(st.floats(0.0, 0.5), st.floats(0.01, 0.5), st.floats(0.0, 0.5), st.floats(0.01, 1.0), st.floats(0.0, 0.5))
-def test_the_four_states_stationary_law_is_left_by_one_step_as_it_was(
-    p13: float, p31: float, p32: float, p23: float, p14: float
-) -> None:
-    """The closed form of the four states' law solves the chain's balance."""
-    _assert_stationary(Markov(p13=p13, p31=p31, p32=p32, p23=p23, p14=p14))
-
-
-def _assert_stationary(model: LossModel) -> None:
-    n = len(model.stationary)
-    assert [sum(row) for row in model.transitions] == pytest.approx([1.0] * n)
-    after = [sum(model.stationary[i] * model.transitions[i][j] for i in range(n)) for j in range(n)]
-    assert after == pytest.approx(list(model.stationary), abs=1e-12)
-    assert sum(model.stationary) == pytest.approx(1.0)
-
-
-@steady
 @given(st.integers(0, 20), st.floats(0.0, 0.9), st.floats(0.0, 0.1))
 def test_a_higher_loss_loses_what_a_lower_one_loses_and_more(seed: int, p: float, more: float) -> None:
     """A message's number is the same whatever the probability: sweeps over loss compare like with like."""
@@ -158,14 +108,6 @@ def test_a_flip_changes_one_bit_and_undoes_itself(payload: bytes, data: st.DataO
 
     assert sum((one ^ other).bit_count() for one, other in zip(payload, flipped, strict=True)) == 1
     assert flip(flipped, bit) == payload
-
-
-def test_numbers_lie_strictly_between_zero_and_one() -> None:
-    """Inverse distribution functions are finite at every number that can be drawn."""
-    numbers = [Stream(3, "inv1", "inv2", "loss").uniform(seq) for seq in range(N)]
-
-    assert min(numbers) > 0.0
-    assert max(numbers) < 1.0
 
 
 def test_numbers_are_uniform_normal_and_independent_from_one_to_the_next() -> None:

@@ -16,10 +16,8 @@ from gridpeers.netem.models.loss import GilbertElliott
 from gridpeers.netem.models.medium import Corrupt, Cut, Duplicate, Flap, Rate, Slots
 from gridpeers.netem.receiver import Receiver
 from gridpeers.netem.schema.fault import Fault, Span
-from gridpeers.netem.schema.netem import Netem
-from gridpeers.netem.schema.partition import Partition
 from gridpeers.wire.links import Arrival
-from tests.unit.netem.link_messages import MICROGRIDS, T_C, receiver, steady
+from tests.unit.netem.link_messages import T_C, receiver, steady
 
 PAYLOAD = bytes(range(120))
 
@@ -222,18 +220,6 @@ def test_healing_a_holding_cut_lets_go_at_once_as_if_it_had_been_planned() -> No
     planned.due(9.0)
     assert live.counts() == planned.counts()
     assert outcomes(live.take_trace()) == outcomes(planned.take_trace())
-
-
-def test_a_partition_is_felt_by_links_between_groups_and_by_the_plants_only_if_named() -> None:
-    """Microgrids apart hear nobody else; the plant's links stay."""
-    to = Receiver("inv2", Netem(partitions=(Partition(by="microgrid", from_s=0.0, to_s=1.0),)), MICROGRIDS)
-    send(to, range(100), "inv1", "inv4", "plant")
-
-    assert {src: count.dropped for src, count in to.counts().items()} == {
-        "inv1": {},
-        "inv4": {"partition": 50},
-        "plant": {},
-    }
 
 
 def test_faults_that_were_over_long_ago_are_forgotten_and_change_no_fate() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 import gridpeers as gp
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from tests.unit.lab.communication.records import CUT, KILLED, LOSSY, in_real_time
+from tests.unit.lab.communication.records import CUT, KILLED, LOSSY
 from tests.unit.scenarios.checks.cases import altered, ran, ran_with, verdict, with_content
 
 
@@ -47,44 +47,6 @@ def test_a_value_that_nobody_sent_is_caught(sound: CheckedCase) -> None:
 
     assert found.status == "failed"
     assert found.violations[0].t == pytest.approx(3.02)
-
-
-def test_in_real_time_a_state_that_does_not_arrive_is_caught(sound: CheckedCase) -> None:
-    """A number between others that the receiver never noted, and was not rejected either."""
-    content = in_real_time(sound)
-    (lost,) = (key for key, state in content.states["inv1"].items() if state.number == 150)
-    arrived = {key: why for key, why in content.heard["inv1", "inv2"].items() if key != lost}
-    wrong = altered(content, heard=dict(content.heard) | {("inv1", "inv2"): arrived})
-    found = verdict(with_content(sound, wrong), "message_account")
-
-    assert verdict(with_content(sound, content), "message_account").status == "passed"
-    assert (found.count, found.violations[0].agent, found.violations[0].value) == (1, "inv2", 1.0)
-    assert found.violations[0].t == pytest.approx(3.0)
-
-
-def test_in_real_time_nothing_is_missed_while_the_receiver_is_away(sound: CheckedCase) -> None:
-    """A process that left and came back owes no account of what was sent meanwhile, nor of its last second."""
-    content = in_real_time(sound)
-    states = {}
-    for (epoch, number), state in content.states["inv2"].items():
-        if not 2.0 < state.t < 3.0:
-            back = epoch + (state.t >= 3.0)
-            states[back, number] = state._replace(epoch=back)
-    arrived = {key: "" for key, state in content.states["inv1"].items() if not 1.9 < state.t < 3.1}
-    other = altered(content, states=dict(content.states) | {"inv2": states}, heard={("inv1", "inv2"): arrived})
-
-    assert verdict(with_content(sound, other), "message_account").status == "passed"
-
-
-def test_in_real_time_journals_that_come_late_change_no_account(sound: CheckedCase) -> None:
-    """Nor do arrivals; a state that did not arrive is missing all the same."""
-    content = in_real_time(sound)
-    arrived = {key: "" for key, state in content.states["inv1"].items() if state.number % 50}
-    wrong = altered(content, heard=dict(content.heard) | {("inv1", "inv2"): arrived})
-    at_once, late = (with_content(sound, wrong, late=late) for late in (0.0, 2.0))
-
-    assert verdict(at_once, "message_account") == verdict(late, "message_account")
-    assert [one.value for one in verdict(late, "message_account").violations] == [5.0]
 
 
 def test_a_stale_value_is_caught(sound: CheckedCase) -> None:
@@ -181,11 +143,6 @@ def deaf(entry: Any) -> Any:
     return msgspec.structs.replace(entry, unused=unused, states=states)
 
 
-def test_without_a_cut_there_is_no_heal_to_judge(sound: CheckedCase) -> None:
-    """No cut, no verdict."""
-    assert verdict(sound, "heal").sentence == "heal not judged: no link was cut and healed"
-
-
 def test_agents_that_rejoin_after_a_cut_pass() -> None:
     """A cut of 0.16 s heals at once; before the limit's time is over the run ends, and it is judged all the same."""
     assert verdict(ran_with(CUT).checked_case, "heal").sentence == "heal passed"
@@ -202,54 +159,3 @@ def test_a_split_that_outlasts_its_heal_is_caught() -> None:
 
     assert found.count == 8
     assert all("no new value of inv2 is used after the cut ended at 2.16 s" in one.text for one in found.violations)
-
-
-@pytest.mark.parametrize(("again_s", "count"), [(2.5, 0), (3.5, 1)])
-def test_a_heal_is_judged_by_the_time_until_its_link_is_lost_again(again_s: float, count: int) -> None:
-    """Where nothing comes through a cut's end, its link must have been whole for the limit's time to be named."""
-    spans = [(1.5, 2.0), (again_s, 3.8)]
-    changes = repr([{"on": "inv2 -> inv1", "cut": True, "from_s": a, "to_s": b} for a, b in spans])
-    case = ran_with((("case.IV.link", changes), ("time.end_s", "4.5"))).checked_case
-    content = case.content
-    decisions = {
-        agent: [(epoch, deaf(entry) if agent == "inv1" and entry.tick < 180 else entry) for epoch, entry in entries]
-        for agent, entries in content.decisions.items()
-    }
-    found = verdict(with_content(case, altered(content, decisions=decisions)), "heal", within_s=1.0)
-
-    assert [one.text for one in found.violations] == [
-        "no new value of inv2 is used after the cut ended at 2 s" for _ in range(count)
-    ]
-
-
-@pytest.mark.parametrize(("until", "count"), [(140, 0), (170, 1)])
-def test_the_longest_time_that_both_are_at_work_is_that_of_a_heal(until: int, count: int) -> None:
-    """inv1 pauses again and again after a cut: it must use nothing new of inv2 for the limit's time in one piece."""
-    pauses = [(2.2, 2.4), (2.5, 2.7), (until * 0.02, 3.9)]
-    changes = (
-        ("case.IV.link", repr([{"on": "inv2 -> inv1", "cut": True, "from_s": 1.5, "to_s": 2.1}])),
-        ("case.IV.node", repr([{"name": "inv1", "pause": True, "from_s": a, "to_s": b} for a, b in pauses])),
-        ("time.end_s", "4.5"),
-    )
-    case = ran_with(changes).checked_case
-    content = case.content
-    decisions = {
-        agent: [(epoch, deaf(entry) if agent == "inv1" and entry.tick >= 75 else entry) for epoch, entry in entries]
-        for agent, entries in content.decisions.items()
-    }
-    found = verdict(with_content(case, altered(content, decisions=decisions)), "heal", within_s=0.65)
-
-    assert found.count == count
-
-
-def test_a_heal_is_not_judged_while_its_receiver_is_away() -> None:
-    """inv2 leaves when a cut ends and comes back into another one: neither end is held against anybody."""
-    links = [
-        {"on": "* <-> *", "cut": True, "from_s": 1.94, "to_s": 1.98},
-        {"on": "inv6 <-> *", "cut": True, "from_s": 2.28, "to_s": 4.02},
-    ]
-    changes = {"case.IV.link": links, "time.end_s": 5.5}
-    run = gp.load("plug-n-play").replace(changes).run("IV")  # its record goes with it
-    found = verdict(run.checked_case, "heal", within_s=1.0)
-
-    assert found.sentence == "heal passed"
