@@ -68,14 +68,6 @@ def test_batches_have_schedules_of_their_own_and_every_kind_of_disturbance() -> 
     assert {it.kind for it in both} == set(KINDS)
 
 
-def test_what_is_not_possible_together_is_left_out() -> None:
-    """An inverter that is away cannot leave; of two disturbances the first stays."""
-    base = base_named("islanding")
-    again = Disturbance(table="event", entry={"t_s": 2.5, "leave": ["inv2"]})
-
-    assert base.kept([LEAVE, again, CUT]) == (LEAVE, CUT)
-
-
 @pytest.mark.parametrize(
     ("names", "fits"),
     [(("inv2",), True), (("inv1", "inv4", "inv7"), False), (("inv1", "inv2", "inv3", "inv4", "inv5", "inv6"), False)],
@@ -85,16 +77,6 @@ def test_what_no_control_can_feed_is_left_out(names: tuple[str, ...], fits: bool
     leave = Disturbance(table="event", entry={"t_s": 2.0, "leave": list(names)})
 
     assert base_named("islanding").is_possible((leave,)) == fits
-
-
-def test_somebody_stays_who_controls_the_frequency() -> None:
-    """All agents of grid-forming inverters of an island are not killed."""
-    kills = [
-        Disturbance(table="node", entry={"name": n, "from_s": 2.0, "kill": True}) for n in ("inv1", "inv4", "inv7")
-    ]
-
-    assert base_named("islanding").is_possible(tuple(kills[:1]))
-    assert not base_named("islanding").is_possible(tuple(kills))
 
 
 def test_a_switch_that_waits_for_synchronism_may_never_close() -> None:

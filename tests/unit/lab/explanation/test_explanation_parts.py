@@ -126,19 +126,6 @@ def test_a_state_from_before_the_island_changed_is_not_of_another_island() -> No
 # -------------------------------------------------------------------- the step of a law
 
 
-class Counting(Law):
-    """A law with a memory: its steps grow by 0.001 pu each."""
-
-    def start(self, own: Own) -> None:
-        """Begin at no step."""
-        self._count = 0
-
-    def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
-        """Go on."""
-        self._count += 1
-        return SetPoints(own.P_set + 0.001 * self._count, own.V_set)
-
-
 class Wrong(Law):
     """A law whose terms are not numbers."""
 
@@ -173,18 +160,6 @@ def test_a_step_that_is_off_is_told(quantity: str, off: float) -> None:
     assert [term.name for term in step.P_set.terms] == [term.name for term in step.V_set.terms] == ["step"]
     assert abs(step.P_set.rest) <= 1e-15
     assert abs(step.V_set.rest) <= 1e-15
-
-
-def test_a_law_that_names_no_terms_has_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its whole step, which is that of the record."""
-    of_law(Counting(), monkeypatch)
-    made = decision(restarted=True)
-    once = RecordedDecision(**vars(made) | {"state": replace(made.state, P_set=5e4 + 100.0, V_set=277.0)})
-
-    step = step_of(once)
-
-    assert step.problem == ""
-    assert [(term.name, pytest.approx(term.value)) for term in step.P_set.terms] == [("step", 0.001)]
 
 
 def test_terms_that_are_no_numbers_are_told(monkeypatch: pytest.MonkeyPatch) -> None:

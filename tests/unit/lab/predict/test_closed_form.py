@@ -14,7 +14,6 @@ import gridpeers as gp
 from gridpeers.lab.predict.closed_form import (
     delay_limit_closed,
     equivalent_delay,
-    groups,
     modes,
     robustness,
     robustness_notes,
@@ -64,17 +63,6 @@ def test_lost_messages_are_as_old_as_the_theory_says() -> None:
         equivalent_delay(0.02, 30)
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_the_number_of_zero_eigenvalues_is_the_number_of_parts(seed: int) -> None:
-    """lambda_2 is 0 exactly when the graph is not connected."""
-    rng = np.random.default_rng(seed)
-    A = np.triu(rng.random((9, 9)) < 0.18, 1).astype(float)
-    random = dataclasses.replace(inverters("full"), A=A + A.T)
-
-    assert (modes(random).lambda_2 == 0.0) == (len(groups(random)) > 1)
-    assert sorted(name for part in groups(random) for name in part) == sorted(random.names)
-
-
 def test_where_only_the_leaders_act_the_frequency_answers_by_their_weight() -> None:
     """Without the followers the frequency mode is kappa times the leaders' part of the ratings: 1800 of 3900 kW."""
     whole = inverters("full")
@@ -82,14 +70,6 @@ def test_where_only_the_leaders_act_the_frequency_answers_by_their_weight() -> N
 
     assert modes(leaders).frequency_rate == pytest.approx(whole.kappa[0] * 1800.0 / 3900.0)
     assert modes(leaders).slowest_rate == pytest.approx(modes(leaders).frequency_rate, rel=1e-9)
-
-
-def test_nobody_to_control_is_told_in_words() -> None:
-    """Without anybody who runs the law there are no modes, and no number is made up."""
-    idle = dataclasses.replace(inverters("full"), acts=np.zeros(9, bool))
-
-    with pytest.raises(ValueError, match="nobody runs the secondary law"):
-        modes(idle)
 
 
 def test_one_leader_alone_has_nobody_to_share_with() -> None:

@@ -15,7 +15,6 @@ from gridpeers.lab.replay.recorded_process import (
     RecordedProcess,
     RecordedStep,
     agent_again,
-    made_here,
     processes_of,
 )
 from gridpeers.lab.replay.replay import ComparedRows, ReplayedPart, message_difference, replay
@@ -169,11 +168,6 @@ def test_the_first_field_that_differs_is_named(changes: dict[str, Any], found: t
 
     assert (None if difference is None else (difference.quantity, difference.unit)) == found
     assert difference is None or (difference.name, difference.t) == ("inv1", 0.06)
-
-
-def test_a_full_disk_is_no_fault_of_what_is_made_again() -> None:
-    with pytest.raises(OSError, match="No space left"), made_here("the run cannot be made again here"):
-        raise OSError(28, "No space left on device")
 
 
 def test_rows_are_compared_up_to_a_time(record: RunRecord) -> None:
