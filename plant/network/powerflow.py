@@ -34,5 +34,5 @@ def solve_power_flow(network: Network, closed: frozenset[str]) -> Complex:
     try:
         flow.solve(J, none, none, of_none)
     except NoPowerFlowError as error:
-        raise ArithmeticError(f"the power flow has no solution; {network.weak_loads(error.weak)}") from None
+        raise ArithmeticError(f"power flow has no solution; {network.weak_loads(error.weak)}") from None
     return merge.expand(flow.reduction.all_voltages(J, flow.I_b, circuit.source_voltage))
