@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
-from typing import TypeVar
+from functools import lru_cache
 
 import numpy as np
 
@@ -18,19 +17,6 @@ from gridpeers.plant.dynamics.kernel.step import MAX_LIMITING, limit_currents
 from gridpeers.plant.dynamics.reduction import Reduction
 
 KEPT = 32  # circuits, and their factors, that are kept: a factored network of 123 nodes has 1 MB
-K = TypeVar("K", bound=Hashable)
-V = TypeVar("V")
-
-
-def recent(kept: dict[K, V], key: K, make: Callable[[], V]) -> V:
-    """Return the value of a key, made if it is not there; of more than `KEPT` the one used longest ago goes."""
-    value = kept.pop(key) if key in kept else make()
-    if len(kept) == KEPT:
-        del kept[next(iter(kept))]
-    kept[key] = value
-    return value
-
-
 TOLERANCE = 1e-11  # of a network solution: last change of a voltage (pu of the highest nominal one)
 WORTH = 40  # iterations of a network solution that cost as much time as new sparse factors
 
@@ -44,17 +30,19 @@ class LiveNetwork:
     """
 
     net: Reduced
-    x: Real
 
     def __init__(self, circuit: Circuit, inverters: Inverters) -> None:
         self._inverters = inverters
-        self._reductions: dict[tuple[Circuit, bytes], Reduction] = {}
-        self._unsourced: dict[Circuit, Circuit] = {}
+        y_f, forming = inverters.y_f, inverters.forming  # copies of a plant share what follows, which has no state
+        self._reduction_of = lru_cache(KEPT)(
+            lambda circuit, connected: Reduction(circuit, y_f, forming, np.array(connected, bool))
+        )
+        self._unsourced = lru_cache(KEPT)(Circuit.without_source)
+        self.x: Real = np.zeros(0)
         self.substation_on = True  # whether the ideal sources are connected
         self.circuit = circuit
         self.reduction = self.reduced(circuit)
         self._noted: Complex = circuit.V_branch.astype(complex)
-        self._steps_since = False  # whether steps were taken since `V_branch` was written
         self._excess = 0
         self._parts: IslandParts | None = None
 
@@ -64,17 +52,16 @@ class LiveNetwork:
 
     def reduced(self, circuit: Circuit) -> Reduction:
         """Factor a circuit, once; called ahead of a scheduled event it saves this work in its step."""
-        units = self._inverters
         if not self.substation_on:
-            circuit = recent(self._unsourced, circuit, circuit.without_source)
-        key = circuit, units.connected.tobytes()
-        return recent(self._reductions, key, lambda: Reduction(circuit, units.y_f, units.forming, units.connected))
+            circuit = self._unsourced(circuit)
+        return self._reduction_of(circuit, tuple(self._inverters.connected.tolist()))
 
     def change(self, circuit: Circuit) -> None:
         """Take another circuit, or the same with other connected inverters; call `solve` next."""
         dead = np.ones(self.V_branch.size, bool)
         dead[self.reduction.branches] = False
         self.V_branch[dead] = 0.0
+        self.x = np.zeros(0)
         self.circuit = circuit
         self.reduction = self.reduced(circuit)
 
@@ -107,7 +94,6 @@ class LiveNetwork:
             of_nodes = self.reduction.node_voltages(units.J, V_b, self.source_voltage)
             units.V[:] = self.circuit.turn * of_nodes[self.circuit.terminals]
         self._linearise(V_b)
-        self.V_branch[branches] = V_b
 
     def renew(self) -> None:
         """Linearise again at the solution of the present injections; NoSolutionError if there is none."""
@@ -130,21 +116,16 @@ class LiveNetwork:
         self._parts = None
         self.net.sparse.increments[:] = 0.0
 
-    def note(self) -> None:
-        self._steps_since = True
-
     @property
     def V_branch(self) -> Complex:
-        """Voltages of all branches (V) in the common frame; may be written."""
-        if self._steps_since:
-            self._steps_since = False
-            if self.x.size:
-                self._noted[self.reduction.branches] = self._branch_voltages()
+        """Voltages of all branches (V) in the common frame; may be written between `change` and `solve`."""
+        if self.x.size:
+            self._noted[self.reduction.branches] = self._branch_voltages()
         return self._noted
 
     @V_branch.setter
     def V_branch(self, V: Complex) -> None:
-        self._noted, self._steps_since = V, False
+        self._noted = V
 
     def _solve_islands(self, guess: Complex) -> Complex:
         V_b, failed = self.reduction.solve_islands(self._inverters.J, self.source_voltage, guess)

@@ -203,12 +203,10 @@ class Dynamics:
                 except NoSolutionError as error:
                     islands = set(error.islands)
             units.state[:], units.J[:] = units.start, units.J_0  # go back to the start of the step that failed
-            network.note()
             self._trip(sorted(islands), step)
             self.connect(network.circuit, step)
             begin, renewed = 2 * step, -1
         network.refresh(status, 2 * steps - begin)
-        network.note()
         if self._single.size:
             out[:, self._single, 1:3] /= 3.0  # the kernel's powers are those of three equal phases
         return out

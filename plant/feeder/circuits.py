@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import scipy.sparse as sp
 
 from gridpeers.plant.dynamics import Circuit, PlantError
 from gridpeers.plant.dynamics.kernel.compiled import Integers
-from gridpeers.plant.dynamics.live_network import recent
+from gridpeers.plant.dynamics.live_network import KEPT
 from gridpeers.plant.equipment import PHASES
 from gridpeers.plant.network import Network
 from gridpeers.plant.network.loads import LoadBranches
@@ -21,8 +23,8 @@ class Circuits:
 
     def __init__(self, network: Network) -> None:
         self._network = network
-        self._loads: dict[Network, LoadBranches] = {}  # of each network, one for each state of the loads
-        self._made: dict[tuple[Network, frozenset[str]], Circuit] = {}
+        loads = lru_cache(KEPT)(Network.loads)  # of each network, one for each state of the loads
+        self._made = lru_cache(KEPT)(lambda of, closed: circuit_of(of, closed, loads(of)))
 
     def change_loads(self, network: Network) -> None:
         self._network = network
@@ -32,9 +34,7 @@ class Circuits:
 
         PlantError if ideal devices tie an inverter to another: their sharing would be undetermined.
         """
-        of = self._network if network is None else network
-        loads = recent(self._loads, of, of.loads)
-        return recent(self._made, (of, closed), lambda: circuit_of(of, closed, loads))
+        return self._made(network or self._network, closed)
 
 
 def circuit_of(network: Network, closed: frozenset[str], loads: LoadBranches) -> Circuit:

@@ -341,7 +341,6 @@ class DaeDynamics(Dynamics):
                     units.state_of(i)[name] = value
         for i, speed in zip(former.tolist(), w, strict=True):
             units.state_of(i)["w"] = speed
-        self.network.V_branch[network.branches] = network.branch_voltages(V) * back
         return readings
 
 
