@@ -244,28 +244,10 @@ def fake_clock_record(
     delay: Delay = at_once,
     happens: Callable[[FakeClockRun], None] = lambda run: None,
 ) -> RunRecord:
-    """Run the toy plant on a fake clock; return its record.
+    """Run the toy plant on a fake clock until `end` (s); return its record.
 
-    Parameters
-    ----------
-    folder : Path
-        Folder of the case, which is made.
-    n : int, optional
-        Number of agents.
-    spares : tuple[str, ...], optional
-        Those of them that are not started with the run.
-    end : float, optional
-        End of the run (s).
-    netem : Netem, optional
-        Faults of emulated links; without it there are none.
-    control : Control, optional
-        Rule of control.
-    record : {"all", "decisions"}, optional
-        How much is recorded.
-    delay : Delay, optional
-        Of every message.
-    happens : Callable[[FakeClockRun], None], optional
-        Plans what people and the machine do, before the run.
+    Of its `n` agents the `spares` are not started with the run. `netem` has faults of emulated links, `delay` that of
+    every message; `happens` plans, before the run, what people and the machine do.
     """
     plant, agents = toy_configs(n, control, end=end, spares=spares)
     links: dict[str, Any] = {}

@@ -15,6 +15,7 @@ from gridpeers.lab.replay.recomputation import recomputed
 from gridpeers.scenarios.record.record_file import RecordFile, RecordFileError
 from gridpeers.scenarios.record.record_info import FILE
 from gridpeers.scenarios.record.record_reader import RunRecord
+from tests.command_line import invoke
 
 LONG = """
 [time]
@@ -116,3 +117,20 @@ def assert_usable(left: Left, *, complete: bool = False) -> None:
         again = list(recomputed(record, agent))
         assert all(each.agrees for each in again)
         assert not begun or again
+
+
+def assert_commands_read(record: RunRecord, agent: str = "inv4") -> None:
+    """`export`, `why`, `trace` and `replay` do their work, and tell the cut."""
+    folder, file = record.path.parent, str(record.path)
+    commands = {
+        "export": (file, "--to", "csv", "--out", str(folder / "tables")),
+        "why": (file, agent, f"{record.t_end:.3f}"),
+        "trace": (file, "--out", str(folder / "trace.pftrace")),
+        "replay": (file,),
+    }
+    for command, arguments in commands.items():
+        code, printed = invoke(command, *arguments)
+        assert code == 0, f"gridpeers {command} {' '.join(arguments)}: {code}: {printed}"
+        assert "Traceback" not in printed
+        assert record.complete or command == "replay" or "cut off" in printed, f"{command}: {printed}"
+    assert (folder / "trace.pftrace").stat().st_size > 500

@@ -9,8 +9,7 @@ import pytest
 
 from gridpeers.scenarios.record.record_reader import RunRecord
 from tests.command_line import invoke
-from tests.record.killed_commands import CLOCKS, Clock, assert_usable, killed
-from tests.record.reader_commands import assert_commands_read
+from tests.record.killed_commands import CLOCKS, Clock, assert_commands_read, assert_usable, killed
 
 MOST = 4.0
 """Run time (s) of a run beyond which it would take long to read."""

@@ -232,26 +232,15 @@ def test_what_links_drop_counts_as_lost() -> None:
 PAUSE = NodeFault(name="inv1", from_s=1.7, to_s=2.7, pause=True)
 
 
-def _arrivals(*links: Fault) -> dict[float, list[float]]:
-    """Times (s) at which states of inv2 were sent, by the tick at which inv1, paused from 1.7 to 2.7 s, takes them."""
-    config = EmulationConfig(netem=Netem(links=links, nodes=(PAUSE,)), microgrids={"inv1": "mg1", "inv2": "mg1"})
-    side, found = EmulatedLinks("inv1", config), dict[float, list[float]]()
-    sent = {k: State(sender="inv2", epoch=1, seq=k, t=0.1 * k, P_set=0.0, V_set=277.0, Q=0.0) for k in range(40)}
-    for k, state in sent.items():
-        side.offer(state, b"state", state.t)
-        for arrival in side.due(0.1 * k + 1e-9):
-            assert isinstance(arrival.message, State)
-            found.setdefault(round(0.1 * k, 1), []).append(round(arrival.message.t, 1))
-    return found
-
-
 def test_a_paused_agent_takes_what_has_come_when_it_goes_on() -> None:
     """Nothing is taken during the pause, all of it at its end, and later messages at once."""
-    found = _arrivals()
+    config = EmulationConfig(netem=Netem(nodes=(PAUSE,)), microgrids={"inv1": "mg1", "inv2": "mg1"})
+    side, found = EmulatedLinks("inv1", config), dict[float, list[float]]()
+    for k in range(40):
+        side.offer(State(sender="inv2", epoch=1, seq=k, t=0.1 * k, P_set=0.0, V_set=277.0, Q=0.0), b"state", 0.1 * k)
+        for arrival in side.due(0.1 * k + 1e-9):
+            found.setdefault(round(0.1 * k, 1), []).append(round(arrival.message.t, 1))
 
     assert [t for t in found if 1.65 < t < 2.65] == []
     assert found[2.7] == [round(0.1 * k, 1) for k in range(17, 28)]
     assert found[2.8] == [2.8]
-
-
-MICROGRIDS = {"inv1": "mg1", "inv2": "mg1", "inv3": "mg2"}
