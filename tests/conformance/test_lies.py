@@ -84,16 +84,8 @@ def test_lies_have_the_same_story_in_one_process_and_in_many(scenario: Path) -> 
     assert truth.rows != alone.rows
     assert truth.rows[20:30] == alone.rows[20:30]  # before 0.3 s
     told = [(event.t, event.subject) for event in alone.outcome.events if " lie" in event.text or "truth" in event.text]
-    assert told == [
-        (0.3, "inv4"),
-        (0.4, "inv3"),
-        (0.5, "inv5"),
-        (0.5, "inv6"),
-        (0.8, "inv7"),
-        (0.9, "inv3"),
-        (1.0, "inv8"),
-        (1.1, "inv8"),
-    ]
+    times = {"inv3": (0.4, 0.9), "inv4": (0.3,), "inv5": (0.5,), "inv6": (0.5,), "inv7": (0.8,), "inv8": (1.0, 1.1)}
+    assert sorted(told) == sorted((t, name) for name, of in times.items() for t in of)
 
 
 def test_a_record_has_what_was_heard_of_liars(scenario: Path, tmp_path: Path) -> None:

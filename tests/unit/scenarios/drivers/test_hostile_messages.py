@@ -77,19 +77,6 @@ def test_tokens_of_anybody_change_nothing(make: Callable[[], Scene]) -> None:
     assert all(text.isprintable() for text in said)
 
 
-@pytest.mark.parametrize("make", [RealtimeAgentScene, RealtimePlantScene])
-def test_a_flood_of_tokens_does_not_flood_the_log(make: Callable[[], Scene]) -> None:
-    """Two thousand processes that claim a name, or names that nobody knows."""
-    scene = make()
-    scene.honest(0)
-    for i in range(1000):
-        scene.side.appeared(KEYS.alive_agent("inv2", f"x{i}"), scene.now)
-        scene.side.appeared(KEYS.alive_agent(f"who{i}", "x"), scene.now)
-    scene.honest(1)
-
-    assert len([action for action in scene.done if isinstance(action, Log)]) < 50
-
-
 def _decided(scene: Scene) -> list[object]:
     """The states, measurements and rows that a core has published."""
     kinds = ("state", "measurement", "telemetry")

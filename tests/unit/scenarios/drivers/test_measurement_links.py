@@ -23,17 +23,24 @@ from tests.toy.toy_plant import ToyPlant
 Rows = list[tuple[float, ...]]
 
 
-def rows_of(fault: dict[str, Any], schedule: Schedule = ()) -> Rows:
-    """Rows of a run of three agents in which the measurements of inv2 have a fault."""
-    netem = Netem(links=(Fault(on="plant -> inv2", **fault),))
-    links = EmulationConfig(netem=netem, microgrids={f"inv{i}": "mg1" for i in range(1, 4)}).to_tree()
+def emulated(*faults: Fault) -> dict[str, Any]:
+    """The configuration of links between three inverters with these faults."""
+    microgrids = {f"inv{i}": "mg1" for i in range(1, 4)}
+    return EmulationConfig(netem=Netem(links=faults), microgrids=microgrids).to_tree()
+
+
+def rows_of(*faults: Fault, schedule: Schedule = ()) -> Rows:
+    """Rows of a run of three agents with faults of links."""
     plant, agents = toy_configs(3, end=2.0, schedule=schedule)
-    agents = tuple(replace(agent, links=links) for agent in agents)
+    agents = tuple(replace(agent, links=emulated(*faults)) for agent in agents)
     rows: Rows = []
     outcome = run_inprocess(plant, agents, lambda message: rows.extend(message.rows), plant=ToyPlant(plant))
     assert outcome.broke == ""
     assert outcome.reproducible
     return rows
+
+
+MEASURED = "plant -> inv2"
 
 
 def P_set(rows: Rows, number: int, since: float, until: float) -> set[float]:
@@ -44,7 +51,7 @@ def P_set(rows: Rows, number: int, since: float, until: float) -> set[float]:
 @pytest.mark.parametrize("fault", [{"cut": True}, {"delay": 5.0}])
 def test_an_agent_that_never_gets_a_measurement_stands_still(fault: dict[str, Any]) -> None:
     """Its inverter keeps its first set-points from the beginning to the end, and the others go on without it."""
-    rows = rows_of(fault)
+    rows = rows_of(Fault(on=MEASURED, **fault))
 
     assert P_set(rows, 2, 0.0, 9.0) == {50e3}
     assert len(P_set(rows, 1, 0.2, 2.0)) > 50
@@ -53,7 +60,8 @@ def test_an_agent_that_never_gets_a_measurement_stands_still(fault: dict[str, An
 
 def test_a_newcomer_stands_still_too_until_it_measures() -> None:
     """inv2 leaves at 0.4 s and is back at 0.6 s; its link is cut from then on."""
-    rows = rows_of({"cut": True, "from_s": 0.5}, schedule=((0.4, "inv2", "leave"), (0.6, "inv2", "join")))
+    cut = Fault(on=MEASURED, cut=True, from_s=0.5)
+    rows = rows_of(cut, schedule=((0.4, "inv2", "leave"), (0.6, "inv2", "join")))
     held = P_set(rows, 2, 0.42, 2.0)
 
     assert len(P_set(rows, 2, 0.1, 0.4)) > 5
@@ -62,21 +70,12 @@ def test_a_newcomer_stands_still_too_until_it_measures() -> None:
 
 def test_the_neighbours_of_a_standing_agent_do_not_use_what_it_says_for_the_lock_step() -> None:
     """They fare as if it said nothing: as if its states were cut, too."""
-    standing = rows_of({"cut": True})
-    netem = Netem(links=(Fault(on="plant -> inv2", cut=True), Fault(on="inv2 -> {inv1, inv3}", cut=True)))
-    links = EmulationConfig(netem=netem, microgrids={f"inv{i}": "mg1" for i in range(1, 4)}).to_tree()
-    plant, agents = toy_configs(3, end=2.0)
-    silent: Rows = []
-    muted = tuple(replace(agent, links=links) for agent in agents)
-    run_inprocess(plant, muted, lambda message: silent.extend(message.rows), plant=ToyPlant(plant))
+    cut = Fault(on=MEASURED, cut=True)
 
-    assert standing == silent
+    assert rows_of(cut) == rows_of(cut, Fault(on="inv2 -> {inv1, inv3}", cut=True))
 
 
-LATE = EmulationConfig(
-    netem=Netem(links=(Fault(on="inv2 -> plant", delay=0.3),)),
-    microgrids={f"inv{i}": "mg1" for i in range(1, 4)},
-).to_tree()
+LATE = emulated(Fault(on="inv2 -> plant", delay=0.3))
 """States of inv2 take 0.3 s to the plant."""
 
 KEYS = Keys("toy")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from io import BytesIO
 from itertools import islice
 from pathlib import Path
 from types import SimpleNamespace
@@ -131,42 +132,34 @@ def test_a_record_with_changed_bytes_is_read_up_to_them(whole: Path, tmp_path: P
     assert told > 20
 
 
+def mcap(profile: str, **metadata: str) -> bytes:
+    """The bytes of an MCAP file without messages."""
+    writer = Writer(file := BytesIO())
+    writer.start(profile=profile)
+    writer.add_metadata(METADATA, metadata)
+    writer.finish()
+    return file.getvalue()
+
+
 @pytest.mark.parametrize(
     ("content", "complaint"),
     [
         (b"", "this is no record: it does not begin as an MCAP file"),
         (b"t_s,inv1_f_Hz\n", "this is no record"),
         (b"\x89MCAP0\r\n", "it ends before it says what was recorded: 8 bytes"),
+        (mcap("ros2"), "no record of gridpeers: its profile is 'ros2'"),
+        (
+            mcap(PROFILE, format=str(FORMAT + 1), gridpeers="9.9", info="?"),
+            f"of format {FORMAT + 1}, written by gridpeers 9.9; .*install the later",
+        ),
     ],
+    ids=["empty", "a table", "the beginning of a record", "of others", "a later format"],
 )
 def test_another_file_is_told_in_one_line(content: bytes, complaint: str, tmp_path: Path) -> None:
-    """An empty file, a table, the beginning of a record."""
+    """Before anything else is read."""
     (tmp_path / FILE).write_bytes(content)
 
     with pytest.raises(RecordFileError, match=complaint):
-        RunRecord.open(tmp_path)
-
-
-def test_an_mcap_file_of_others_is_told(tmp_path: Path) -> None:
-    """Its profile is another one."""
-    with (tmp_path / FILE).open("wb") as file:
-        writer = Writer(file)
-        writer.start(profile="ros2")
-        writer.finish()
-
-    with pytest.raises(RecordFileError, match="no record of gridpeers: its profile is 'ros2'"):
-        RunRecord.open(tmp_path)
-
-
-def test_a_later_format_is_refused(tmp_path: Path) -> None:
-    """It names both formats and what to do, before anything else is read."""
-    with (tmp_path / FILE).open("wb") as file:
-        writer = Writer(file)
-        writer.start(profile=PROFILE)
-        writer.add_metadata(METADATA, {"format": str(FORMAT + 1), "gridpeers": "9.9", "info": "?"})
-        writer.finish()
-
-    with pytest.raises(RecordFileError, match=f"of format {FORMAT + 1}, written by gridpeers 9.9; .*install the later"):
         RunRecord.open(tmp_path)
 
 
