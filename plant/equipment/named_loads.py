@@ -117,29 +117,29 @@ class LoadPowers:
     def table(self, name: str) -> complex:
         return self._loads[name].S
 
-    def power(self, name: str, setting: LoadSetting, before: complex) -> complex:
-        """Return the power (VA) of a load after a setting; ValueError says what would be right."""
-        table = self._loads[name].S
+    def power(self, name: str, setting: LoadSetting, now: Mapping[str, complex]) -> complex:
+        """Return the power (VA) of a load after a setting; ValueError says what would be right.
+
+        `now`: present powers of loads that have other ones than in the tables.
+        """
+        table, most = self._loads[name].S, self._most
+        before = now.get(name, table)
         if (setting.factor is None) == (setting.P is None and setting.Q is None):
             raise ValueError("takes either a factor, or real or reactive power")
         if setting.factor is not None:
-            _refuse_unless_plausible(FACTOR, setting.factor, "")
-            return setting.factor * table
-        low = 0.0 if table.real >= 0.0 else -self._most
-        P = before.real if setting.P is None else setting.P
-        Q = before.imag if setting.Q is None else setting.Q
-        _refuse_unless_plausible(Plausible("the real power of a load", low, self._most), P / 1e3, "kW")
-        around = Plausible("the reactive power of a load", -self._most, self._most)
-        _refuse_unless_plausible(around, Q / 1e3, "kvar")
-        return complex(P, Q)
+            S, text = setting.factor * table, FACTOR.objection(setting.factor)
+        else:
+            P = before.real if setting.P is None else setting.P
+            Q = before.imag if setting.Q is None else setting.Q
+            real = Plausible("the real power of a load", 0.0 if table.real >= 0.0 else -most, most)
+            reactive = Plausible("the reactive power of a load", -most, most)
+            S, text = complex(P, Q), real.objection(P / 1e3, "kW") or reactive.objection(Q / 1e3, "kvar")
+        if text:
+            raise ValueError(text)
+        return S
 
     def words(self, name: str, S: complex) -> str:
         return f"{S.real / 1e3:.6g} kW and {S.imag / 1e3:.6g} kvar at nominal voltage{_beside(S, self.table(name))}"
-
-
-def _refuse_unless_plausible(plausible: Plausible, value: float, unit: str) -> None:
-    if objection := plausible.objection(value, unit):
-        raise ValueError(objection)
 
 
 def _beside(S: complex, table: complex) -> str:

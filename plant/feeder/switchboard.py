@@ -145,7 +145,7 @@ class LoadBoard:
 
     def _power(self, name: str, setting: LoadSetting, now: dict[str, complex]) -> complex:
         try:
-            return self._powers.power(name, setting, now.get(name, self._powers.table(name)))
+            return self._powers.power(name, setting, now)
         except ValueError as error:
             raise ValueError(f"load {name}: {error}") from None
 

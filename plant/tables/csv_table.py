@@ -123,7 +123,8 @@ def _read(
     path: Path, columns: type[msgspec.Struct], required: bool
 ) -> tuple[list[str], list[tuple[int, list[str]]], list[str]]:
     """Return header and numbered rows of a file, and its problems, with which it has no rows."""
-    fields, keys = fields_of(columns), required_columns(columns)
+    fields = fields_of(columns)
+    keys = [field.key for field in fields if field.required]
     if not path.exists():
         return [], [], [f"no such file; a feeder needs it, with the columns {', '.join(keys)}"] if required else []
     numbers = [field.key for field in fields if field.type is float]
@@ -137,7 +138,3 @@ def _read(
     problems = [f'column "{key}" stands there twice; keep one' for key in keys if found.count(key) > 1]
     problems += [f'no column "{key}"; {suggestion(key, found, "columns")}' for key in keys if key not in found]
     return found, [] if problems else table.rows, problems
-
-
-def required_columns(columns: type[msgspec.Struct]) -> list[str]:
-    return [field.key for field in fields_of(columns) if field.required]

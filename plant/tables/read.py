@@ -11,8 +11,7 @@ from gridpeers.plant.equipment import PHASES, Load, Tables
 from gridpeers.plant.equipment.connectivity import Connectivity, buses_without_ground, by_bus
 from gridpeers.plant.equipment.neutrals import neutrals_by_bus
 from gridpeers.plant.tables import branches, shunts
-from gridpeers.plant.tables.csv_table import required_columns
-from gridpeers.plant.tables.feeder_columns import LOAD_SETS, TABLES, LoadColumns, Manifest
+from gridpeers.plant.tables.feeder_columns import LOAD_SETS, TABLES, Manifest
 from gridpeers.wire.schema.table_reading import read_table
 from gridpeers.wire.text_file import TextFileError, text_of
 from gridpeers.wire.wording import InputError, first_of, suggestion
@@ -88,13 +87,10 @@ def _read_tables(folder: Path, feeder: str, load_set: str, contents: tuple[tuple
     buses.floating = buses_without_ground(transformers, lines, [*switches, *regulators])
     sets, of_parts = load_sets(folder), f"load_parts_{load_set}.csv"
     loads: tuple[Load, ...] = ()
-    if load_set in sets:
+    if load_set in sets or not sets:
         loads = shunts.read_loads(buses, f"loads_{load_set}.csv", required=not (folder / of_parts).is_file())
-    elif sets:
-        problems.append(f'load set "{load_set}": no such set; there are {", ".join(sets)}')
     else:
-        columns = ", ".join(required_columns(LoadColumns))
-        problems.append(f"loads_{load_set}.csv: no such file; a feeder needs it, with the columns {columns}")
+        problems.append(f'load set "{load_set}": no such set; there are {", ".join(sets)}')
     elements = branches.read_elements(buses)
     load_parts = shunts.read_load_parts(buses, of_parts)
     capacitors = shunts.read_capacitors(buses)

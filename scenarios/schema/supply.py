@@ -30,7 +30,7 @@ def powers_after(scenario: ScenarioModel, feeder: Tables) -> Iterator[tuple[Even
     for event in scenario.events:
         for text, change in event.load.items():
             name = powers.name(text)
-            now[name] = powers.power(name, _setting(change), now.get(name, powers.table(name)))
+            now[name] = powers.power(name, _setting(change), now)
         yield event, dict(now)
 
 
@@ -52,7 +52,7 @@ def check_loads(scenario: ScenarioModel, feeder: Tables, problems: Problems) -> 
             if problems.touch(path) or problems.below(path):
                 continue
             try:
-                now[name] = powers.power(name, _setting(change), now.get(name, powers.table(name)))
+                now[name] = powers.power(name, _setting(change), now)
             except ValueError as error:
                 more = "" if change != LoadChange() else ", e.g. { factor = 1.5 }"
                 problems.add(path, f"{error}{more}")

@@ -220,7 +220,7 @@ CHANGED: list[tuple[str, Callable[[str], str | bytes], str]] = [
         'line_configs.csv row 7: config "1" has an X matrix',
     ),
     ("feeder.toml", lambda text: "f_nom_Hz = 50000", "feeder.toml: f_nom_Hz: 50000 Hz is not plausible for a"),
-    ("feeder.toml", lambda text: "f_nom = 50", "feeder.toml: f_nom: unknown key; write f_nom_Hz, in hertz"),
+    ("feeder.toml", lambda text: "f_nom = 50", 'feeder.toml: f_nom: unknown key; did you mean "f_nom_Hz"?'),
     ("feeder.toml", lambda text: "f_nom_Hz 50", "feeder.toml: not valid TOML"),
     ("inverter.csv", lambda text: "", 'inverter.csv: not a table of a feeder; did you mean "inverters.csv"?'),
 ]
