@@ -19,7 +19,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from math import inf
 
-from gridpeers.plant.meeting import AGAIN, STAYS, Meeting, TickActions, agent_schedule
+from gridpeers.plant.meeting import AGAIN, STAYS, Meeting, agent_schedule
+from gridpeers.plant.plant_config import ScheduledAction
 from gridpeers.plant.plant_stepper import TELEMETRY_TICKS, PlantStepper
 from gridpeers.plant.recorder_feed import RecorderFeed, RunReports
 from gridpeers.wire.codec import RejectedError
@@ -110,7 +111,7 @@ class LockstepRoster:
         post, stepper, config = meeting.post, meeting.stepper, meeting.stepper.config
         self._post, self._stepper, self._phases = post, stepper, meeting.phases
         self._schedule = agent_schedule(config, stepper.inverters)
-        joiners = {name for actions in self._schedule.values() for name in actions.join}.difference(config.agents)
+        joiners = {it.inverter for it in config.schedule if it.action == "join"}.difference(config.agents)
         self.everyone = (*config.agents, *(name for name in stepper.inverters if name in joiners))
         self.names: tuple[str, ...] = ()  # agents of the last roster sent
         self.state_keys, self.publications = (post.keys.state,), ()
@@ -164,7 +165,7 @@ class LockstepRoster:
 
     def settle(self, now: float) -> bool:
         """Let agents leave, die and join, as scheduled for this tick; return whether the plant may measure now."""
-        self._move(self._schedule.pop(self._stepper.tick, TickActions()), now)
+        self._move(self._schedule.pop(self._stepper.tick, []), now)
         if self._phases.now == "joining":
             if self.missing():
                 return False
@@ -201,14 +202,15 @@ class LockstepRoster:
         )
         self._post.send(self._post.keys.control, self._prepare)
 
-    def _move(self, actions: TickActions, now: float) -> None:
+    def _move(self, actions: list[ScheduledAction], now: float) -> None:
         when = f"at t = {self._stepper.t:g} s, as the scenario says"
-        for name in actions.leave:
+        for name in [it.inverter for it in actions if it.action == "leave"]:
             self._dismiss(name, f"{name} leaves {when}")
             self._connect(name, False)
-        for name in actions.die:
+        for name in [it.inverter for it in actions if it.action == "die"]:
             self._dismiss(name, f"{name} dies {when}; {STAYS}")
-        joining = tuple(name for name in actions.join if not self._post.members.instance(name))
+        coming = [it.inverter for it in actions if it.action == "join"]
+        joining = tuple(name for name in coming if not self._post.members.instance(name))
         for name in joining:
             self._stepper.note("roster", name, f"{name} joins {when}")
         if joining and not self._stepper.broken:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from math import inf
-from typing import NamedTuple
 
-from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.plant.plant_config import PlantConfig, ScheduledAction
 from gridpeers.plant.plant_stepper import PlantStepper
 from gridpeers.plant.recorder_feed import RecorderFeed
 from gridpeers.wire.messages import PLANT, Stop
@@ -24,18 +23,12 @@ REFUSALS, REFUSAL_INTERVAL = 20, 0.1
 of its own, a millisecond or two in which a plant in real time does not step."""
 
 
-class TickActions(NamedTuple):
-    leave: tuple[str, ...] = ()  # inverters whose agents leave
-    join: tuple[str, ...] = ()  # inverters whose agents join
-    die: tuple[str, ...] = ()  # inverters whose agents die
-
-
-def agent_schedule(config: PlantConfig, inverters: tuple[str, ...]) -> dict[int, TickActions]:
+def agent_schedule(config: PlantConfig, inverters: tuple[str, ...]) -> dict[int, list[ScheduledAction]]:
     """Return the scheduled joins, leaves and deaths of a run, by tick.
 
     ValueError if an action names no inverter of the plant, or its time is no tick after 0.
     """
-    at: dict[int, TickActions] = {}
+    at: dict[int, list[ScheduledAction]] = {}
     for action in config.schedule:
         if action.inverter not in inverters:
             raise ValueError(f'schedule: no inverter "{action.inverter}"; inverters are {", ".join(inverters)}')
@@ -45,8 +38,7 @@ def agent_schedule(config: PlantConfig, inverters: tuple[str, ...]) -> dict[int,
                 f"schedule: {action.inverter} must {action.action} at a positive multiple of the control period "
                 f"{config.T_c:g} s, got {action.t:g} s"
             )
-        actions = at.get(tick, TickActions())
-        at[tick] = actions._replace(**{action.action: (*getattr(actions, action.action), action.inverter)})
+        at.setdefault(tick, []).append(action)
     return at
 
 

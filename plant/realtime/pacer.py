@@ -65,9 +65,6 @@ class RealTimePacer:
             slipped=self._slipped,
         )
 
-    def __str__(self) -> str:
-        return sentence(self.report(), self.period)
-
 
 def sentence(pacing: Pacing, period: float) -> str:
     share = 100.0 * pacing.late / max(1, pacing.steps)

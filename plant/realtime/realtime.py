@@ -13,9 +13,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from math import inf
 
-from gridpeers.plant.meeting import AGAIN, STAYS, Meeting, TickActions, agent_schedule
+from gridpeers.plant.meeting import AGAIN, STAYS, Meeting, agent_schedule
 from gridpeers.plant.plant_stepper import PlantStepper
-from gridpeers.plant.realtime.pacer import RealTimePacer
+from gridpeers.plant.realtime.pacer import RealTimePacer, sentence
 from gridpeers.plant.realtime.run_commands import LinkCommandSender
 from gridpeers.plant.realtime.silence_detector import SilenceDetector
 from gridpeers.plant.recorder_feed import TELEMETRY, RunReports
@@ -101,7 +101,8 @@ class RealtimeTimer:
             warnings.append(f"fell {slipped:.3f} s of wall time behind; all later steps are put off by as much")
         fails = self.pacer.take_failure(of=self._stepper.end_tick)
         if fails:
-            warnings.append(f"cannot keep pace at speed {speed:g}: {self.pacer}; give it a lower speed or more cores")
+            pace = sentence(self.pacing(), self.pacer.period)
+            warnings.append(f"cannot keep pace at speed {speed:g}: {pace}; give it a lower speed or more cores")
         told = tuple(line for each in warnings if (line := self.warnings.admit(each, now)) is not None)
         if fails and self._config.strict:
             return TickVerdict("break", f"plant: {warnings[-1]}", told)
@@ -189,13 +190,13 @@ class RealtimeRoster:
     def settle(self, now: float) -> bool:
         """Ask agents to leave, and have agents started, as scheduled for this tick; the plant waits for none."""
         t = self._stepper.t
-        leave, join, _ = self._schedule.pop(self._stepper.tick, TickActions())  # here an agent dies as a process
-        for name in leave:
+        actions = self._schedule.pop(self._stepper.tick, [])  # here an agent dies as a process
+        for name in [it.inverter for it in actions if it.action == "leave"]:
             if instance := self._post.members.instance(name):
                 reason = f"{name} leaves at t = {t:.2f} s, as the scenario says"
                 self._meeting.stop(self._post.keys.stop_request(name, instance), reason)
                 self._post.say(reason)
-        if join:
+        if join := tuple(it.inverter for it in actions if it.action == "join"):
             self._post.say(f"{', '.join(join)} may join from t = {t:.2f} s on, as the scenario says")
             self._reports.telemetry(awaited=join)
         self.link_commands.send(self.names, now)

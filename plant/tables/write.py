@@ -78,14 +78,10 @@ def _load_part(it: LoadPart) -> Row:
 
 
 def inverter_cells(it: InverterRow) -> dict[str, str]:
-    """Return the cells of an inverter by their columns, for a file or to be checked: what is no number stays a text."""
-    try:
-        P_rated = repr(float(it.P_rated) / 1e3)
-    except (TypeError, ValueError, OverflowError):
-        P_rated = str(it.P_rated)
+    """Return the cells of an inverter by their columns, for a file or to be checked."""
     texts = ("" if text is None else text for text in (it.name, it.kind, it.bus, it.microgrid))
     spare = "yes" if it.spare else ""
-    values = (*texts, P_rated, it.m_p, it.m_q, it.phases, spare, it.parameters, it.neutral)
+    values = (*texts, float(it.P_rated) / 1e3, it.m_p, it.m_q, it.phases, spare, it.parameters, it.neutral)
     return dict(zip(InverterColumns.__struct_fields__, map(str, values), strict=True))
 
 
