@@ -18,17 +18,6 @@ from tests.command_line import invoke
 DEADLINE = 80.0
 """Longest wait (s) for any line, of a command that runs; on an idle machine all come within 3 s."""
 
-LIMIT = 512 * 1024
-"""Greatest size (bytes) of any file: the plant's compiled loop fits, the history of 7 s does not."""
-
-LIMITED = [
-    *(sys.executable, "-c"),
-    "import os, resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]),) * 2);"
-    "os.execvp(sys.argv[2], sys.argv[2:])",
-    str(LIMIT),
-]
-"""Before a command, in whose files there is no more room."""
-
 
 class Terminal:
     """One command in a terminal of its own."""

@@ -13,7 +13,7 @@ import pytest
 
 from gridpeers.scenarios.catalogue_files import CATALOGUE
 from tests.command_line import invoke
-from tests.processes.terminals import DEADLINE, LIMITED
+from tests.processes.terminals import DEADLINE
 
 ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
 HEAD = ISLANDING.replace('paper = "islanding"', "").partition('[[event]]\nlabel = "event2"')[0]
@@ -122,23 +122,3 @@ def test_a_complaint_that_cannot_be_written_keeps_its_exit_status(tmp_path: Path
         )
 
     assert done.returncode == 2
-
-
-def test_a_run_without_room_for_its_record_breaks_in_one_line(tmp_path: Path) -> None:
-    """Exit status 3; there is no history, and nothing in the folder claims to be whole."""
-    (tmp_path / "long.toml").write_text(SHORT.replace("end_s = 1.5", "end_s = 7.0"))
-    done = subprocess.run(
-        [*LIMITED, *command("run", "long.toml", "--driver", "inprocess", "--out", "here")],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        timeout=100,
-    )
-
-    why = "here/IV/history.csv: cannot be written: File too large"
-    assert done.returncode == 3
-    assert done.stderr == f"gridpeers: the run broke: {why}\ngridpeers: what came until then is in here/\n"
-    here = tmp_path / "here"
-    assert (here / "status.txt").read_text() == f"broken: {why}\n"
-    assert sorted(path.name for path in here.iterdir()) == ["IV", "log", "scenario.toml", "status.txt"]
-    assert not (here / "IV" / "history.csv").exists()

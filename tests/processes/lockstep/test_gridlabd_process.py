@@ -6,8 +6,6 @@ import os
 import re
 import select
 import signal
-import subprocess
-import sys
 from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
@@ -174,40 +172,3 @@ def test_gridlabd_keeps_no_real_time(tmp_path: Path) -> None:
         code, text = invoke(live, str(tmp_path / "mine.toml"), "--listen", "tcp/127.0.0.1:0")
         assert (code, text.count("\n")) == (2, 1)
         assert 'plant.simulator = "gridlabd": keeps no real time' in text
-
-
-WAITING = """import os, signal
-with open(os.environ["TOLD"], "w") as told:
-    told.write(f"{os.getpid()}")
-signal.pause()
-"""
-"""A package gridlabd that tells its process, and then loads for ever."""
-
-READ = "import sys; from gridpeers.bridges.gridlabd.read_glm import read_glm; read_glm(sys.argv[1])"
-
-
-@pytest.fixture
-def model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A model; what the package gridlabd is, the test says in `gridlabd.py` beside it."""
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    path = tmp_path / "x.glm"
-    path.write_text("module powerflow;\n")
-    return path
-
-
-def test_a_killed_import_leaves_no_process(model: Path) -> None:
-    """After kill -9 of an import GridLAB-D's process ends."""
-    folder = model.parent
-    (folder / "gridlabd.py").write_text(WAITING)
-    told = folder / "told"
-    os.mkfifo(told)
-    with subprocess.Popen(
-        [sys.executable, "-c", READ, str(model)], env=os.environ | {"TOLD": str(told), "TMPDIR": str(folder)}
-    ) as reading:
-        watched = os.pidfd_open(int(told.read_text()))
-        reading.kill()
-
-    assert reading.returncode == -signal.SIGKILL
-    assert select.select([watched], [], [], 60.0)[0] == [watched]
-    os.close(watched)

@@ -6,16 +6,12 @@ import re
 from pathlib import Path
 
 import msgspec
-import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from gridpeers.agents.agent_config import DegradedCommunication, Gains
-from gridpeers.plant.feeder import Plant
-from gridpeers.plant.network import Network
-from gridpeers.plant.plant_config import PlantSettings, PowerLimit, SwitchEvent, SyncCheck
-from gridpeers.plant.tables import read_feeder
+from gridpeers.plant.plant_config import SwitchEvent, SyncCheck
 from gridpeers.plant.tables.read import DATA
 from gridpeers.scenarios.catalogue_files import CATALOGUE
 from gridpeers.scenarios.live.live_options import configure
@@ -194,8 +190,6 @@ def test_factors_and_an_inverters_own_data_reach_the_plant_and_the_agents(tmp_pa
 @pytest.mark.parametrize(
     ("keys", "said"),
     [
-        ("m_p_factor = 0", "plant.m_p_factor: 0 is not plausible for a factor on droops (0.01 to 100)"),
-        ("inverter.inv3.m_p = 0.02", 'plant.inverter.inv3.m_p: unknown key; did you mean "m_p_pu"'),
         ("inverter.inv3 = {}", "plant.inverter.inv3: changes nothing; give it one of m_p_pu, m_q_pu, P_rated_kW"),
         ("inverter = 3", "plant.inverter: must be written as tables [plant.inverter.NAME], got 3"),
     ],
@@ -223,7 +217,6 @@ def test_trip_settings_are_judged_at_the_nominal_frequency(tmp_path: Path) -> No
         ('"all"', '["inv1", "inv44"]', 'case.IV.secondary: no inverter "inv44"; did you mean "inv4"?'),
         ('"all"', '["inv1", "inv1"]', 'case.IV.secondary: "inv1" is named twice; name it once'),
         ('"all"', "[]", 'case.IV.secondary: names no inverter; write secondary = "none"'),
-        ('"all"', "3", 'case.IV.secondary: must be one of "none", "GFM", "all" or a list such as ["inv1", "inv4"]'),
         ('"all"', '["inv1"]\nwithout_agent = ["inv1"]', "case.IV.secondary: inv1 has no agent that could run the law"),
         ('"all"', '"all"\nwithout_agent = ["inv0"]', 'case.IV.without_agent: no inverter "inv0"'),
         (
@@ -267,41 +260,6 @@ def test_a_case_has_its_own_available_power(tmp_path: Path) -> None:
     assert load_scenario(written(tmp_path, to_toml(scenario, {})))[0] == scenario
 
 
-@pytest.mark.parametrize(
-    ("wrong", "told"),
-    [
-        ("{ inv5 = -1 }", "inv5 can have from 0 to 350 kW available, got -1 kW"),
-    ],
-)
-def test_a_limit_that_cannot_be_is_told_with_what_would_be_right(tmp_path: Path, wrong: str, told: str) -> None:
-    """File, line, inverter, value and unit, and the range that makes sense."""
-    text = CLOUDS.replace("{ inv2 = 350, inv5 = 350, inv8 = 350 }", wrong, 1)
-    found = problems(tmp_path, text)
-
-    number = next(number for number, line in enumerate(text.splitlines(), 1) if wrong in line)
-    assert any(line.startswith(f"mine.toml:{number}: event[1].P_max_kW: ") and told in line for line in found)
-
-
-def test_a_limited_inverter_gives_no_more_than_it_has_and_all_again_later() -> None:
-    """P falls to the limit within its filter's time, the grid takes the rest, and P is back when the limit is."""
-    settings = PlantSettings(
-        limits=(PowerLimit(t=0.05, inverter="inv2", P_max=150e3), PowerLimit(t=0.6, inverter="inv2", P_max=350e3)),
-    )
-    plant = Plant(Network(read_feeder("microgrid123")), settings, 0.02, 0.01)
-    for _ in range(60):
-        plant.advance()
-    rows = np.array(plant.take_rows())
-    t, P = rows[:, 0], rows[:, 1 + 6 * plant.inverters.index("inv2") + 1]
-
-    assert P[t < 0.05] == pytest.approx(0.647 * 350e3, rel=1e-3)
-    assert P[(t > 0.5) & (t < 0.6)] == pytest.approx(150e3, rel=1e-2)
-    assert P[-1] == pytest.approx(0.647 * 350e3, rel=1e-2)
-    assert [(event.t, event.kind, event.subject) for event in plant.take_events()] == [
-        (0.05, "limit", "inv2"),
-        (0.6, "limit", "inv2"),
-    ]
-
-
 PLUG = (CATALOGUE / "plug-n-play.toml").read_text(encoding="utf-8")
 
 
@@ -328,7 +286,6 @@ def test_in_a_live_run_people_move_the_agents(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('leave = ["inv2"]', 'leave = ["inv2", "inv2"]', r'event\[1\].leave: "inv2" is named twice in event "leave"'),
         (
             'leave = ["inv2"]',
             'leave = ["inv10", "inv2"]',
@@ -336,7 +293,6 @@ def test_in_a_live_run_people_move_the_agents(tmp_path: Path) -> None:
         ),
         ('join = ["inv2"]', 'leave = ["inv2"]', r'event\[2\].leave: "inv2" is not there at 3 s; .* let it join before'),
         ("t_s = 2.0", "t_s = 2.01", r"event\[1\].t_s: 2.01 s is not a multiple of T_c_s = 0.02 s, .* nearest is 2"),
-        ('join = ["inv2"]', 'joins = ["inv2"]', r'event\[2\].joins: unknown key; did you mean "join"\?'),
     ],
 )
 def test_each_problem_is_told_with_its_place_and_what_would_be_right(

@@ -20,25 +20,16 @@ ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("seed = 1", "seeed = 1", r'mine.toml:\d+: seeed: unknown key; did you mean "seed"\?'),
-        ("T_c_s = 0.02", "T_c = 0.02", r'time.T_c: unknown key; did you mean "T_c_s"'),
         ("T_c_s = 0.02", "T_c_s = 0", r"time.T_c_s: a control period must be above 0, got 0 s"),
-        ("T_c_s = 0.02", 'T_c_s = "20 ms"', r'time.T_c_s: must be a number, got "20 ms"; write 0.02'),
-        ("T_c_s = 0.02", "T_c_s = nan", r"time.T_c_s: a control period must be a finite number"),
         (
             "h_s = 0.002",
             "h_s = 0.005",
             r"time.h_s: 0.005 s is too long a step for T_p_s = 0.01 s of \[plant.gfm\], .*; at most 0.003 s",
         ),
-        ("h_s = 0.002", "h_s = 2", r"time.h_s: 2 s is not plausible .* did you mean 0.002 \(2 ms\)\?"),
         ("end_s = 7.0", "", r"time.end_s: is missing; write a number"),
-        ("[gains]", "[gains]\nT_c_s = 0.02", r"gains.T_c_s: unknown key here; it belongs into \[time\]"),
         ("t_s = 4.0", "t_s = 4.001", r"event\[1\].t_s: 4.001 s is not a multiple of h_s = 0.002 s"),
-        ('"60-160"', '"60-161"', r'event\[1\].open: no switch "60-161"; did you mean "60-160"\?'),
         ('"60-160"', '"13-152"', r'event\[1\].open: switch "13-152" is open already at 4 s'),
         ('graph = "full"', 'graph = "mesh"', r'case.IV.graph: there is no graph "mesh"; the graphs are full, none'),
-        ('secondary = "all"', 'secondary = "GFMs"', r'case.IV.secondary: there is no "GFMs"; did you mean "GFM"\?'),
-        ("[case.IV]", '[case."a/b"]', r'case.a/b: name "a/b" must be up to 31 letters'),
         ('feeder = "microgrid123"', 'feeder = "microgrid"', r'plant.feeder: feeder "microgrid": no such feeder'),
         ('feeder = "microgrid123"', 'feeder = "standard123"', r"(?s)plant.(feeder|load_set): "),
         (
@@ -81,21 +72,6 @@ def test_the_longest_step_depends_on_the_method(tmp_path: Path) -> None:
     assert "time.h_s: 0.01 s is too long a step for T_p_s = 0.008 s of [plant.gfm], which it" in faster
     assert faster.endswith("at most 0.008 s, 1 of the shortest time constant")
     assert load_scenario(written(tmp_path, second_order))[0].time.h_s == 0.01
-
-
-def test_all_problems_come_at_once_in_the_order_of_lines(tmp_path: Path) -> None:
-    """All problems of a file are reported the first time."""
-    text = ISLANDING.replace("T_c_s = 0.02", "T_c_s = 20").replace("k_p = 0.0007", "k_p = 0")
-    text = text.replace('"60-160"', '"60-161"').replace('graph = "full"', 'graph = "mesh"')
-
-    found = problems(tmp_path, text)
-
-    assert [re.sub(r".*?: ([^:]*): .*", r"\1", line) for line in found] == [
-        "time.T_c_s",
-        "gains.k_p",
-        "event[1].open",
-        "case.IV.graph",
-    ]
 
 
 def test_an_unknown_feeder_hides_only_what_depends_on_it(tmp_path: Path) -> None:
