@@ -115,7 +115,7 @@ class Scenario:
 
     def check(self) -> tuple[str, ...]:
         """Return notes on what the events de-energise or overload; ScenarioError if the plant cannot start."""
-        from gridpeers.scenarios.schema.check_notes import start_problem
+        from gridpeers.scenarios.schema.loading import start_problem
         from gridpeers.scenarios.schema.supply import supply_notes
 
         if problem := start_problem(self._spec, self._feeder):

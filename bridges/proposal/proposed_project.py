@@ -15,7 +15,7 @@ from gridpeers.cli.usage import fail
 from gridpeers.feeder import Feeder
 from gridpeers.plant.equipment.neutrals import returns_in_words
 from gridpeers.scenarios.schema import load_scenario
-from gridpeers.scenarios.schema.check_notes import start_problem
+from gridpeers.scenarios.schema.loading import start_problem
 from gridpeers.wire.driver.command_line import command_line
 from gridpeers.wire.wording import counted
 

@@ -11,8 +11,8 @@ import pandas as pd
 from gridpeers.netem.ledger import LinkTrace
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict, Violation
 from gridpeers.scenarios.results.case_tables import EVENTS, LINKS, event_rows, link_rows
+from gridpeers.scenarios.results.metric import unit_of
 from gridpeers.scenarios.results.recorded_events import LawFailure
-from gridpeers.scenarios.sweep.sweep_table import unit_of
 from gridpeers.wire.messages import PlantEvent
 
 

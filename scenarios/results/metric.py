@@ -35,6 +35,18 @@ DIGITS: dict[Measure, int] = {"f_error_Hz": 2, "MPSI": 2, "V_error": 3, "MQSI": 
 """Decimals that make sense, and that the paper prints: smaller differences vary from run to run of a microgrid."""
 
 
+_ENDINGS = ("s", "Hz", "pu", "kW", "kvar", "W", "var", "V")
+
+
+def unit_of(name: str) -> str:
+    """Return the unit of a column, with which the name of a key or an index ends."""
+    *above, last = name.split(".")
+    if last == "V_error" or above[-1:] == ["p"]:
+        return "pu"
+    rest, _, unit = last.rpartition("_")
+    return unit if rest and unit in _ENDINGS else ""
+
+
 def label(measure: str, f_nom: float = 60.0) -> str:
     """Return the name of a measure for people, such as "abs(f-50)", at a nominal frequency (Hz)."""
     return {"f_error_Hz": f"abs(f-{f_nom:g})", "p": "P"}.get(measure, measure)

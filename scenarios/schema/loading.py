@@ -15,7 +15,7 @@ from gridpeers.plant.simulators import SIMULATORS
 from gridpeers.plant.tables import FeederError, feeders, is_folder, read_feeder
 from gridpeers.scenarios.catalogue_files import CATALOGUE, names_in
 from gridpeers.scenarios.schema import checks, participants
-from gridpeers.scenarios.schema.configs import as_in
+from gridpeers.scenarios.schema.configs import as_in, configs
 from gridpeers.scenarios.schema.plugin_keys import check_plugins, with_folders, with_model_folders
 from gridpeers.scenarios.schema.scenario_errors import Problems, ScenarioError
 from gridpeers.scenarios.schema.scenario_model import AS_RUN, ScenarioModel
@@ -125,6 +125,21 @@ def check_tables(
         if not problems.touch("plant.simulator"):
             SIMULATORS.resolve(scenario.plant.simulator).check(scenario, feeder, problems)
     return scenario, feeder
+
+
+def start_problem(scenario: ScenarioModel, feeder: Tables) -> str:
+    """Return why the plant has no operating point at t = 0, or cannot operate an event's switches; "" if it can."""
+    if SIMULATORS.resolve(scenario.plant.simulator).elsewhere:  # it finds its own
+        return ""
+    from gridpeers.plant.build import plant_at_rest  # the compiled step
+    from gridpeers.plant.dynamics import PlantError
+
+    plant, _ = configs(scenario, feeder, next(iter(scenario.cases)))
+    try:
+        plant_at_rest(plant)
+    except (PlantError, ValueError) as error:
+        return str(error)
+    return ""
 
 
 def _malformed(file: str, text: str, reason: str) -> str:

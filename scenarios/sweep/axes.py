@@ -110,20 +110,16 @@ def _zip_axes(table: Mapping[str, Any], problems: Problems) -> list[Axis]:
     if len(set(counts.values())) > 1 and all(counts.values()):
         listed = ", ".join(f"{path} has {count}" for path, count in counts.items())
         problems.add("zip", f"keys that go together need equally many values, but {listed}; for all combinations: grid")
-    elif (twice := _twice(list(zip(*values.values(), strict=False)))) is not None:
-        problems.add("zip", f"has {twice!r} twice, and nothing is run twice; for more seeds write seeds = n")
     return [Axis({path: f"zip.{path}" for path in values}, partial(of_values, values))] if values else []
 
 
 def graph_axes(axis: GraphAxis, inverters: Sequence[str], cases: Sequence[str], problems: Problems) -> list[Axis]:
     n = len(inverters)
     low, high = n - 1, n * (n - 1) // 2
-    for i, links in enumerate(axis.links):
+    for links in axis.links:
         if not low <= links <= high:
             why = "fewer cannot join them" if links < low else "there are no more pairs"
             problems.add("graph.links", f"{n} inverters have {low} to {high} links, got {links}: {why}")
-        elif links in axis.links[:i]:
-            problems.add("graph.links", f"{links} is listed twice; for more graphs raise per_count")
     keys = [f"case.{case}.{key}" for case in cases for key in ("graph", "links")]
     return [Axis(dict.fromkeys(keys, "graph"), lambda: _graphs(axis, inverters, cases))] if axis.links else []
 
@@ -161,21 +157,9 @@ def _values_of(table: Mapping[str, Any], where: str, problems: Problems) -> dict
             problems.add(at, f"must be a list of values or {{ from, to, count }}, got {value!r}; write [{value!r}]")
         elif not value:
             problems.add(at, "has no value; list at least one")
-        elif where == "grid" and (twice := _twice(value)) is not None:
-            problems.add(at, f"lists {twice!r} twice, and nothing is run twice; for more seeds write seeds = n")
         else:
             found[path] = value
     return found
-
-
-def _twice(items: Sequence[Any]) -> Any:
-    """Return the first item that comes again, or None; lists among them are compared as written."""
-    seen: set[str] = set()
-    for item in items:
-        if (written := repr(item)) in seen:
-            return item
-        seen.add(written)
-    return None
 
 
 def _is_range(value: Any) -> bool:

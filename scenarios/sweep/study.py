@@ -1,4 +1,4 @@
-"""A sweep from its checked plan to its folder: the runs that are not done yet, the table."""
+"""A sweep from its checked plan to its folder: the runs that are not done yet, and the table of all."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
+
+import pandas as pd
 
 from gridpeers.scenarios.results.run_files import (
     JOURNAL,
@@ -27,9 +29,8 @@ from gridpeers.scenarios.results.run_files import (
     write_whole,
 )
 from gridpeers.scenarios.schema.scenario_writing import to_toml
-from gridpeers.scenarios.sweep.sweep_case import SweepRow, run_one
+from gridpeers.scenarios.sweep.sweep_case import FATE, SweepRow, run_one
 from gridpeers.scenarios.sweep.sweep_reading import Plan
-from gridpeers.scenarios.sweep.sweep_table import results_frame, write_table
 from gridpeers.scenarios.sweep.workers import on_workers
 from gridpeers.scenarios.versions import versions
 
@@ -114,6 +115,38 @@ def _check(folder: Path, whole: Mapping[str, object]) -> bool:
             f"that rows of both would not compare: {'; '.join(other)}; give another folder by --out, or remove this one"
         )
     return True
+
+
+FILE = "results.csv"
+
+
+def results_frame(plan: Plan, done: Mapping[int, SweepRow]) -> pd.DataFrame:
+    """Return the rows of the runs that are done.
+
+    Columns: `sample`, `case`, `seed`, the parameters by their path, those of `FATE` (`metric_warnings` only where the
+    scenario has metrics of its own), the indexes as "WINDOW.INDEX", nan where there is no value, and over emulated
+    links `links_sent`, `links_delivered`, `links_dropped`.
+    """
+    numbers = sorted(done)
+    runs, rows = [plan.runs[number] for number in numbers], [done[number] for number in numbers]
+    columns: dict[str, list[object]] = {
+        "sample": [run.sample for run in runs],
+        "case": [run.case for run in runs],
+        "seed": [run.scenario.seed for run in runs],
+    }
+    columns |= {name: [run.shown[name] for run in runs] for name in plan.parameters if name not in columns}
+    fate = FATE if any(run.scenario.metrics for run in runs) else FATE[:-1]
+    columns |= {name: [getattr(row, name) or None for row in rows] for name in fate}
+    measures = pd.DataFrame([row.measures for row in rows], dtype=float)
+    return pd.concat([pd.DataFrame(columns), measures], axis=1)
+
+
+def write_table(frame: pd.DataFrame, plan: Plan, folder: Path) -> Path:
+    """Write a table at once or not at all; a parameter whose values are no numbers alone is JSON."""
+    mixed = [name for name in plan.parameters if frame[name].dtype == object]
+    written = frame.assign(**{name: [json.dumps(value, default=str) for value in frame[name]] for name in mixed})
+    write_whole(folder / FILE, written.to_csv(index=False))
+    return folder / FILE
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -43,7 +43,7 @@ def check(
 
     from gridpeers.cli.progress import TRYING, explained
     from gridpeers.rooms import ROOMS
-    from gridpeers.scenarios.schema.check_notes import start_problem
+    from gridpeers.scenarios.schema.loading import start_problem
     from gridpeers.scenarios.schema.supply import supply_notes
 
     with explained(lambda: typer.echo(TRYING)):

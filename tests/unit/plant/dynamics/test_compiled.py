@@ -17,8 +17,8 @@ from gridpeers.plant.build import build_plant
 from gridpeers.plant.dynamics import Dynamics
 from gridpeers.plant.dynamics.kernel import compiled
 from gridpeers.scenarios.schema import load_scenario
-from gridpeers.scenarios.schema.check_notes import start_problem
 from gridpeers.scenarios.schema.configs import configs
+from gridpeers.scenarios.schema.loading import start_problem
 from tests.side_by_side import compile_once
 
 SOURCES = sorted(path for path in compiled.HERE.glob("*.py") if "\n@compiled\n" in path.read_text())

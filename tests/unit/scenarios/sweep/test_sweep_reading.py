@@ -100,7 +100,6 @@ BAD: list[tuple[str, str]] = [
     ("scenario = 'islanding'", "nothing is varied"),
     ("scenario = 'islanding'\ncases = ['V']\nseeds = 2", 'cases: no case "V"'),
     ('[grid]\n"gains.k_p" = 0.0005', "grid.gains.k_p: must be a list of values"),
-    ('[grid]\n"gains.k_p" = [0.001, 0.001]', "lists 0.001 twice"),
     ('[grid]\n"gains.k_p" = { from = 0, to = 1, count = 3, spacing = "log" }', "needs two numbers above 0"),
     ('[grid]\n"gains.k_p" = { from = 0.0001, to = 1, count = 50000 }', "50,000 runs, about 12 min on one core, and"),
     ('[zip]\n"gains.k_p" = { from = 0.0001, to = 1, count = 50000 }', "50,000 runs"),
