@@ -60,7 +60,7 @@ class Start:
 
 def _start(start: Start, *, agents: bool) -> None:
     """Run the plant, with its agents or without, until it ends; end with its exit code."""
-    from gridpeers.scenarios.live.live_options import check_alone, chosen_case, configure
+    from gridpeers.scenarios.live.live_options import check_alone, chosen_case, configure, folders, live_record
 
     # first: reading a scenario takes seconds, and a forgotten run is reported at once
     run = check_name("--run", start.run)
@@ -72,7 +72,6 @@ def _start(start: Start, *, agents: bool) -> None:
     endpoint = free_endpoint(listen, option="--listen")
     check_alone(run, beyond, credentials, access)
 
-    from gridpeers.scenarios.live.live_files import folders, live_record
     from gridpeers.scenarios.live.live_processes import all_here, conclude, plant_here, say
     from gridpeers.scenarios.record.record_info import LIVE
     from gridpeers.scenarios.results.recorded_events import ended_by_a_law, first_of, law_failures

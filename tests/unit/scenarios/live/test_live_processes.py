@@ -22,7 +22,7 @@ from gridpeers.scenarios import measured_run
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.live import live_processes
-from gridpeers.scenarios.live.live_files import folders
+from gridpeers.scenarios.live.live_options import folders
 from gridpeers.scenarios.live.live_processes import UNHEARD, LiveRecorder, ProcessOutcome, _followed, meaning
 from gridpeers.scenarios.live.run_address import RunAddress, UsageError
 from gridpeers.scenarios.live.run_requests import own_code
