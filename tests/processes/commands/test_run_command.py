@@ -1,4 +1,4 @@
-"""`gridpeers run` as a command: its bytes, its end, a closed pipe, a full disk."""
+"""`gridpeers run` and `replay` as commands: their bytes, their end, a closed pipe, a full disk."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+import gridpeers as gp
 from gridpeers.scenarios.catalogue_files import CATALOGUE
 from tests.command_line import invoke
 from tests.processes.terminals import DEADLINE
@@ -122,3 +123,54 @@ def test_a_complaint_that_cannot_be_written_keeps_its_exit_status(tmp_path: Path
         )
 
     assert done.returncode == 2
+
+
+HELD_FOR_A_WHILE = """
+law = "held:Held"
+[time]
+end_s = 0.1
+[[event]]
+label = "islanding"
+t_s = 0.04
+open = ["13-152"]
+[case.IV]
+secondary = "all"
+graph = "full"
+"""
+
+LAW = """
+import os
+import gridpeers as gp
+
+class Held(gp.Law):
+    def step(self, own, neighbours, T):
+        if number := os.environ.get("SIGNAL_AT_STEP"):
+            os.kill(os.getpid(), int(number))
+        return gp.SetPoints(P_set=own.P_set, V_set=own.V_set)
+"""
+"""A law that sends its own process a signal, so that it comes in the middle of the work on every machine."""
+
+
+@pytest.fixture(scope="module")
+def held(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of a run with that law, which nobody stopped."""
+    folder = tmp_path_factory.mktemp("held")
+    (folder / "held.py").write_text(LAW, encoding="utf-8")
+    (folder / "short.toml").write_text(HELD_FOR_A_WHILE, encoding="utf-8")
+    return gp.load(folder / "short.toml").run("IV", folder=folder / "out").folder
+
+
+def test_a_stopped_replay_ends_as_a_stopped_run(held: Path, tmp_path: Path) -> None:
+    """One line, the exit code of the signal, a folder that says what happened, and no temporary ones."""
+    (tmp_path / "tmp").mkdir()
+    own = {"SIGNAL_AT_STEP": str(int(signal.SIGINT)), "TMPDIR": str(tmp_path / "tmp")}
+    words = ("replay", str(held), "--without", "inv4 <-> inv7", "--out", "would")
+    done = subprocess.run(
+        command(*words), cwd=tmp_path, env=os.environ | own, capture_output=True, text=True, timeout=DEADLINE
+    )
+
+    assert (done.returncode, done.stderr) == (130, "gridpeers: interrupted; what came until then is in would/\n")
+    assert not list((tmp_path / "tmp").iterdir())
+    assert (tmp_path / "would" / "status.txt").read_text() == "broken: interrupted from the keyboard\n"
+    assert (tmp_path / "would" / "IV" / "run.mcap").exists()
+    assert not (tmp_path / "would" / "metrics.json").exists()

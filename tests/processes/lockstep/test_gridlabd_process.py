@@ -132,18 +132,6 @@ def test_gridlabd_that_does_not_answer_is_named(gridlabd: DeltaModeProcess) -> N
         gridlabd.ask(advance=1)
 
 
-def test_without_the_wheel_one_line_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The command refuses before it starts anything."""
-    find = find_spec
-    monkeypatch.setattr(
-        "importlib.util.find_spec", lambda name, *rest: None if name == "gridlabd" else find(name, *rest)
-    )
-    code, text = invoke("run", "islanding", "--plant", "gridlabd", "--driver", "inprocess")
-
-    assert code == 2
-    assert text.splitlines()[-1] == "gridpeers: install it: pip install 'gridpeers[gridlabd]'"
-
-
 def test_a_damaged_wheel_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A package that is there and cannot be imported ends the command with 2, and a plant with the same reason."""
     (tmp_path / "gridlabd.py").write_text("raise ImportError('libdamaged.so')")

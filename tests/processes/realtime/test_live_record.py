@@ -9,7 +9,6 @@ import pytest
 from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.lab.explanation.law_step import law_step
 from gridpeers.lab.replay.recomputation import recomputed
 from gridpeers.netem.models.delay import Normal
 from gridpeers.netem.schema.fault import Fault
@@ -112,23 +111,3 @@ def test_what_was_heard_is_there_with_its_time(record: RunRecord) -> None:
     assert all(journal.t > 1.4 for journal, _ in lacking), "within its last second"
     fates = {outcome if isinstance(outcome, str) else "passed" for trace in record.links() for outcome in trace.outcome}
     assert fates >= {"passed", "loss", "partition"}
-
-
-def test_decisions_alone_leave_arrivals_out(tmp_path: Path) -> None:
-    """With "decisions" the inputs of each decision are there, and nothing of what else arrived."""
-    plant, agents = toy_configs(3, end=0.6)
-    wall = {"clock": "wall", "record": "decisions"}
-    record = recorded(tmp_path, replace(plant, **wall), [replace(agent, **wall) for agent in agents])
-
-    assert all(each.agrees for each in recomputed(record, "inv1"))
-    assert sum(1 for _ in record.decisions("inv1")) > 15
-    assert not any(isinstance(entry, MessageReference) for entry in record.entries("inv1"))
-
-
-def test_each_step_adds_up(record: RunRecord) -> None:
-    """Terms and limits of each decision of the law give the recorded step within 1e-12 pu."""
-    for agent in record.agents:
-        steps = [step for each in record.decisions(agent) if (step := law_step(record, each)) is not None]
-        assert len(steps) > 20
-        assert {step.problem for step in steps} == {""}
-        assert max(max(abs(step.P_set.rest), abs(step.V_set.rest)) for step in steps) <= 1e-12

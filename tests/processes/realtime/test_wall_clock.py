@@ -160,19 +160,3 @@ def test_a_plant_that_freezes_or_dies_is_held_out_for_and_has_its_agents_again(t
         town.until_event("inv4", "inv4 joined")
 
         settled(town)
-
-
-def test_two_runs_side_by_side_do_not_meet(tmp_path: Path) -> None:
-    """Even where agents of one run are connected to the other's plant: names keep them apart."""
-    (tmp_path / "a").mkdir()
-    (tmp_path / "b").mkdir()
-    with Town(3, tmp_path / "a", run="run-a") as a, Town(3, tmp_path / "b", run="run-b", also=(a.endpoint,)) as b:
-        a.all()
-        b.all()
-        a.signal("inv2", signal.SIGTERM)
-        a.until_event("inv2", "inv2 left").together(("inv1", "inv3"))
-        since = b.t
-        b.until(lambda: b.t > since + 0.6, "the other run goes on")
-
-        b.together(("inv1", "inv2", "inv3"))
-        assert [event for event in b.events if "left" in event.text or "died" in event.text] == []

@@ -16,9 +16,7 @@ from gridpeers.scenarios.live.run_address import (
     UsageError,
     accepting,
     address_of,
-    loopback_of,
     return_path,
-    with_protocol,
 )
 from gridpeers.scenarios.live.run_client import NobodyError, RunClient
 from gridpeers.wire.driver.inbox import Inbox
@@ -86,6 +84,8 @@ def test_who_connects_to_another_host_can_be_reached_from_there(connect: tuple[s
     [
         ("tls/127.0.0.1:7447", ["--keys", "lab"]),
         ("tls/0.0.0.0:7500", ["--connect", "tls/127.0.0.1:7500", "--keys", "lab"]),
+        ("tls/[::]:7447", ["--connect", "tls/[::1]:7447", "--keys", "lab"]),
+        ("tls/10.0.0.1:7447", ["--connect", "tls/10.0.0.1:7447", "--keys", "lab"]),
     ],
 )
 def test_the_options_that_find_a_run_say_what_is_not_the_default(endpoint: str, words: list[str]) -> None:
@@ -93,21 +93,6 @@ def test_the_options_that_find_a_run_say_what_is_not_the_default(endpoint: str, 
     address = RunAddress(run="gridpeers", connect=(endpoint,), access=Access(keys=Path("lab")))
 
     assert address.words == words
-
-
-def test_endpoints_as_other_commands_need_them() -> None:
-    """On the same host, and with certificates."""
-    listens = ("tcp/0.0.0.0:7447", "tcp/[::]:7447", "tcp/10.0.0.1:7447")
-
-    assert [*map(loopback_of, listens)] == ["tcp/127.0.0.1:7447", "tcp/[::1]:7447", "tcp/10.0.0.1:7447"]
-    assert with_protocol("tcp/lab:7447", keys=True, default="tcp/lab:7447") == "tls/lab:7447"
-    assert RunAddress(run="gridpeers", connect=("tcp/127.0.0.1:7447",)).words == []
-    assert RunAddress(run="demo", connect=("tcp/0.0.0.0:7500",)).words == [
-        "--run",
-        "demo",
-        "--connect",
-        "tcp/127.0.0.1:7500",
-    ]
 
 
 class Clock:

@@ -11,7 +11,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from gridpeers.agents.agent_config import DegradedCommunication, Gains
-from gridpeers.plant.plant_config import SwitchEvent, SyncCheck
+from gridpeers.plant.plant_config import SyncCheck
 from gridpeers.plant.tables.read import DATA
 from gridpeers.scenarios.catalogue_files import CATALOGUE
 from gridpeers.scenarios.live.live_options import configure
@@ -48,21 +48,6 @@ def test_every_scenario_of_the_catalogue_can_be_run(name: str) -> None:
     assert feeder.inverters
 
 
-def test_islanding_is_the_papers_experiment() -> None:
-    """Section 4: event 1 opens 13-152 at 1 s, event 2 opens 60-160 at 4 s, in four cases."""
-    scenario, feeder = load_scenario("islanding")
-    plant, agents = configs(scenario, feeder, "III")
-
-    assert plant.settings.events == (
-        SwitchEvent(t=1.0, switch="13-152", action="open"),
-        SwitchEvent(t=4.0, switch="60-160", action="open"),
-    )
-    assert (plant.T_c, plant.settings.h, plant.end) == (0.02, 0.002, 7.0)
-    assert [agent.name for agent in agents if agent.kind == "GFM"] == ["inv1", "inv4", "inv7"]
-    rules = {name: (case.secondary, case.graph) for name, case in scenario.cases.items()}
-    assert rules == {"I": ("none", "none"), "II": ("GFM", "none"), "III": ("GFM", "GFM-only"), "IV": ("all", "full")}
-
-
 def test_an_agent_is_told_its_own_nameplate_and_the_rule_and_no_neighbour() -> None:
     """The configuration of an agent names nobody but itself."""
     _, agents = configs(*load_scenario("islanding"), "IV", "tcp/127.0.0.1:7447")
@@ -71,15 +56,6 @@ def test_an_agent_is_told_its_own_nameplate_and_the_rule_and_no_neighbour() -> N
         text = msgspec.json.encode(agent).decode()
         assert [name for name in (other.name for other in agents) if f'"{name}"' in text] == [agent.name]
         assert agent.connect == ("tcp/127.0.0.1:7447",)
-
-
-def test_a_case_changes_only_the_gains_it_names(tmp_path: Path) -> None:
-    """[case.NAME.gains] starts from [gains], not from the defaults."""
-    text = SHORT + "[case.only.gains]\nalpha = 3.0\n\n[gains]\nk_q = 0.5\n"
-
-    scenario, _ = load_scenario(written(tmp_path, text))
-
-    assert scenario.cases["only"].gains == Gains(alpha=3.0, k_q=0.5)
 
 
 def test_a_case_changes_only_the_handling_it_names_and_agents_are_told(tmp_path: Path) -> None:
