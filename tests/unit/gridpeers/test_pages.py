@@ -6,7 +6,6 @@ import doctest
 import re
 import shlex
 import tomllib
-from importlib import util
 from pathlib import Path
 from typing import Any
 
@@ -16,15 +15,12 @@ import typer
 from gridpeers.cli.root import app
 from gridpeers.scenarios.catalogue_files import CATALOGUE
 from gridpeers.scenarios.schema import load_scenario
-from tests.command_line import invoke
 
 README = Path(__file__).parents[3] / "README.md"
 TEXT = README.read_text(encoding="utf-8")
 BLOCKS = re.findall(r"^```(\w*)\n(.*?)^```", TEXT, re.S | re.M)
 SNIPPETS = [block for language, block in BLOCKS if not language and re.search(r"^\[\[?[a-z]", block, re.M)]
 ROWS = [line for line in TEXT.splitlines() if line.startswith("| ") and "gridpeers" in line]
-SWEEP_EXTRA = ("joblib",)
-"""Modules that the extra `sweep` installs besides what everybody has."""
 
 
 def commands(row: str) -> list[list[str]]:
@@ -62,22 +58,6 @@ def test_a_command_of_the_readme_is_one(row: str, line: list[str]) -> None:
 
     assert command is not None, line[0]
     command.make_context(line[0], line[1:], parent=context)
-
-
-@pytest.mark.parametrize("row", [row for row in ROWS if commands(row)])
-def test_a_row_whose_command_needs_an_extra_tells_to_install_it(
-    row: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    """A row tells to install the extra exactly where one of its commands ends without its packages."""
-    find, missing = util.find_spec, []
-    monkeypatch.setattr(util, "find_spec", lambda name, *rest: None if name in SWEEP_EXTRA else find(name, *rest))
-    monkeypatch.chdir(tmp_path)
-    for line in commands(row):
-        if line[0] in ("sweep", "experiment"):
-            code, said = invoke(*line)
-            missing.append(code == 2 and "gridpeers[sweep]" in said)
-
-    assert ("'.[sweep]'" in row) == any(missing)
 
 
 ROOT = Path(__file__).parents[3]

@@ -66,6 +66,8 @@ def test_what_is_no_finished_run_is_not_read(tmp_path: Path) -> None:
     """A folder of something else, and one of a run that broke, are told in one line."""
     with pytest.raises(gp.FolderError, match="no folder of a run"):
         gp.read(tmp_path)
+    with pytest.raises(gp.FolderError, match="needs the path of a folder, got"):
+        gp.read("x" * 5000)
     (tmp_path / "status.txt").write_text("broken: interrupted\n")
     with pytest.raises(gp.FolderError, match='its status is "broken: interrupted"'):
         gp.read(tmp_path)
@@ -132,3 +134,16 @@ def test_a_folder_of_any_name_is_read_and_compared(run: gp.Result, tmp_path: Pat
     assert gp.read(folder).sha256 == run.sha256
     code, text = invoke("compare", str(folder), str(run.folder), "--out", str(tmp_path / "c.svg"))
     assert (code, "r\\xdcff" in text) == (0, True), text
+
+
+def test_a_machine_without_room_for_temporary_files_is_told(
+    scenario: gp.Scenario, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A result that is not saved needs a folder too."""
+
+    def refuse(**_: str) -> str:
+        raise FileNotFoundError(2, "No usable temporary directory found")
+
+    monkeypatch.setattr("tempfile.mkdtemp", refuse)
+    with pytest.raises(ValueError, match="there is nowhere for temporary files: No usable temporary directory found"):
+        scenario.run("I")

@@ -6,6 +6,7 @@ import inspect
 from collections import Counter
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from gridpeers.runs.choices import Pace
 from gridpeers.runs.running import How
 from gridpeers.scenarios.run_request import Request
 
+LONG = "x" * 5000
 TABLES = {
     "name": "mine",
     "time": {"end_s": 1.0},
@@ -126,3 +128,18 @@ def test_a_scenario_without_events_runs_and_has_no_windows() -> None:
 
     assert len(run.metrics) == 0
     assert len(run.history) == 51
+
+
+@pytest.mark.parametrize(("changes", "said"), [
+    ({"gains.k_p": {3, "b"}}, "replace: gains.k_p: must be a number, got [3,"),
+    ({"case.IV.law": {"command": [LONG]}}, "case.IV.law.command: begins with what can be no name of a program"),
+    ({"case.IV.graph": {"use": "mine:star", "k": 10**30}}, "case.IV.graph.k: a whole number has at most 64 bits"),
+    ({"case.IV.link": [{"on": "* <-> *", "mine:Jam": {"folder": LONG}}]}, "must be the path of a folder"),
+    ({"metrics": [{"use": "mine:low", "band": float("nan")}]}, "metrics[0].band: must be a finite number, got nan"),
+])  # fmt: skip
+def test_changes_to_nonsense_are_refused(changes: dict[str, Any], said: str) -> None:
+    """Names that can be no file's, numbers that are too great."""
+    with pytest.raises(gp.ScenarioError) as refused:
+        gp.load("islanding").replace(changes)
+
+    assert said in str(refused.value)

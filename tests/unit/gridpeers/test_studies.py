@@ -70,28 +70,21 @@ def test_all_problems_of_a_sweep_come_before_the_first_run(scenario: gp.Scenario
         gp.sweep(scenario, {"gains.k_p": [0.001]}, cases=["I"], metrics=["MPSY"], jobs=1)
 
 
-def test_a_prediction_says_that_it_leaves_out_faults_of_links() -> None:
-    """Its times to restore are those of good links, whatever delays the scenario writes."""
-    late = gp.load("islanding").replace({"case.IV.link": [{"on": "* <-> *", "delay": 0.1}]})
-
-    assert "without its faults of links" in str(gp.predict(late, "IV", voltage=False))
-    assert "without its faults" not in str(gp.predict(gp.load("islanding"), "IV", voltage=False))
-
-
 def test_a_prediction_has_tables_and_the_words_of_the_command() -> None:
-    """The frequency mode is kappa n_L/N, and what the command prints is its text."""
+    """The frequency mode is kappa n_L/N; it is that of good links and of the paper's law, and says so."""
     found = gp.predict(gp.load("islanding"), "IV", voltage=False)
 
     assert found.modes["frequency_rate"] == pytest.approx(found.modes["kappa"] * 3 / 9)
     assert math.isinf(found.delay_limits["discrete"]["agent to agent"])
     assert found.times["t_restore_s"].tolist() == pytest.approx([0.64, 0.74], abs=0.02)
     assert invoke("predict", "islanding", "--case", "IV", "--no-vars") == (0, f"{found}\n")
-
-
-def test_another_law_is_not_predicted_by_the_theory_of_the_papers() -> None:
-    """Nothing is told of a law that the equations are not about."""
+    late = gp.load("islanding").replace({"case.IV.link": [{"on": "* <-> *", "delay": 0.1}]})
+    assert "without its faults" not in str(found)
+    assert "without its faults of links" in str(gp.predict(late, "IV", voltage=False))
     with pytest.raises(gp.ScenarioError, match="case IV: runs the law dapi"):
         gp.predict(gp.load("islanding").replace({"case.IV.law": "dapi"}), "IV", voltage=False)
+    with pytest.raises(gp.ScenarioError, match='no case "V"; did you mean "IV"'):
+        gp.predict("islanding", "V")
 
 
 def test_a_comparison_tells_what_differs(scenario: gp.Scenario, runs: gp.Results) -> None:

@@ -3,12 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import base64
-import os
-import signal
-import socket
-import subprocess
-import sys
 from typing import Any, cast
 
 import pytest
@@ -17,54 +11,6 @@ from gridpeers.scenarios.live.run_address import UsageError
 from gridpeers.viewer.page_server import access, texts
 
 pytest.importorskip("uvicorn", reason="the page needs the extra view")
-
-SERVER = """
-import asyncio, functools, socket, uvicorn
-uvicorn.Config = functools.partial(uvicorn.Config, ws_ping_interval=0.1, ws_ping_timeout=0.1)
-from gridpeers.viewer.page_server import PageServer, send, texts
-class Pages:
-    def close(self): pass
-    def talk(self, page):
-        async def talk():
-            asyncio.get_running_loop().call_later(0.5, functools.partial(print, "given up", flush=True))
-            while True:
-                await send(page, "x" * 60_000)
-                await asyncio.sleep(0.001)
-        async def hear():
-            async for text in texts(page): pass
-        return talk(), hear()
-listening = socket.create_server(("127.0.0.1", 0))
-listening.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
-print(listening.getsockname()[1], flush=True)
-try:
-    PageServer(Pages()).run(listening)
-except KeyboardInterrupt:
-    print("ended")
-"""
-"""Serves pages many frames, with uvicorn's patience cut to a fraction of a second."""
-
-
-def test_a_page_that_never_reads_leaves_no_traceback() -> None:
-    """Its frames find no room, and uvicorn would give it up after a while; then somebody ends the server."""
-    server = subprocess.Popen(
-        [sys.executable, "-c", SERVER],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    )
-    with server, socket.socket() as page:
-        assert server.stdout is not None
-        port = int(server.stdout.readline())
-        page.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-        page.connect(("127.0.0.1", port))
-        key = base64.b64encode(os.urandom(16)).decode()
-        page.sendall(
-            f"GET /frames HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-            f"Sec-WebSocket-Key: {key}\r\nSec-WebSocket-Version: 13\r\n\r\n".encode()
-        )
-        said = server.stdout.readline()
-        server.send_signal(signal.SIGINT)
-        assert said + server.stdout.read() == "given up\nended\n"
 
 
 class Socket:

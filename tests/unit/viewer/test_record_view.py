@@ -122,25 +122,6 @@ def test_switches_eachevents_are_those_of_the_time(view: RecordView) -> None:
     assert view.events[0].text == "switch 13-152 opened"
 
 
-def test_a_page_gets_what_it_lacks(view: RecordView) -> None:
-    """Points of a later time continue those that a page has; together they are those of one request."""
-    whole, first = view.frame(1.5).points, view.frame(0.75)
-    more = view.frame(1.5, since=first.points[-1][0])
-
-    assert (first.reset, more.reset) == (True, False)
-    assert more.points[0][0] > first.points[-1][0]
-    assert {*first.points, *more.points} >= set(whole)
-    assert view.frame(1.5, since=1.5).points == ()
-
-
-def test_a_decision_is_explained(record: RunRecord, view: RecordView) -> None:
-    """A page shows what `gridpeers why` prints."""
-    from gridpeers.lab.explanation.explanation import explain
-
-    assert view.decision("inv4", 0.7) == str(explain(record, "inv4", 0.7))
-    assert "10 states since: 10 cut off by a cut link" in view.decision("inv4", 0.7)
-
-
 def test_a_record_of_the_physics_shows_them_eachsays_what_it_lacks(tmp_path: Path) -> None:
     """No link and no age is made up; agents are there as the scenario says."""
     (tmp_path / "it.toml").write_text(ISLANDED.replace("1.6", "0.6"), encoding="utf-8")

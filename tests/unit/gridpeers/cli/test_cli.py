@@ -3,6 +3,7 @@
 import json
 import re
 import socket
+import subprocess
 import sys
 import tomllib
 from pathlib import Path
@@ -34,31 +35,22 @@ def test_no_command_is_cut_short_in_the_help(words: tuple[str, ...], monkeypatch
     assert [line for line in lines if not line.endswith(".") or line.endswith("...")] == []
 
 
-def test_help_and_list_do_not_wait_for_heavy_modules() -> None:
-    """Neither imports numba, matplotlib, Zenoh or what they bring."""
-    import subprocess
+HELPED = ["feeder", "sweep", "reproduce", "experiment", "up", "plant", "run", "link", "check"]
 
-    heavy = {"numba", "numpy", "scipy", "pandas", "matplotlib", "zenoh", "msgspec"}
-    code = "import sys\nfrom gridpeers.cli.root import app\napp(['list'], standalone_mode=False)\n"
+
+@pytest.mark.parametrize(("lines", "heavy"), [
+    ([["list"]], {"numba", "numpy", "scipy", "pandas", "matplotlib", "zenoh", "msgspec"}),
+    ([[name, "--help"] for name in HELPED], {"numba", "pandas", "matplotlib"}),
+])  # fmt: skip
+def test_what_is_only_read_does_not_wait_for_heavy_modules(lines: list[list[str]], heavy: set[str]) -> None:
+    """The list, and the help of each command, import nothing that compiles, draws, connects or computes."""
+    code = f"import sys\nfrom gridpeers.cli.root import app\nfor words in {lines}: app(words, standalone_mode=False)\n"
     code += f"print(sorted({heavy} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
 
-    *listed, imported = done.stdout.splitlines()
-    assert listed
+    *printed, imported = done.stdout.splitlines()
+    assert printed
     assert imported == "[]"
-
-
-def test_help_of_no_command_compiles_or_draws() -> None:
-    """None imports numba, pandas or matplotlib: whoever reads what a command takes does not wait for them."""
-    import subprocess
-
-    names = ["feeder", "sweep", "reproduce", "experiment", "up", "plant", "run", "link", "check"]
-    code = "import sys\nfrom gridpeers.cli.root import app\n"
-    code += f"for name in {names}: app([name, '--help'], standalone_mode=False)\n"
-    code += "print(sorted({'numba', 'pandas', 'matplotlib'} & set(sys.modules)))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-
-    assert done.stdout.splitlines()[-1] == "[]"
 
 
 def test_list_shows_the_catalogue() -> None:

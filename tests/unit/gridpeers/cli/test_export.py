@@ -109,10 +109,9 @@ def test_of_a_record_that_is_cut_off_there_is_what_it_has(run: Path, tmp_path: P
         (("nowhere",), "nowhere: cannot be read: No such file or directory"),
         (("{run}", "--case", "V"), 'no record of case "V"'),
         (("{run}", "--to", "hdf"), "--to.*hdf.*xlsx"),
-        (
-            ("{run}/IV", "--to", "xlsx"),
-            "history has 51 rows, and a sheet of xlsx takes 20; use --to",
-        ),
+        (("{run}/IV", "--to", "xlsx"), "history has 51 rows, and a sheet of xlsx takes 20; use --to"),
+        (("{run}/IV", "--to", "mat"), "history: inv1_P_set_W has 12 characters, .* use --to parquet or csv"),
+        (("{run}/IV", "--to", "parquet"), r"pyarrow is not installed; .* pip install 'gridpeers\[export\]'"),
     ],
 )
 def test_bad_input_is_one_line(
@@ -120,32 +119,10 @@ def test_bad_input_is_one_line(
 ) -> None:
     """Exit code 2, and nothing is written."""
     monkeypatch.setattr(export, "SHEET", 20)
-    monkeypatch.setattr(usage.util, "find_spec", lambda name: name)
+    monkeypatch.setattr(export, "LONGEST", 10)
+    monkeypatch.setattr(usage.util, "find_spec", lambda name: name != "pyarrow" or None)
 
     code, text = invoke("export", *(word.format(run=run) for word in words))
 
     assert code == 2
     assert re.search(complaint, " ".join(text.split()))
-
-
-def test_a_column_with_too_long_a_name_for_matlab_is_named(
-    run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Exit code 2, and the formats that take it; names of inverters have up to 64 characters."""
-    monkeypatch.setattr(export, "LONGEST", 10)
-
-    code, text = invoke("export", str(run / "IV"), "--to", "mat", "--out", str(tmp_path))
-
-    assert code == 2
-    assert re.search(r"history: inv1_P_set_W has 12 characters, .* use --to parquet or csv", " ".join(text.split()))
-
-
-def test_a_missing_package_is_named_with_its_extra(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Only some formats need one."""
-    monkeypatch.setattr(usage.util, "find_spec", lambda name: None)
-
-    code, text = invoke("export", str(run / "IV"), "--to", "parquet")
-
-    assert code == 2
-    assert "pyarrow is not installed; it is needed for --to parquet" in text
-    assert "pip install 'gridpeers[export]'" in text

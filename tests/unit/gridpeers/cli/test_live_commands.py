@@ -99,19 +99,6 @@ def test_something_that_listens_in_silence_is_told() -> None:
     assert "start a plant" not in text
 
 
-def test_a_port_in_use_is_told(elsewhere: Path) -> None:
-    """The plant is not built for nothing."""
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        endpoint = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
-
-        code, text = invoke("plant", "islanding", "--listen", endpoint)
-
-    assert code == 2
-    assert f"--listen: {endpoint} cannot be listened on: address already in use; end what uses it" in text
-
-
 def test_the_plant_hands_every_agent_what_it_needs() -> None:
     """Each inverter, spare ones too, has a configuration of this run; the plant waits for those that are no spares."""
     wishes: dict[str, Any] = {"run": "lab", "case": "III", "speed": 2.0, "wait": 5.0, "duration": 1.0}
