@@ -21,7 +21,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any, NoReturn
 
-from gridpeers.plant.request_process import ProcessEndedError, RequestProcess, no_room, program
+from gridpeers.plant.request_process import ProcessEndedError, RequestProcess, program
 from gridpeers.plant.tables.read import FeederError
 
 RESULT, PLACE = "result.pickle", "place"
@@ -126,12 +126,7 @@ def _answer(
             os.pwrite(place, text.encode()[:1000].ljust(1000), 0)
 
     try:
-        result = pickle.dumps(read(request, tell), pickle.HIGHEST_PROTOCOL)
-        try:
-            (folder / RESULT).write_bytes(result)
-        except OSError as error:
-            (folder / RESULT).unlink(missing_ok=True)
-            return {"problems": [f"{Path(request['path']).name}: {no_room(f'what {name} reads', str(error))}"]}
+        (folder / RESULT).write_bytes(pickle.dumps(read(request, tell), pickle.HIGHEST_PROTOCOL))
     except FeederError as error:
         return {"problems": error.problems}
     except Exception:

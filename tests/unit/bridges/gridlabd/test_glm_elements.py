@@ -15,7 +15,6 @@ from gridpeers.plant.feeder.plant import installed_inverters
 from gridpeers.plant.network import Network, solve_power_flow
 from gridpeers.plant.plant_config import PlantSettings
 from gridpeers.plant.tables import read_feeder
-from gridpeers.plant.tables.write import write_feeder
 from tests.unit.bridges.gridlabd.glm_models import (
     ASYMMETRIC,
     HEAD,
@@ -38,18 +37,6 @@ def test_voltages_are_gridlabds(tmp_path: Path, model: str, count: int) -> None:
 
     assert nodes == count
     assert difference < TOLERANCE
-
-
-def test_tables_of_an_import_are_read_again(tmp_path: Path) -> None:
-    """The tables that an import is saved as give the same voltages."""
-    feeder = read_glm(write(tmp_path, TRANSFORMERS))
-    write_feeder(feeder, tmp_path / "tables")
-
-    first, again = (Network(each) for each in (feeder, read_feeder(str(tmp_path / "tables"))))
-
-    assert first.nodes == again.nodes
-    ours, theirs = (solve_power_flow(each, each.closed0) for each in (first, again))
-    assert abs(ours - theirs).max() < 1e-6
 
 
 @pytest.mark.parametrize(

@@ -176,16 +176,6 @@ def test_what_gridlabd_would_write_is_not_written(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["feeder.glm"]
 
 
-def test_a_file_that_is_not_there_is_told(tmp_path: Path) -> None:
-    """A missing file and a file of bytes end in few lines."""
-    (missing,) = problems(tmp_path / "missing.glm")
-    assert "there is no such file" in missing
-
-    path = tmp_path / "x.glm"
-    path.write_bytes(bytes(range(256)) * 200)
-    assert len(problems(path)) <= 4
-
-
 @pytest.mark.parametrize("encoding", ["latin-1", "utf-8-sig", "utf-16"])
 def test_a_model_in_another_encoding_is_refused(tmp_path: Path, encoding: str) -> None:
     """GridLAB-D reads UTF-8 alone: an included file in another encoding is named, with what to do."""

@@ -1,4 +1,6 @@
-"""Parts of scripts: elements and loads that the tests solve with both engines."""
+"""Parts of scripts: elements, loads and generation that the tests solve with both engines."""
+
+from tests.unit.bridges.opendss.opendss_solutions import LINE, STEP_DOWN
 
 LOADS = """New Load.a bus1=c.1 phases=1 kv=0.277 kw=60 kvar=20 model=1
 New Load.bc bus1=c.2.3 phases=1 conn=delta kv=0.48 kw=80 kvar=40 model=5
@@ -138,3 +140,60 @@ LOAD_SCRIPTS = {
     **{f"loads {limits}": loads_of_all_models(limits) for limits in RANGES},
     **{f"connections, model {model}": loads_of_all_connections(model) for model in (1, 5, 6, 8)},
 }
+
+OTHER_LOADS = {
+    "at a neutral node": """New Reactor.ground bus1=c.4 bus2=c.0 phases=1 r=0.05 x=0.02
+New Load.l bus1=c.1.2.3.4 phases=3 kv=0.48 kw=120 kvar=20 vminpu=0.7
+New Load.one bus1=c.1.4 phases=1 kv=0.277 kw=50 kvar=5 model=5 vminpu=0.7""",
+    "of negative power, and of reactive power alone": """New Load.l bus1=c phases=3 kv=0.48 kw=-90 kvar=30
+New Load.z bus1=c.1 phases=1 kv=0.277 kw=20 pf=-0.9 model=2
+New Load.q bus1=c phases=3 kv=0.48 kw=0 kvar=60""",
+    "as impedances": "New Load.l bus1=c phases=3 kv=0.48 kw=150 kvar=60 model=1\nSet LoadModel=Admittance",
+    "multiplied, but for fixed and exempt ones": "\n".join(
+        f"New Load.l{k} bus1=c phases=3 kv=0.48 kw=50 kvar=20 status={status} vminpu=0.8"
+        for k, status in enumerate(("variable", "fixed", "exempt", "variable model=6", "variable model=7"))
+    )
+    + "\nSet LoadMult=0.4",
+    "of the fifth year": "New Load.l bus1=c phases=3 kv=0.48 kw=90 kvar=30\nSet %growth=3\nSet year=5",
+    "over several lines, with comments": """/* a comment
+New Load.not bus1=c kw=999 */
+New Load.l bus1=c ! phases=1
+more phases=3 // kv=99
+m kv=0.48 kw=90
+~ kvar=30
+Load.l.vminpu=0.8
+Edit Load.l kw=100""",
+}
+
+UNEVEN = "New Load.uneven bus1=c.1.2 phases=1 kv=0.48 kw=60 kvar=10 vminpu=0.5"
+"""A load that makes the voltages unequal."""
+
+GENERATION = {
+    "generator": "New Generator.g bus1=c kv=0.48 kw=50 kvar=10",
+    "one phase": "New Generator.g bus1=c.1 phases=1 kv=0.277 kw=20 pf=0.9",
+    "two phases": "New Generator.g bus1=c.2.3 phases=2 kv=0.48 kw=30 pf=0.9",
+    "delta": "New Generator.g bus1=c conn=delta kv=0.48 kw=50 pf=-0.9",
+    "below its limits": "New Generator.g bus1=c kv=0.48 kw=50 pf=-0.9 vminpu=1.1 vmaxpu=1.2",
+    "partly above its limits": "New Generator.g bus1=c kv=0.48 kw=50 vminpu=0.7 vmaxpu=0.99",
+    "impedance": "New Generator.g bus1=c kv=0.48 kw=50 model=2",
+    "voltage-controlled": "New Generator.g bus1=c kv=0.48 kw=50 model=3 maxkvar=40 minkvar=-40 vpu=1.0",
+    "photovoltaic": "New PVSystem.p bus1=c.1.2 phases=1 kv=0.48 kva=50 pmpp=40 irradiance=0.8",
+    "volt-var": (
+        "New PVSystem.p bus1=c kv=0.48 kva=50 pmpp=40\n"
+        "New XYcurve.vv npts=4 Yarray=(1 1 -1 -1) XArray=(0.5 0.95 1.05 1.5)\n"
+        "New InvControl.i mode=voltvar voltage_curvex_ref=rated vvc_curve1=vv derlist=(pvsystem.p)"
+    ),
+    "discharging": "New Storage.s bus1=c kv=0.48 kwrated=50 kwhrated=100 state=discharging",
+    "charging": "New Storage.s bus1=c kv=0.48 kwrated=50 kwhrated=100 state=charging %stored=20",
+}
+
+FAR_LOAD = "New Load.d bus1=d.2 phases=1 kv=0.277 kw=50 kvar=10"
+SCRIPTS = {
+    **{f"transformer, {what}": (LINE, script) for what, script in TRANSFORMERS.items()},
+    **{what: (LINE, STEP_DOWN, LOADS, script) for what, script in ELEMENTS.items()},
+    **{f"line, {what}": (LINE, STEP_DOWN, LOADS, script, FAR_LOAD) for what, script in LINES.items()},
+    **{what: (LINE, STEP_DOWN, script) for what, script in LOAD_SCRIPTS.items()},
+    **{f"loads {what}": (LINE, STEP_DOWN, script) for what, script in OTHER_LOADS.items()},
+    **{f"generation, {what}": (LINE, STEP_DOWN, UNEVEN, script) for what, script in GENERATION.items()},
+}
+"""Parts of a script for each thing that is compared with the engine."""

@@ -1,4 +1,4 @@
-"""Lines, transformers, capacitors, reactors and switches have the voltages that the OpenDSS engine gives them."""
+"""Elements, loads and switches have the voltages that the OpenDSS engine gives them."""
 
 import csv
 from cmath import phase
@@ -11,7 +11,7 @@ import pytest
 
 from gridpeers.bridges.opendss import read_opendss
 from gridpeers.plant.network import Network, solve_power_flow
-from tests.unit.bridges.opendss.opendss_scripts import ELEMENTS, LINES, LOADS, TRANSFORMERS
+from tests.unit.bridges.opendss.opendss_scripts import ELEMENTS, FAR_LOAD, LOADS, RANGES, SCRIPTS
 from tests.unit.bridges.opendss.opendss_solutions import (
     LINE,
     STEP_DOWN,
@@ -25,31 +25,16 @@ from tests.unit.bridges.opendss.opendss_solutions import (
 pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")
 
 
-@pytest.mark.parametrize("connection", TRANSFORMERS)
-def test_a_transformer_is_the_engines(tmp_path: Path, connection: str) -> None:
-    """Transformers of every connection, with uneven loads, have the engine's voltages."""
-    assert largest_difference(write(tmp_path, LINE, TRANSFORMERS[connection])) < TOLERANCE
-
-
-@pytest.mark.parametrize("element", ELEMENTS)
-def test_a_capacitor_reactor_or_fault_is_the_engines(tmp_path: Path, element: str) -> None:
-    """Capacitors, reactors and faults, shunt and in series, have the engine's voltages."""
-    assert largest_difference(write(tmp_path, LINE, STEP_DOWN, LOADS, ELEMENTS[element])) < TOLERANCE
-
-
-@pytest.mark.parametrize("line", LINES)
-def test_a_line_is_the_engines(tmp_path: Path, line: str) -> None:
-    """Lines by sequence impedances or geometry, with crossed phases, in parallel, with a neutral: all the engine's."""
-    load = "New Load.d bus1=d.2 phases=1 kv=0.277 kw=50 kvar=10"
-
-    assert largest_difference(write(tmp_path, LINE, STEP_DOWN, LOADS, LINES[line], load)) < TOLERANCE
+@pytest.mark.parametrize("what", SCRIPTS)
+def test_voltages_are_those_of_the_engine(tmp_path: Path, what: str) -> None:
+    """Every element, load and generator, of each connection, law and range of voltage, has the engine's voltages."""
+    assert largest_difference(write(tmp_path, *SCRIPTS[what])) < TOLERANCE
 
 
 def test_an_admittance_matrix_may_be_asymmetric(tmp_path: Path) -> None:
     """An element whose matrix differs from its transpose, by unequal sequence impedances, comes over as it is."""
     reactor = "New Reactor.x bus1=c bus2=d phases=3 z1=(0.01 0.04) z2=(0.02 0.01) z0=(0.03 0.09)"
-    load = "New Load.d bus1=d.2 phases=1 kv=0.277 kw=50 kvar=10"
-    path = write(tmp_path, LINE, STEP_DOWN, LOADS, reactor, load)
+    path = write(tmp_path, LINE, STEP_DOWN, LOADS, reactor, FAR_LOAD)
     (element,) = [element for element in read_opendss(path).elements if element.name == "reactor.x"]
 
     assert element.Y[0][1] != pytest.approx(element.Y[1][0])
@@ -149,6 +134,28 @@ def test_disabled_elements_are_not_there(tmp_path: Path) -> None:
 
     assert largest_difference(path) < TOLERANCE
     assert not [element for element in read_opendss(path).elements if element.name == "capacitor.k"]
+
+
+@pytest.mark.parametrize(("cut_off", "part"), [(0.98, 1.0), (1.0195, 0.5), (1.05, 0.0), (1.3, 0.0)])
+def test_a_zip_load_drops_out_at_its_cut_off_voltage(tmp_path: Path, cut_off: float, part: float) -> None:
+    """A ZIP load is off below its cut-off voltage, on above it, and partly on close to it."""
+    load = f"New Load.l bus1=c phases=3 kv=0.48 kw=9 kvar=3 model=8 zipv=(0.3 0.5 0.2 0.1 0.6 0.3 {cut_off})"
+    path = write(tmp_path, LINE, STEP_DOWN, load)
+    network = Network(read_opendss(path))
+    V = solve_power_flow(network, network.closed0)
+    taken = (network.loads().powers(V).sum() + V @ np.conj(network.Y_loads @ V)).real
+
+    assert taken == pytest.approx(part * 9.3e3, abs=2.5e3)
+    assert largest_difference(path) < TOLERANCE
+
+
+def test_a_difference_from_the_engine_is_told(tmp_path: Path) -> None:
+    """Model 7 jumps at vlowpu in the engine, and not here: a note says by how much, and where."""
+    load = f"New Load.l bus1=c phases=3 kv=0.48 kw=150 kvar=60 model=7 {RANGES['far below its limit']}"
+
+    (note,) = read_opendss(write(tmp_path, LINE, STEP_DOWN, load)).notes
+
+    assert note.startswith("bus c: our power flow differs from the engine's by 0.0")
 
 
 FEEDERS = Path(__file__).parents[3] / "feeders"

@@ -105,14 +105,6 @@ def test_controls_that_hunt_stay_where_they_are(tmp_path: Path) -> None:
     assert any("its controls hunt" in note for note in notes)
 
 
-def test_loads_grow_by_the_year(tmp_path: Path) -> None:
-    """`set year` scales all loads by the circuit's growth, once a year after the first."""
-    path = write(tmp_path, LINE, STEP_DOWN, LOAD, "Set %growth=3", "Set year=5")
-
-    assert sum(part.S.real for part in read_opendss(path).load_parts) == pytest.approx(90e3 * 1.03**4)
-    assert unlike(path) < TOLERANCE
-
-
 def test_tables_of_an_import_can_be_read_again(tmp_path: Path) -> None:
     """A limit below Vlowpu, a switched neutral, a grounded element and a strange voltage base survive the tables."""
     switch = "New Line.n phases=4 bus1=c.1.2.3.4 bus2=d.1.2.3.4 switch=yes"

@@ -1,9 +1,7 @@
 """The OpenDSS engine has a process of its own: what it does there ends no import without one line that says so."""
 
 import os
-import resource
 import signal
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from unittest.mock import Mock
@@ -120,21 +118,3 @@ def test_a_killed_engine_is_told_and_started_again(tmp_path: Path) -> None:
     with pytest.raises(FeederError, match="its process was killed by SIGKILL"):
         read_opendss(path)
     assert read_opendss(path).name == "test"
-
-
-def test_a_full_disk_is_not_a_crash_of_the_engine(tmp_path: Path) -> None:
-    """Where the answer of the engine's process finds no room, the line has folder and cause, and nothing is left."""
-    pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")
-    path = write(tmp_path, LINE)
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    ENGINE.close()
-    resource.setrlimit(resource.RLIMIT_FSIZE, (1024, before[1]))
-    try:
-        text = problem(path)
-        assert list(engine()[1].iterdir()) == []
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
-        ENGINE.close()
-
-    assert text.startswith(f"{path.name}: what the OpenDSS engine reads cannot be written in {tempfile.gettempdir()} (")
-    assert "File too large" in text

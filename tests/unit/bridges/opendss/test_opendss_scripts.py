@@ -77,20 +77,6 @@ New "Load.4.5" bus1=X_1-2/3#.2 phases=1 kv=7.2 kw=50 kvar=9
     assert largest_difference(path) < TOLERANCE
 
 
-def test_commands_over_several_lines_and_comments(tmp_path: Path) -> None:
-    """Continued commands, all three kinds of comments and abbreviated commands mean what they mean in OpenDSS."""
-    script = """/* a comment
-New Load.not bus1=c kw=999 */
-New Load.l bus1=c ! phases=1
-more phases=3 // kv=99
-m kv=0.48 kw=90
-~ kvar=30
-Load.l.vminpu=0.8
-Edit Load.l kw=100
-"""
-    assert largest_difference(write(tmp_path, LINE, STEP_DOWN, script)) < TOLERANCE
-
-
 def test_the_import_writes_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A script that saves, exports or traces writes nothing to the working folder or beside the script."""
     control = "New RegControl.r transformer=down winding=2 vreg=120 band=2 ptratio=2.3 debugtrace=yes"
