@@ -95,20 +95,6 @@ def test_a_rival_without_its_package_or_that_fails_is_left_out_and_named() -> No
     assert len(part.loads) == 4
 
 
-def test_a_part_that_cannot_be_prepared_is_left_out_whole() -> None:
-    """What the measures of a part share may fail before the first of them."""
-
-    def measures() -> list[Measure]:
-        checked([sys.executable, "-c", "import sys; sys.exit('no feeder\\nat all')"])
-        return []
-
-    part = measure_in_turns(measures, rounds=2)
-
-    assert part.failed
-    assert part.left_out["all of it"].endswith("ended with 1: at all")
-    assert part.left_out["all of it"].startswith("`python -c")
-
-
 def test_a_command_that_fails_is_named_as_a_person_types_it_with_its_last_line() -> None:
     """One line says which command, its exit status, and what it said last."""
     with pytest.raises(subprocess.CalledProcessError) as caught:
@@ -127,10 +113,3 @@ def test_every_rival_does_the_rounds_of_a_mesh(transport: str) -> None:
         pytest.importorskip({"pyzmq": "zmq"}.get(PACKAGE[transport], PACKAGE[transport]))
 
     assert 0.0 < seconds_per_round(transport, full_graph(["a", "b"]), rounds=3, sizes=(200, 100)) < 10.0
-
-
-def test_agents_of_one_process_share_its_messages() -> None:
-    """Four agents in two processes do their rounds, though some neighbours are in the own process."""
-    agents = full_graph(["a", "b", "c", "d"])
-
-    assert seconds_per_round("zenoh", agents, rounds=3, sizes=(200, 100), processes=2) > 0.0

@@ -7,7 +7,6 @@ import pytest
 from msgspec.structs import replace
 
 from gridpeers.agents.graphs import in_neighbours
-from gridpeers.papers.singhal2022.islanding_claims import EVENTS
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.results import metrics
 from gridpeers.scenarios.results.history import History
@@ -47,13 +46,6 @@ def test_without_the_followers_the_leaders_run_into_their_limit(case: str) -> No
     assert [p[name] for name in ("inv1", "inv4", "inv7")] == pytest.approx([1.0] * 3, abs=0.005)
 
 
-def test_full_coordination_moves_every_inverter_alike() -> None:
-    """Case IV: after each event all nine run at the same per-unit power. Section 4, figure of P, (9)."""
-    for event in EVENTS:
-        p = list(experiment("islanding").steady["IV"][event].p.values())
-        assert max(p) - min(p) < 0.005
-
-
 def test_grid_connected_nothing_moves() -> None:
     """Before event 1 secondary control is on hold: every case starts from the same operating point. Section 4."""
     histories = experiment("islanding").histories
@@ -72,15 +64,6 @@ def test_the_mean_voltage_returns_to_nominal_with_secondary_control() -> None:
 
     assert mean["I"] < 0.996
     assert [mean[case] for case in ("II", "III", "IV")] == pytest.approx([1.0] * 3, abs=0.002)
-
-
-def test_the_indices_fall_to_what_is_left_and_stay_there() -> None:
-    """Case IV: MPSI of every row in the last second before event 2 is below 0.001. Figure of MPSI, (16)."""
-    islanding = experiment("islanding")
-    history = islanding.histories["IV"]
-    last_second = (history.t > 3.0) & (history.t < 4.0)
-
-    assert metrics.MPSI(history, islanding.nameplates)[last_second].max() < 0.001
 
 
 def test_below_200_kW_the_frequency_falls_on_and_on() -> None:
@@ -208,15 +191,6 @@ def test_without_secondary_control_the_returned_inverter_stays_at_no_load() -> N
 
     assert abs(steady.p["inv2"]) < 0.01
     assert steady.t_restore_s is None
-
-
-def test_mean_sharing_is_that_of_eight_while_one_is_away() -> None:
-    """MPSI of every row in the last 0.2 s before the return is below 0.001, as the absent one does not count. (16)."""
-    plug_n_play = experiment("plug-n-play")
-    history = plug_n_play.histories["IV"]
-    away = (history.t > 2.8) & (history.t <= 3.0)
-
-    assert metrics.MPSI(history, plug_n_play.nameplates)[away].max() < 0.001
 
 
 @pytest.mark.parametrize("island", ["inv1", "inv4", "inv7"])
