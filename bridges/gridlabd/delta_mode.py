@@ -15,7 +15,7 @@ Requests are JSON objects, one a line on standard input, answered one a line on 
 A reading is f (Hz), P (W), Q (var), mean line-to-neutral V (V), the set-points as GridLAB-D holds them: `Pset` (pu)
 of a GFM or `Pref` (W) of a GFL, and `Vset` (pu); then the lowest and the highest phase voltage (V). What goes wrong is
 answered as {"error": text}, a package gridlabd that cannot be imported as {"not_importable": text}.
-The process ends with standard input, and with its parent, whose id is its argument.
+The process ends with standard input.
 """
 
 from __future__ import annotations
@@ -24,7 +24,6 @@ import ctypes
 import importlib
 import json
 import os
-import signal
 import sys
 import threading
 from collections.abc import Iterator
@@ -34,7 +33,6 @@ from typing import Any
 
 STAY = 0  # answer of a module that wants delta mode now; any other answer is the time (s) until it does
 SWITCH_STATES = {"open": 0, "close": 1}  # values of a switch's property `status`
-PR_SET_PDEATHSIG = 1  # request of Linux's prctl: a signal to this process when its parent has ended
 
 Reading = tuple[float, float, float, float, float, float, float, float]
 
@@ -209,15 +207,7 @@ def answers(requests: Iterator[dict[str, Any]]) -> Iterator[dict[str, Any]]:
         yield {"steps": simulation.advance(request["advance"])} if "advance" in request else {}
 
 
-def end_with(parent: int) -> None:
-    """Let the kernel end this process when its parent has, which standard input tells only between two requests."""
-    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent:  # it has ended already
-        os._exit(0)
-
-
 def main() -> None:
-    end_with(int(sys.argv[1]))
     out = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)  # GridLAB-D prints to standard output
     try:

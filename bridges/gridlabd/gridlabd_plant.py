@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Sequence
 from math import isfinite
@@ -232,7 +231,7 @@ class DeltaModeProcess:
     def __init__(self, deadline: float) -> None:
         self._deadline = deadline
         self._folder = TemporaryDirectory(prefix="gridpeers-gridlabd-")  # GridLAB-D writes files where it stands
-        command = [sys.executable, "-P", str(Path(__file__).with_name("delta_mode.py")), str(os.getpid())]
+        command = [sys.executable, "-P", str(Path(__file__).with_name("delta_mode.py"))]
         self._process = RequestProcess(command, Path(self._folder.name), KEPT_MEMORY)
 
     @property

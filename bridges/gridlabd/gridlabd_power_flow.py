@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from gridpeers.bridges.engine_process import Tell, serve
-from gridpeers.bridges.gridlabd.delta_mode import GridlabdCore, NotImportableError, end_with, gridlabd_package
+from gridpeers.bridges.gridlabd.delta_mode import GridlabdCore, NotImportableError, gridlabd_package
 from gridpeers.bridges.gridlabd.glm_text import CHILD_OF_BUS, WATCHING
 from gridpeers.plant.tables.read import FeederError
 from gridpeers.wire.wording import damaged, printable
@@ -384,9 +384,8 @@ def main() -> None:
 
 
 def read_model(request: dict[str, Any], _tell: Tell) -> dict[str, Any]:
-    """Return what GridLAB-D's solver holds of a model (`PowerFlowModel.solve`); `parent`: the process that asks."""
+    """Return what GridLAB-D's solver holds of a model (`PowerFlowModel.solve`)."""
     path, scratch = Path(request["path"]), Path.cwd()
-    end_with(request["parent"])
     try:
         module = gridlabd_package()
     except NotImportableError as error:

@@ -7,7 +7,6 @@ take: constant power, current or impedance. What comes out is solved here, too, 
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Sequence
 from contextlib import closing
@@ -69,7 +68,7 @@ def solved_model(path: Path, text: GlmText) -> dict[str, Any]:
     module = "gridpeers.bridges.gridlabd.gridlabd_power_flow"
     with closing(EngineProcess(module, "gridlabd", "GridLAB-D", ".glm", "gridlabd")) as engine:
         try:
-            model: dict[str, Any] = engine.read(path, parent=os.getpid())
+            model: dict[str, Any] = engine.read(path)
             said = "" if "buses" in model else f"{path.name}: GridLAB-D's power flow does not converge"
         except EngineError as error:
             last = printable(str(error).strip().rpartition("\n")[2])

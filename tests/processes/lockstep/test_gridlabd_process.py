@@ -22,6 +22,7 @@ from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.schema.configs import configs
 from gridpeers.wire.messages import Telemetry
 from tests.command_line import invoke
+from tests.processes.terminals import children_of
 from tests.toy.toy_runs import ProcessRun
 
 pytestmark = pytest.mark.skipif(find_spec("gridlabd") is None, reason="the extra gridlabd is not installed")
@@ -51,17 +52,8 @@ def in_one_process(**changes: object) -> Outcome:
 
 
 def all_of(pid: int) -> list[int]:
-    """Process ids of GridLAB-D whose argument is the process that started it."""
-    return [int(path.parent.name) for path in Path("/proc").glob("[0-9]*/cmdline") if is_of(path, pid)]
-
-
-def is_of(path: Path, pid: int) -> bool:
-    """Whether a command line is GridLAB-D's of a process."""
-    try:
-        words = path.read_bytes().split(b"\0")
-    except OSError:  # it has just ended
-        return False
-    return any(word.endswith(b"delta_mode.py") for word in words) and str(pid).encode() in words
+    """Process ids of GridLAB-D that a process has started."""
+    return [child for child in children_of(pid) if b"delta_mode.py" in Path(f"/proc/{child}/cmdline").read_bytes()]
 
 
 @pytest.fixture
@@ -87,7 +79,7 @@ def test_a_run_names_the_signal_that_killed_gridlabd() -> None:
 
 
 def test_gridlabd_ends_with_a_killed_plant(tmp_path: Path) -> None:
-    """A plant that is killed by -9 cannot end GridLAB-D; the kernel does."""
+    """A plant that is killed by -9 cannot end GridLAB-D, which ends as nobody asks it any more."""
     run = ProcessRun(*run_of(), tmp_path)
     watched: list[int] = []
 
