@@ -12,7 +12,6 @@ import pandas as pd
 
 from gridpeers.runs.result import Result, Results, shown_in_notebooks
 from gridpeers.runs.running import read
-from gridpeers.scenarios.results.metrics import SHARING_OF_ISLANDS
 from gridpeers.scenarios.schema.scenario_errors import ScenarioError
 from gridpeers.scenarios.schema.scenario_writing import to_toml
 from gridpeers.scenarios.sweep.paths import flatten
@@ -21,9 +20,6 @@ from gridpeers.wire.wording import counted
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-OF_ISLAND = ", island "
-"""Between a metric and the first inverter of the island that it is of, in a table."""
 
 RunSource = Result | Results | str | Path
 """A result, results of several cases, or the folder of either."""
@@ -70,7 +66,7 @@ class Comparison:
     def table(self) -> pd.DataFrame:
         """Metrics of both and their difference (second minus first), a row per (window, metric), or (case, ...).
 
-        What is shared has a row for each island where a window has several, e.g. "MPSI, island inv4".
+        What is shared has no value where a window has several islands: `Result.islands` has that of each.
         """
         frames = {case: _table(*pair, self.names) for case, pair in self._pairs.items()}
         if list(frames) == [""]:
@@ -123,32 +119,12 @@ class Comparison:
 
 
 def _table(a: Result, b: Result, names: tuple[str, str]) -> pd.DataFrame:
-    """Return the metrics of one pair of cases; windows and islands that one of them lacks are nan there.
-
-    The rows of islands are below that of their metric, which has no value where both have several islands.
-    """
-    frame = pd.concat([_column(run) for run in (a, b)], axis=1, keys=names, sort=False)
-    frame.index.names = ["window", "metric"]
-    both = set(a.islands.index.get_level_values("window")) & set(b.islands.index.get_level_values("window"))
-    windows = list(dict.fromkeys(window for window, _ in frame.index))
-    metrics = list(dict.fromkeys(metric.partition(OF_ISLAND)[0] for _, metric in frame.index))
-    rows = [row for row in frame.index if not (row[0] in both and row[1] in SHARING_OF_ISLANDS)]
-    rows.sort(key=lambda row: (windows.index(row[0]), metrics.index(row[1].partition(OF_ISLAND)[0])))
-    frame = frame.loc[rows]
+    """Return the metrics of one pair of cases; a window that one of them lacks is nan there."""
+    columns = [run.metrics.drop(columns="reasons").stack(future_stack=True) for run in (a, b)]
+    frame = pd.concat(columns, axis=1, keys=names, sort=False).rename_axis(["window", "metric"])
     frame["difference"] = frame[names[1]] - frame[names[0]]
     frame.attrs["units"] = dict(a.metrics.attrs["units"])
     return frame
-
-
-def _column(run: Result) -> pd.Series:
-    """Return the metrics of one case by window and metric; after those of the whole, what each island shares."""
-    whole = run.metrics.drop(columns="reasons").stack(future_stack=True)
-    islands = {
-        (window, f"{name}{OF_ISLAND}{island}"): row[name]
-        for (window, island), row in run.islands.iterrows()
-        for name in SHARING_OF_ISLANDS
-    }
-    return pd.concat([whole, pd.Series(islands, dtype=float)]) if islands else whole
 
 
 def _keys(runs: tuple[Result, ...]) -> dict[str, Any]:

@@ -12,13 +12,11 @@ import pandas as pd
 
 from gridpeers.runs.running import warn_of_laws
 from gridpeers.scenario import Scenario, as_scenario, plain
-from gridpeers.scenarios.results.history import History
 from gridpeers.scenarios.results.metric import METRICS, unit_of
-from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.scenarios.schema.plugin_keys import check_portable, metrics_of
 from gridpeers.scenarios.schema.scenario_errors import Problems, ScenarioError
 from gridpeers.scenarios.sweep.study import results_frame
-from gridpeers.scenarios.sweep.sweep_case import FATE, SweepRow, run_one, run_with_history
+from gridpeers.scenarios.sweep.sweep_case import FATE, SweepRow, run_one
 from gridpeers.scenarios.sweep.sweep_model import Sweep
 from gridpeers.scenarios.sweep.sweep_reading import BaseScenario, Plan, plan_of
 from gridpeers.scenarios.sweep.workers import cores, on_workers
@@ -36,7 +34,6 @@ def sweep(
     cases: str | Iterable[str] | None = None,
     seeds: int = 1,
     metrics: str | Iterable[Any] | None = None,
-    histories: bool = False,
     jobs: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> pd.DataFrame:
@@ -58,8 +55,6 @@ def sweep(
     metrics : iterable, optional
         Metrics to keep, e.g. `["MPSI", "t_restore_s"]`, of every window; all when left out. One of your own is a
         function of a window, its registered name, `module:Name`, or a table with `use` and parameters.
-    histories : bool
-        Give each row its history, in a column of that name, as `Result.history`.
     jobs : int, optional
         Processes; one per core when left out. More than one needs joblib, of the extra `sweep`.
     progress : Callable[[int, int], None], optional
@@ -69,13 +64,11 @@ def sweep(
     checked, chosen = _with_metrics(known, metrics)
     plan = _plan(checked, grid or {}, zip or {}, (cases,) if isinstance(cases, str) else cases or (), seeds)
     done: dict[int, SweepRow] = {}
-    kept: dict[int, pd.DataFrame | None] = {}
     calls = [(number, run.scenario, run.case) for number, run in enumerate(plan.runs)]
-    results = on_workers(calls, _jobs(plan, jobs), run_with_history if histories else _run)
+    results = on_workers(calls, _jobs(plan, jobs), run_one)
     with closing(results):
-        for row, history in results:
+        for row in results:
             done[row.number] = row
-            kept[row.number] = None if history is None else history.frame()
             if progress is not None:
                 progress(len(done), len(plan.runs))
     failed = {f"run {number}": row.why for number, row in sorted(done.items()) if row.why and row.status != "broke"}
@@ -84,8 +77,6 @@ def sweep(
     if chosen is not None:
         frame = frame[_chosen(list(frame), chosen, plan)]
     frame.attrs["units"] = {name: unit for name in frame if (unit := unit_of(str(name)))}
-    if histories:
-        frame["history"] = [kept[number] for number in sorted(done)]
     return frame
 
 
@@ -133,11 +124,6 @@ def _jobs(plan: Plan, jobs: int | None) -> int:
     if lacking and count > 1:
         raise ScenarioError(["jobs: more than one process needs joblib: pip install 'gridpeers[sweep]'"])
     return count
-
-
-def _run(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, History | None]:
-    """Do one run without its history, so that none travels between two processes."""
-    return run_one(number, scenario, case), None
 
 
 def _chosen(columns: list[str], metrics: list[str], plan: Plan) -> list[str]:

@@ -18,7 +18,6 @@ from gridpeers.plant.tables import read_feeder
 from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.results.findings import Findings, find
-from gridpeers.scenarios.results.history import History
 from gridpeers.scenarios.results.metrics import SHARING, SHARING_OF_ISLANDS
 from gridpeers.scenarios.results.record import Recorder
 from gridpeers.scenarios.results.recorded_events import ended_by_a_law, first_of, law_failures
@@ -61,20 +60,16 @@ FATE = ("status", "why", "trips", "link_warnings", "history_sha256", "links_sha2
 
 
 def run_one(number: int, scenario: ScenarioModel, case: str) -> SweepRow:
-    return run_with_history(number, scenario, case)[0]
-
-
-def run_with_history(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, History | None]:
-    """Run one case in this thread and measure it; its history is None if it broke."""
+    """Run one case in this thread and measure it."""
     try:
         return _run(number, scenario, case)
     except Exception as error:
         text = utf8(str(error))
         known = type(error).__name__ in ("PlantError", "RecordError")
-        return SweepRow(number=number, status="broke", why=text if known else f"{type(error).__name__}: {text}"), None
+        return SweepRow(number=number, status="broke", why=text if known else f"{type(error).__name__}: {text}")
 
 
-def _run(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, History | None]:
+def _run(number: int, scenario: ScenarioModel, case: str) -> SweepRow:
     feeder = as_in(scenario, _feeder(scenario.plant.feeder, scenario.plant.load_set))
     plant, agents = configs(scenario, feeder, case)
     recorder = Recorder()
@@ -82,7 +77,7 @@ def _run(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, His
     outcome = run_inprocess(plant, agents, recorder, plant=ready, on_other=recorder)
     if outcome.broke:
         stopped = ended_by_a_law(plant.on_law_failure, outcome.events)
-        return SweepRow(number=number, status="law failed" if stopped else "broke", why=outcome.broke), None
+        return SweepRow(number=number, status="law failed" if stopped else "broke", why=outcome.broke)
     failed_laws = first_of(law_failures(outcome.events))
     failed_check = bool(failed_laws) and judges_laws(scenario)
     recorded = recorder.finish(scenario.time.end_s, scenario.time.record_s)
@@ -103,7 +98,7 @@ def _run(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, His
         measures["links_delivered"] = float(sum(book.delivered for book in books))
         measures["links_dropped"] = float(sum(sum(book.dropped.values()) for book in books))
     failed = [f"{label}: {name} {text}" for label, metrics in own.items() for name, text in metrics.reasons.items()]
-    done = SweepRow(
+    return SweepRow(
         number=number,
         status="law failed" if failed_check else "ran",
         why=failed_laws,
@@ -114,7 +109,6 @@ def _run(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, His
         link_warnings="; ".join((*links.warnings, *sorted(links.failures))),
         measures=measures,
     )
-    return done, measured.history
 
 
 def _indexes(found: Findings, case: str, label: str) -> dict[str, Any]:
