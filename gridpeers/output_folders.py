@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
-import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -35,24 +33,16 @@ def files_written(place: Path) -> Iterator[None]:
 def whole_folder(folder: Path) -> Iterator[None]:
     """Fill a folder, new or empty, within this; whatever ends it early leaves the folder as it was.
 
-    FolderError if there is something in it, it cannot be written, or another command fills it.
+    FolderError if there is something in it, or it cannot be written.
     """
     there = folder.exists()
-    handle = os.open(empty_folder(folder), os.O_RDONLY | os.O_CLOEXEC)
+    empty_folder(folder)
     try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        empty_folder(folder)  # another command may have filled it before the lock
-        try:
+        with files_written(folder):
             yield
-        except BaseException:  # an interruption, too
-            for path in folder.iterdir() if folder.is_dir() else ():
-                shutil.rmtree(path) if path.is_dir() else path.unlink()
-            if folder.is_dir() and not there:
-                folder.rmdir()
-            raise
-    except BlockingIOError:
-        raise FolderError(f"{folder}: another command is writing in it; give another folder") from None
-    except OSError as error:
-        raise FolderError(refusal(folder, error)) from None
-    finally:
-        os.close(handle)
+    except BaseException:  # an interruption, too
+        for path in folder.iterdir() if folder.is_dir() else ():
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
+        if folder.is_dir() and not there:
+            folder.rmdir()
+        raise

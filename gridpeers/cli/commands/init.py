@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 import shutil
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
@@ -39,8 +38,6 @@ def init(
         with whole_folder(folder):
             shutil.copytree(TEMPLATE, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
         following = command_line("run", "mine.toml", "--driver", "inprocess")
-        if find_spec("pytest"):
-            following += f" && {command_line(program='pytest')}"
     else:
         with whole_folder(folder):
             ROOMS.resolve("propose_project")(folder, feeder, switch or [], leave_out or [])
