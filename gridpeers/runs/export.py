@@ -22,7 +22,6 @@ PACKAGES = {"parquet": "pyarrow", "feather": "pyarrow", "xlsx": "openpyxl"}
 """Packages of the extra `export` that a format needs."""
 
 SHEET = 1_048_575  # Rows of a sheet below its header
-LONGEST = 63  # Characters of a name in MATLAB (namelengthmax)
 
 
 def export(record: RunRecord, to: Format, folder: Path) -> list[Path]:
@@ -91,13 +90,12 @@ def _mat(tables: dict[str, pd.DataFrame]) -> bytes:
         fields = [re.sub(r"^(?=[^A-Za-z])", "x", re.sub(r"\W", "_", column)) for column in table]
         if len(set(fields)) < len(fields):
             raise FolderError(f"{name}: in MATLAB two of its columns would have one name; use --to parquet or csv")
-        if len(longest := max(fields, key=len)) > LONGEST:
-            raise FolderError(
-                f"{name}: {longest} has {len(longest)} characters, a name in MATLAB {LONGEST}; use --to parquet or csv"
-            )
         columns = [table[column] for column in table]
         arrays = [it.to_numpy(it.dtype if it.dtype.kind in "fi" else "U") for it in columns]
         structs[name] = dict(zip(fields, arrays, strict=True))
     file = BytesIO()
-    savemat(file, structs, long_field_names=True, do_compression=True, oned_as="column")
+    try:
+        savemat(file, structs, long_field_names=True, do_compression=True, oned_as="column")
+    except ValueError as error:  # names have at most 63 characters
+        raise FolderError(f"MATLAB cannot take the tables: {error}; use --to parquet or csv") from error
     return file.getvalue()

@@ -110,7 +110,6 @@ def test_of_a_record_that_is_cut_off_there_is_what_it_has(run: Path, tmp_path: P
         (("{run}", "--case", "V"), 'no record of case "V"'),
         (("{run}", "--to", "hdf"), "--to.*hdf.*xlsx"),
         (("{run}/IV", "--to", "xlsx"), "history has 51 rows, and a sheet of xlsx takes 20; use --to"),
-        (("{run}/IV", "--to", "mat"), "history: inv1_P_set_W has 12 characters, .* use --to parquet or csv"),
         (("{run}/IV", "--to", "parquet"), r"pyarrow is not installed; .* pip install 'gridpeers\[export\]'"),
     ],
 )
@@ -119,7 +118,6 @@ def test_bad_input_is_one_line(
 ) -> None:
     """Exit code 2, and nothing is written."""
     monkeypatch.setattr(export, "SHEET", 20)
-    monkeypatch.setattr(export, "LONGEST", 10)
     monkeypatch.setattr(usage.util, "find_spec", lambda name: name != "pyarrow" or None)
 
     code, text = invoke("export", *(word.format(run=run) for word in words))
