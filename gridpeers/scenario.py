@@ -114,13 +114,18 @@ class Scenario:
         return self._of(tree, self._path, self._text, changed, problems)
 
     def check(self) -> tuple[str, ...]:
-        """Return notes on what the events de-energise or overload; ScenarioError if the plant cannot start."""
+        """Return notes on what events de-energise or overload, and on graphs that bear too few liars for their law.
+
+        ScenarioError if the plant cannot start.
+        """
+        from gridpeers.rooms import ROOMS
         from gridpeers.scenarios.schema.loading import start_problem
         from gridpeers.scenarios.schema.supply import supply_notes
 
         if problem := start_problem(self._spec, self._feeder):
             raise ScenarioError([f"{self.name}: the plant cannot start: {problem}"])
-        return supply_notes(self._spec, self._feeder)
+        robustness_notes = ROOMS.resolve("robustness_notes")
+        return (*supply_notes(self._spec, self._feeder), *robustness_notes(self._spec, self._feeder))
 
     @overload
     def run(self, case: str, driver: Driver = ..., **how: Unpack[How]) -> Result: ...
@@ -220,13 +225,17 @@ class Scenario:
 
     __hash__ = None  # type: ignore[assignment]
 
-    def __repr__(self) -> str:
+    @property
+    def extent(self) -> str:
+        """Its cases, and how many events, seconds, inverters and buses it has."""
         cases, events, feeder = self._spec.cases, len(self._spec.events), self._feeder
         return (
-            f"<Scenario {self.name}: case{'s' * (len(cases) != 1)} {', '.join(cases)}; "
-            f"{counted(events, 'event')}; {self._spec.time.end_s:g} s; "
-            f"{len(self.inverters)} inverters on {len(feeder.buses)} buses>"
+            f"case{'s' * (len(cases) != 1)} {', '.join(cases)}; {counted(events, 'event')}; "
+            f"{self._spec.time.end_s:g} s; {len(self.inverters)} inverters on {len(feeder.buses)} buses"
         )
+
+    def __repr__(self) -> str:
+        return f"<Scenario {self.name}: {self.extent}>"
 
 
 def plain(value: Any) -> Any:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from itertools import chain
 from pathlib import Path
 from typing import Annotated, Literal, get_args
 
 import typer
 
-from gridpeers.cli.usage import argument, fail, load, option, require
-from gridpeers.wire.wording import counted, printable
+from gridpeers.cli.usage import argument, fail, option, require
+from gridpeers.wire.wording import printable
 
 Topic = Literal[
     "keys", "messages", "scenario", "feeder", "laws", "inverters", "metrics", "claims", "checks", "faults", "graphs"
@@ -39,25 +38,15 @@ def check(
 
     Example:  gridpeers check my-islanding.toml
     """
-    spec, feeder = load(file)
-
     from gridpeers.cli.progress import TRYING, explained
-    from gridpeers.rooms import ROOMS
-    from gridpeers.scenarios.schema.loading import start_problem
-    from gridpeers.scenarios.schema.supply import supply_notes
+    from gridpeers.scenario import load
 
+    scenario = load(file)
     with explained(lambda: typer.echo(TRYING)):
-        problem = start_problem(spec, feeder)
-    if problem:
-        fail(f"{file}: the plant cannot start: {problem}")
-    of_scenario = (supply_notes, ROOMS.resolve("robustness_notes"))
-    for note in chain.from_iterable(notes(spec, feeder) for notes in of_scenario):
+        notes = scenario.check()
+    for note in notes:
         typer.echo(f"NOTE  {note}")
-    typer.echo(
-        f"{file}: can be run: {counted(len(spec.cases), 'case')} {', '.join(spec.cases)}; "
-        f"{counted(len(spec.events), 'event')}; {spec.time.end_s:g} s; "
-        f"{counted(len(feeder.inverters), 'inverter')} on {counted(len(feeder.buses), 'bus', 'buses')}"
-    )
+    typer.echo(f"{file}: can be run: {scenario.extent}")
 
 
 def doc(
@@ -106,11 +95,8 @@ def compare(
 
 def _names(first: Path, second: Path) -> tuple[str, str]:
     """Return short names of two folders that differ: those of their scenarios, whose runs are called by the time."""
-    folders = first.resolve(), second.resolve()
-    for a, b in (tuple(path.parent.name for path in folders), tuple(path.name for path in folders)):
-        if a != b:
-            return printable(a), printable(b)
-    return "first", "second"
+    a, b = (printable(path.resolve().parent.name) for path in (first, second))
+    return (a, b) if a != b else ("first", "second")
 
 
 def export(
