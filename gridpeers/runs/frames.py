@@ -51,12 +51,7 @@ def islands_frame(windows: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
 
 
 def checks_frame(verdicts: Iterable[CheckVerdict]) -> pd.DataFrame:
-    """Return verdicts of checks, a row per check; value, unit and limit are those of its first violation.
-
-    >>> frame = checks_frame([CheckVerdict(check="heal", status="not judged", reason="no link was cut")])
-    >>> frame["status"].to_dict(), frame["text"]["heal"]
-    ({'heal': 'not judged'}, 'no link was cut')
-    """
+    """Return verdicts of checks, a row per check; value, unit and limit are those of its first violation."""
     rows = {}
     for verdict in verdicts:
         first = next(iter(verdict.violations), Violation(text=""))

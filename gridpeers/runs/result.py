@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 import shutil
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import msgspec
 import pandas as pd
@@ -20,7 +20,7 @@ from gridpeers.runs.run_folder import RunFolder, new_home
 from gridpeers.scenarios.checks import check_verdict
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict, judge_case
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.record.record_info import LIVE
+from gridpeers.scenarios.record.record_info import FILE, LIVE
 from gridpeers.scenarios.results.claims import Verdict, benchmark_of, judge, judged
 from gridpeers.scenarios.results.findings import Findings, find
 from gridpeers.scenarios.results.history import UNITS, History, as_they_came, windows
@@ -31,6 +31,7 @@ from gridpeers.scenarios.results.run_files import FolderError, refusal, shown, w
 from gridpeers.scenarios.results.shared_quantities import shared_frame
 from gridpeers.scenarios.schema import scenario_model as model
 from gridpeers.scenarios.schema.plugin_keys import claims_of
+from gridpeers.wire.messages import PlantEvent
 from gridpeers.wire.wording import suggestion
 
 if TYPE_CHECKING:
@@ -38,6 +39,8 @@ if TYPE_CHECKING:
 
     from gridpeers.lab.explanation.explanation import Explanation
     from gridpeers.scenarios.record.record_reader import RunRecord
+
+T = TypeVar("T")
 
 
 class _FromFolder:
@@ -105,7 +108,7 @@ class Results(_FromFolder, Mapping[str, "Result"]):
     @property
     def failures(self) -> pd.DataFrame:
         """Laws that failed, a row each: case, t (s), agent, why, and line, as "mine.py:12"; empty if none did."""
-        return frames.failures_frame({case: law_failures(self._folder.events(case)) for case in self})
+        return frames.failures_frame({case: law_failures(result.plant_events) for case, result in self.items()})
 
     @property
     def sha256(self) -> dict[str, str]:
@@ -169,7 +172,7 @@ class Result(_FromFolder):
     @cached_property
     def record(self) -> History:
         """The recorded rows as numpy arrays, by quantity."""
-        return self._folder.recorded(self.case, lambda record: record.physics())
+        return self._recorded(lambda record: record.physics())
 
     @cached_property
     def history(self) -> pd.DataFrame:
@@ -203,22 +206,40 @@ class Result(_FromFolder):
     @cached_property
     def events(self) -> pd.DataFrame:
         """Events of the plant and the agents: time t (s), kind, subject, text."""
-        return frames.events_frame(self._folder.events(self.case))
+        return frames.events_frame(self.plant_events)
 
     @property
     def failures(self) -> pd.DataFrame:
         """Laws that failed, a row each, as `Results.failures`."""
-        return frames.failures_frame({self.case: law_failures(self._folder.events(self.case))})
+        return frames.failures_frame({self.case: law_failures(self.plant_events)})
 
     @cached_property
     def links(self) -> pd.DataFrame:
         """Fate of every message on emulated links: src, dst, seq, t (s), delay (s; nan: dropped), fate."""
-        return frames.links_frame(self._folder.recorded(self.case, lambda record: list(record.links())))
+        return frames.links_frame(self._recorded(lambda record: list(record.links())))
 
-    @property
+    @cached_property
     def run_record(self) -> RunRecord:
         """The record of the case: messages, decisions with their inputs, process events (docs/recorder.md)."""
-        return self._folder.record(self.case)
+        from gridpeers.scenarios.record.record_reader import RunRecord  # mcap, which `import gridpeers` does without
+
+        return RunRecord.open(self.folder / self.case)
+
+    def _recorded(self, read: Callable[[RunRecord], T]) -> T:
+        """Read something from the record, which a run that came to its end has whole."""
+
+        def whole(_: Path) -> T:
+            found = read(self.run_record)
+            if self.run_record.damage:
+                raise ValueError(self.run_record.damage[0])
+            return found
+
+        return self._folder.read(f"{self.case}/{FILE}", whole)
+
+    @cached_property
+    def plant_events(self) -> tuple[PlantEvent, ...]:
+        """Events of the plant and the agents, as they were sent."""
+        return self._recorded(lambda record: record.events())
 
     def decision(self, agent: str, t: float) -> Explanation:
         """Explain the decision of an agent that was in force at a run time (s), as `gridpeers why` does.
@@ -242,14 +263,14 @@ class Result(_FromFolder):
     def checked_case(self) -> CheckedCase:
         """The case as metrics and checks see it: what a check of one's own is called with."""
         measured = frames.windows_of(self._folder.numbers_of(self.case))  # a live run need not reach all events
-        came = windows(as_they_came(self.spec, self._folder.events(self.case)), self.spec.time.end_s)
+        came = windows(as_they_came(self.spec, self.plant_events), self.spec.time.end_s)
         return CheckedCase(
             scenario=self.spec,
             feeder=self._feeder,
             case=self.case,
             history=taken_part(self.spec, self._feeder, self.record),
             windows=[window for window in came if window.label in measured],
-            events=self._folder.events(self.case),
+            events=self.plant_events,
             messages_saved={label: of["messages_saved"] for label, of in measured.items() if of.get("messages_saved")},
             folder=self.folder / self.case,
         )

@@ -10,15 +10,10 @@ from collections.abc import Callable
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
-from gridpeers.scenarios.record.record_info import FILE
 from gridpeers.scenarios.results.run_files import FolderError, empty_folder
-from gridpeers.wire.messages import PlantEvent
 from gridpeers.wire.wording import is_no_path, printable
-
-if TYPE_CHECKING:
-    from gridpeers.scenarios.record.record_reader import RunRecord
 
 T = TypeVar("T")
 
@@ -28,8 +23,6 @@ class RunFolder:
 
     def __init__(self, path: Path, *, temporary: bool = False) -> None:
         self.path = path
-        self._records: dict[str, RunRecord] = {}
-        self._events: dict[str, tuple[PlantEvent, ...]] = {}
         self._removal = weakref.finalize(self, shutil.rmtree, path, ignore_errors=True) if temporary else None
 
     def keep(self) -> None:
@@ -45,31 +38,6 @@ class RunFolder:
         except (OSError, ValueError) as error:
             why = getattr(error, "strerror", None) or str(error)
             raise FolderError(f"{file}: cannot be read: {printable(why, 200)}; run the scenario again") from error
-
-    def record(self, case: str) -> RunRecord:
-        """Return the record of a case, opened once."""
-        from gridpeers.scenarios.record.record_reader import RunRecord  # mcap, which `import gridpeers` does without
-
-        if case not in self._records:
-            self._records[case] = RunRecord.open(self.path / case)
-        return self._records[case]
-
-    def recorded(self, case: str, read: Callable[[RunRecord], T]) -> T:
-        """Read something from the record of a case, which a run that came to its end has whole."""
-
-        def whole(_: Path) -> T:
-            found = read(record := self.record(case))
-            if record.damage:
-                raise ValueError(record.damage[0])
-            return found
-
-        return self.read(f"{case}/{FILE}", whole)
-
-    def events(self, case: str) -> tuple[PlantEvent, ...]:
-        """Return the events of a case as the plant sent them."""
-        if case not in self._events:
-            self._events[case] = self.recorded(case, lambda record: record.events())
-        return self._events[case]
 
     def numbers_of(self, case: str) -> dict[str, Any]:
         """Return the content of metrics.json on a case."""
