@@ -24,7 +24,6 @@ from gridpeers.scenarios.results.metrics import Settling as Settling
 from gridpeers.scenarios.results.metrics import Steady as Steady
 from gridpeers.scenarios.results.metrics import V_error as V_error
 from gridpeers.scenarios.results.metrics import mean_frequency as mean_frequency
-from gridpeers.scenarios.results.metrics import mean_voltage as mean_voltage
 
 if TYPE_CHECKING:
     from gridpeers.plant.equipment import Tables

@@ -9,47 +9,39 @@ from __future__ import annotations
 import os
 import sys
 from contextlib import suppress
+from typing import NoReturn
 
 from gridpeers.wire.driver.ending import leave, speaking
-from gridpeers.wire.driver.machine import raise_limit, too_few_files
+from gridpeers.wire.driver.machine import raise_limit
 
 
 def main() -> None:
     """Run the command line; no bad input ends in a traceback."""
+    # The plant's matrices are small: a second BLAS thread only spins, and takes a quarter of the time from the run.
+    # It must be said before numpy is imported; the processes that are started inherit it.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    raise_limit()
     try:
-        _main()
+        _start_ahead(sys.argv[1:])
+        with speaking("gridpeers"):
+            from gridpeers.cli.root import app
+
+            app()
     except KeyboardInterrupt:  # before the command line is read
-        _tell("interrupted before anything had begun")
-        sys.exit(130)
+        _end("interrupted before anything had begun", 130)
     except ImportError as error:
         from gridpeers.wire.wording import not_importable
 
-        _tell(not_importable(error))
-        sys.exit(2)
+        _end(not_importable(error), 2)
     except SystemExit as end:
         if isinstance(end.code, int | None):
             leave(end.code or 0)
         raise
 
 
-def _tell(line: str) -> None:
+def _end(line: str, code: int) -> NoReturn:
     print(f"gridpeers: {line}", file=sys.stderr)
-
-
-def _main() -> None:
-    # The plant's matrices are small: a second BLAS thread only spins, and takes a quarter of the time from the run.
-    # It must be said before numpy is imported; the processes that are started inherit it.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    raise_limit()
-    _start_ahead(sys.argv[1:])
-    with speaking("gridpeers"):
-        from gridpeers.cli.root import app
-        from gridpeers.cli.usage import BROKEN, fail
-
-        try:
-            app()
-        except OSError as error:  # the machine refuses something: no memory for a process, no room on a disk
-            fail(too_few_files(error) or str(error), code=BROKEN)
+    sys.exit(code)
 
 
 def _start_ahead(words: list[str]) -> None:

@@ -18,6 +18,7 @@ from typer.core import TyperGroup
 from gridpeers.scenarios.console import terminal as terminal
 from gridpeers.wire.driver.command_line import command_line
 from gridpeers.wire.driver.ending import stop_handler
+from gridpeers.wire.driver.machine import too_few_files
 from gridpeers.wire.wording import DISTRIBUTIONS, InputError, damaged, printable, requirement, suggestion
 
 if TYPE_CHECKING:
@@ -55,8 +56,6 @@ def load(name: str, changes: Mapping[str, Any] | None = None) -> tuple[ScenarioM
     """Return a checked scenario, with keys changed by the command line, and its feeder."""
     from gridpeers.scenario import load as load_face
 
-    if not name:
-        fail(f"no scenario was named; `{command_line('list')}` shows those of the catalogue")
     scenario = load_face(name)
     if changes:
         scenario = scenario.replace(changes)
@@ -187,6 +186,8 @@ def _in_one_line() -> Iterator[None]:
         fail(_line(error))
     except InputError as error:
         refuse(error)
+    except OSError as error:  # the machine refuses something: no memory for a process, no room on a disk
+        fail(too_few_files(error) or str(error), code=BROKEN)
 
 
 def _line(error: Any) -> str:

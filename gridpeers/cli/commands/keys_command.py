@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from gridpeers.cli.usage import Commands, argument, fail, flag, option, require
+from gridpeers.cli.usage import Commands, argument, flag, option, require
 from gridpeers.wire.keys import Role
 from gridpeers.wire.trust import site_authority
 from gridpeers.wire.trust.credentials import DATE_AND_TIME
@@ -25,7 +26,8 @@ app = typer.Typer(
 )
 
 _Keys = Annotated[Path, option("DIR", "Folder of the site; the present one if left out.")]
-_Days = Annotated[float, option("N", "Life of the certificates (days).")]
+_Days = Annotated[float, option("N", "Life of the certificates (days).", min=0.01, max=3650.0)]
+_require_cryptography = partial(require, {"cryptography": "certificates"}, "install it: pip install 'gridpeers[keys]'")
 
 
 @app.command()
@@ -37,7 +39,7 @@ def init(
 
     Example:  gridpeers keys init lab
     """
-    _check(days)
+    _require_cryptography()
     known = site_authority.make_site(site, days=days)
     names = ", ".join(f"{member.name} ({member.role})" for member in known.members)
     typer.echo(f"{site}: the site {known.site}, with certificates of {names}, until {known.members[0].expires}")
@@ -59,7 +61,7 @@ def issue(
 
     Example:  gridpeers keys issue inv1 inv2 --keys lab
     """
-    _check(days)
+    _require_cryptography()
     names = list(dict.fromkeys(names))
     known = read_list(keys)
     if problems := [why for name in names if (why := site_authority.objection(known, name, role))]:
@@ -78,7 +80,7 @@ def revoke(
 
     Example:  gridpeers keys revoke inv4 --keys lab
     """
-    _check()
+    _require_cryptography()
     site_authority.revoke(keys, name)
     typer.echo(
         f"{name}: revoked. Copy {keys / 'members.json'} to every host, and start anew what runs: what has begun "
@@ -92,7 +94,7 @@ def show(keys: _Keys = Path()) -> None:
 
     Example:  gridpeers keys show --keys lab
     """
-    _check()
+    _require_cryptography()
     known, now = read_list(keys), f"{datetime.now(UTC):{DATE_AND_TIME}}"  # noqa: TID251  # ends of certificates are dates
     authority = f"; {CA_KEY} is here: certificates are issued in this folder" if (keys / CA_KEY).is_file() else ""
     typer.echo(f"site {known.site}, {LIST} is version {known.version}{authority}")
@@ -103,10 +105,3 @@ def show(keys: _Keys = Path()) -> None:
             state = f"{'expired ' if member.expires < now else 'valid    until'} {member.expires}"
             here = ", key here" if (keys / f"{member.name}.key").is_file() else ""
         typer.echo(f"{member.role:9} {member.name:{width}}  {state}{here}")
-
-
-def _check(days: float = 1.0) -> None:
-    """End the command if it lacks a package, or certificates cannot have such a life (days)."""
-    require({"cryptography": "certificates"}, "install it: pip install 'gridpeers[keys]'")
-    if not 0.0 < days <= 3650.0:
-        fail(f"--days: must be more than 0 and at most 3650 days, got {days:g}")

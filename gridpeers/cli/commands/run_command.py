@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, NoReturn
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -28,7 +28,6 @@ from gridpeers.cli.usage import (
 if TYPE_CHECKING:
     from gridpeers.plant.equipment import Tables
     from gridpeers.runs.choices import Pace
-    from gridpeers.scenarios.run_request import Driver
     from gridpeers.scenarios.schema import ScenarioModel
 
 
@@ -64,20 +63,8 @@ def run(
     Example:  gridpeers run islanding --case IV --driver inprocess
     """
     spec, feeder = load(scenario, {} if plant is None else {"plant.simulator": plant})
-    pace: Pace = {"clock": clock, "speed": speed, "strict": strict, "processes": processes, "keys": keys}
-    _carry_out(chosen(spec, case, seed), feeder, driver, out, pace, require_checks=require_checks)
+    spec = chosen(spec, case, seed)
 
-
-def _carry_out(
-    spec: ScenarioModel,
-    feeder: Tables,
-    driver: Driver,
-    out: Path | None,
-    pace: Pace,
-    *,
-    require_checks: bool,
-) -> NoReturn:
-    """Run a checked scenario into a folder, show its report, and end with its exit code."""
     from gridpeers.plant.simulators import SIMULATORS
     from gridpeers.runs.choices import check_how
     from gridpeers.scenarios.drivers.free_endpoint import free_endpoint, local_endpoint
@@ -85,9 +72,10 @@ def _carry_out(
     from gridpeers.scenarios.run import run as run_scenario
     from gridpeers.scenarios.run_request import BrokenRunError, LawStopError, Request
 
+    pace: Pace = {"clock": clock, "speed": speed, "strict": strict, "processes": processes, "keys": keys}
     check_how(driver, pace, spec, dash="--")
-    if pace.get("keys") is not None:
-        _check_keys(Path(pace["keys"] or ""), spec, feeder)
+    if keys is not None:
+        _check_keys(keys, spec, feeder)
     simulator = SIMULATORS.resolve(spec.plant.simulator)
     if simulator.package:
         require_loadable(simulator.package, simulator.words)
