@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from math import isfinite
 
 from gridpeers.agents.carriers.law_registry import make_law
 from gridpeers.agents.carriers.time_limit import limited
-from gridpeers.agents.laws.law import Law, Own, SetPoints, Term, Terms
+from gridpeers.agents.laws.law import LIMITS, Law, Own, SetPoints, Term, Terms, limits_in
 from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.scenarios.record.recorded_decision import RecordedDecision, limits_of
+from gridpeers.scenarios.record.recorded_decision import RecordedDecision
 from gridpeers.wire.plugins.registry import ANYTHING, named
 
 TOLERANCE = 1e-12
@@ -52,12 +53,14 @@ def law_step(record: RunRecord, decision: RecordedDecision) -> LawStep | None:
     if decision.action != "law":
         return None
     choice = decision.config.control.law
+    limits = {name: getattr(Law, name) for name in LIMITS} | limits_in(choice.parameters)
     if choice.command or choice.fmu:
-        return _parts(decision, None, f"the law is {choice.name}, which is not started for an explanation")
+        return _parts(decision, None, limits, f"the law is {choice.name}, which is not started for an explanation")
     try:
         law = make_law(decision.config.control)
     except ValueError as error:
-        return _parts(decision, None, f"the law cannot be made here: {error}")
+        return _parts(decision, None, limits, f"the law cannot be made here: {error}")
+    limits = {name: getattr(law, name) for name in LIMITS}
     problem = "computed again, the law makes another step: it is not the law of the run, or its memory is older"
     with closing(law):
         has_no_memory = type(law).start is Law.start
@@ -67,13 +70,13 @@ def law_step(record: RunRecord, decision: RecordedDecision) -> LawStep | None:
                 law.start(decisions[0].own)
                 for each in decisions[:-1]:
                     law.step(each.own, each.neighbours_used, each.T)
-                step = _parts(decision, law.step(decision.own, decision.neighbours_used, decision.T))
+                step = _parts(decision, law.step(decision.own, decision.neighbours_used, decision.T), limits)
             except ANYTHING as error:  # the law, and its answer, is anybody's code
                 problem = f"computed again, the law raised {named(error)}"
                 continue
             if max(abs(step.P_set.rest), abs(step.V_set.rest)) <= TOLERANCE:
                 return step
-    return _parts(decision, None, problem)
+    return _parts(decision, None, limits, problem)
 
 
 def _since_start(record: RunRecord, decision: RecordedDecision) -> tuple[RecordedDecision, ...]:
@@ -91,19 +94,21 @@ def _since_start(record: RunRecord, decision: RecordedDecision) -> tuple[Recorde
         back *= 4.0
 
 
-def _parts(decision: RecordedDecision, result: SetPoints | Terms | None, problem: str = "") -> LawStep:
-    """Return the parts of a step: the terms of a `result`, and the change by the limits of their sum.
+def _parts(
+    decision: RecordedDecision, result: SetPoints | Terms | None, limits: Mapping[str, float], problem: str = ""
+) -> LawStep:
+    """Return the parts of a step: the terms of a `result`, and the change by the limits (pu) of their sum.
 
     Without terms it is one term: the step of the result, or the recorded one.
     """
     own, config = decision.own, decision.config
     after = SetPoints(decision.after[0] / config.P_rated, decision.after[1] / config.V_nom)
     terms = _terms_of(result or after, own, config.control.law.time_limit)
-    limits, parts = limits_of(config.control), {}
+    parts = {}
     for name, of in (("P_set", terms.P_set), ("V_set", terms.V_set)):
         if wrong := [term.value for term in of if not isfinite(term.value)]:
             raise ValueError(f"a term is {wrong[0]}; it must be a finite number (pu)")
-        low, high, before = limits[f"{name}_min"], limits[f"{name}_max"], getattr(own, name)
+        low, high, before = float(limits[f"{name}_min"]), float(limits[f"{name}_max"]), getattr(own, name)
         wanted = before + sum(term.value for term in of)
         parts[name] = QuantityStep(
             before=before,

@@ -11,7 +11,7 @@ import threading
 from collections import deque
 from math import inf
 from pathlib import Path
-from time import monotonic, sleep
+from time import monotonic
 
 import lz4.frame  # noqa: F401  # without these two mcap fails at the first chunk
 import zstandard  # noqa: F401  # as lz4.frame
@@ -27,9 +27,6 @@ PERIOD = 0.25
 CHUNK = 150_000
 """Bytes of messages from which on a chunk is written at once: in one process a run pays less for small ones, which the
 processor's cache holds, and a reader takes one at a time."""
-
-BEHIND = 64_000_000
-"""Bytes of messages that may wait for the disk: with more, who records waits too, so that memory is bounded."""
 
 
 class RecordWriter:
@@ -83,8 +80,6 @@ class RecordWriter:
                 self._write()
             else:
                 self._wake.set()
-        while self._thread is not None and self._bytes > BEHIND and self.error is None:
-            sleep(0.01)
 
     def close(self) -> None:
         if self._closing:

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Literal
 
 from gridpeers.agents.agent import neighbour_of, own_of
-from gridpeers.agents.agent_config import AgentConfig, Control, LawChoice
-from gridpeers.agents.carriers.law_registry import LAWS
-from gridpeers.agents.degraded_communication import law_in_force
-from gridpeers.agents.laws.law import LIMITS, Law, Neighbour, Own, limits_in
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.agents.laws.law import Neighbour, Own
 from gridpeers.wire.messages import Measurement, Nameplate, State
 
 Action = Literal["law", "hold", "off", "idle"]
@@ -120,15 +117,3 @@ class RecordedDecision:
         """Control period (s) that the law was called with."""
         wall = self.config.clock == "wall"
         return self.config.T_c if wall else self.config.by_own_clock().T_c
-
-
-def limits_of(control: Control) -> dict[str, float]:
-    """Return the limits (pu) to which an agent holds what its law decides, by the name of their parameter."""
-    choice = control.law
-    kind: object = Law
-    if not (choice.command or choice.fmu):
-        with suppress(ValueError):  # code that is not here: its limits are those of every law
-            own_law = choice.use != LawChoice().use
-            kind = LAWS.resolve(choice.use, choice.folder) if own_law else law_in_force(control)
-    own = limits_in(choice.parameters)
-    return {name: float(own.get(name, getattr(kind, name))) for name in LIMITS}

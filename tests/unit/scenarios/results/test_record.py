@@ -12,8 +12,10 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from gridpeers.scenarios.record import record_writer
+from gridpeers.scenarios.record.record_file import RecordFile
 from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.record.record_writer import RecordWriter
 from gridpeers.scenarios.results.record import Recorder, RecordError
 from gridpeers.wire.messages import PlantEvent, Telemetry
 from tests.toy.toy_configs import toy_configs
@@ -154,3 +156,24 @@ def test_a_recorder_keeps_no_rows_and_has_them_once_at_its_end(tmp_path: Path) -
     assert (len(history.t), history.V_set[-1, -1]) == (16_000, 59.0)
     assert grown < 300_000  # a chunk that waits
     assert peak < 8 * 16_000 * 61 + 10_000_000  # the table, and some chunks with their messages
+
+
+def test_a_long_run_takes_no_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of chunks nothing is kept."""
+    monkeypatch.setattr(record_writer, "CHUNK", 100)
+    one = RecordWriter(tmp_path, info_of("inv1"))
+
+    def write(numbers: range) -> int:
+        for number in numbers:
+            one.add("telemetry", number, number, bytes(200))
+        return tracemalloc.get_traced_memory()[0]
+
+    tracemalloc.start()
+    try:
+        grown = -write(range(100)) + write(range(100, 500))
+    finally:
+        tracemalloc.stop()
+    one.close()
+
+    assert grown < 400 * 10
+    assert len(RecordFile(tmp_path / "run.mcap").ends) == 500
