@@ -47,8 +47,6 @@ def test_without_a_certificate_nobody_gets_a_link(town: Town) -> None:
 
 def test_with_a_certificate_of_another_site_nobody_gets_a_link(town: Town, tmp_path: Path) -> None:
     """Though it has the same names."""
-    from gridpeers.wire.trust.site_authority import issue, make_site
-
     other = tmp_path / "lab"
     make_site(other)
     issue(other, "inv3")
@@ -61,8 +59,6 @@ def test_with_a_certificate_of_another_site_nobody_gets_a_link(town: Town, tmp_p
 
 def test_with_an_expired_certificate_nobody_gets_a_link(town: Town, lab: Path, tmp_path: Path) -> None:
     """One of our own site, that ended a day ago."""
-    from gridpeers.wire.trust.site_authority import issue
-
     site = tmp_path / "lab"
     shutil.copytree(lab, site)
     issue(site, "inv3", days=1.0, now=datetime.now(UTC) - timedelta(days=2))  # noqa: TID251
@@ -171,9 +167,6 @@ def test_a_revoked_member_gets_a_link_and_nothing_on_it(town: Town, lab: Path) -
 
     assert len(town.answers) == before
     town.until(lambda: "operator:eve, whose certificate was revoked" in town.log("plant"), "the plant's line")
-
-
-pytest.importorskip("cryptography", reason="certificates need the extra keys")
 
 
 def test_an_agent_whose_certificate_is_issued_later_joins_the_run(tmp_path: Path) -> None:

@@ -26,12 +26,6 @@ def test_every_case_is_pinned_and_nothing_else() -> None:
     assert set(PINNED.pins) == set(PINS) == set(cases())
 
 
-def test_every_move_has_a_reason() -> None:
-    """Each time the pins moved, somebody said why and which scenarios."""
-    assert PINNED.moved
-    assert all(len(entry["reason"]) > 20 and entry["scenarios"] for entry in PINNED.moved)
-
-
 def f_error(case: str) -> float:
     """Frequency error (Hz) of the first inverter at the end of a case."""
     return abs(PINNED.pins["hostile", case].last[0] - 60.0)

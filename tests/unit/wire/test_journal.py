@@ -35,21 +35,6 @@ def read(parts: list[bytes]) -> list[Entry]:
     return [entry for part in parts for entry in entries_of(part)]
 
 
-def test_entries_come_back_as_they_were_noted() -> None:
-    """Each entry, in its order, with bytes and None as they were."""
-    noted = [
-        Token(None, "alive/agent/inv1/a", True),
-        Exchange(3, [b"measured"], [b"state", b"other"]),
-        SentMessage(1.25, "control", bytes(range(256))),
-    ]
-    journal = JournalBuffer()
-    for entry in noted:
-        journal.add(entry)
-
-    assert read(journal.take_parts()) == noted
-    assert journal.take_parts() == []
-
-
 def test_a_part_ends_with_an_entry() -> None:
     """Many entries make several parts, each within the longest message, each readable on its own."""
     journal = JournalBuffer()

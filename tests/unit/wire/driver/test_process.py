@@ -76,16 +76,15 @@ def test_a_program_that_is_not_found_by_its_name_has_its_path(tmp_path: Path, mo
     assert command_line("down") == "gridpeers down"
 
 
-with_policies = pytest.mark.skipif(not hasattr(os, "SCHED_BATCH"), reason="this system knows no such policy")
-
-
-def policies(before: int) -> tuple[int, int]:
+@pytest.mark.skipif(not hasattr(os, "SCHED_BATCH"), reason="this system knows no such policy")
+@pytest.mark.parametrize(("before", "after"), [("SCHED_OTHER", "SCHED_BATCH"), ("SCHED_IDLE", "SCHED_IDLE")])
+def test_a_thread_and_those_it_starts_become_batch_work(before: str, after: str) -> None:
+    """Zenoh's threads start later; a policy that the user has chosen, such as by `chrt --idle`, stays."""
     found: list[int] = []
 
     def thread() -> None:
-        os.sched_setscheduler(0, before, os.sched_param(0))
+        os.sched_setscheduler(0, getattr(os, before), os.sched_param(0))
         schedule_as_batch()
-        found.append(os.sched_getscheduler(0))
         inner = threading.Thread(target=lambda: found.append(os.sched_getscheduler(0)))
         inner.start()
         inner.join()
@@ -93,16 +92,5 @@ def policies(before: int) -> tuple[int, int]:
     outer = threading.Thread(target=thread)
     outer.start()
     outer.join()
-    return found[0], found[1]
 
-
-@with_policies
-def test_a_thread_and_those_it_starts_become_batch_work() -> None:
-    """Zenoh's threads, which start later, are scheduled as the agent that opens the session."""
-    assert policies(os.SCHED_OTHER) == (os.SCHED_BATCH, os.SCHED_BATCH)
-
-
-@with_policies
-def test_a_policy_that_the_user_has_chosen_stays() -> None:
-    """A run under `chrt --idle` stays in the background."""
-    assert policies(os.SCHED_IDLE) == (os.SCHED_IDLE, os.SCHED_IDLE)
+    assert found == [getattr(os, after)]
