@@ -58,9 +58,6 @@ bounds it."""
 TREE_DEPTH = 8
 """Most levels of a tree."""
 
-TREE_SIZE = 4000
-"""Most values in a tree."""
-
 MOST_COUNT = 2**53 - 1
 """Largest `Count`."""
 
@@ -143,32 +140,24 @@ def check_names(*names: str) -> None:
         raise ValueError(f"a name is not 1 to 64 letters, digits, _, - or .: {', '.join(map(ascii, names))[:100]}")
 
 
-def check_tree(tree: Any) -> None:
-    """Check that a tree is finite, printable, at most `TREE_DEPTH` deep, and has at most `TREE_SIZE` values."""
-    level, size = [tree], 0
-    for _ in range(TREE_DEPTH):
-        inner: list[Any] = []
-        for value in level:
-            size += 1
-            if isinstance(value, dict):
-                if not all(isinstance(key, str) for key in value):
-                    raise ValueError("a key in it is no text")
-                inner += [*value, *value.values()]
-            elif isinstance(value, list | tuple):
-                inner += value
-            elif isinstance(value, str):
-                if len(value) > 4000 or not _TEXT.match(value):
-                    raise ValueError(f"a text in it is too long, or not printable: {ascii(value)[:100]}")
-            elif isinstance(value, int | float):
-                if not isfinite(value):
-                    raise ValueError("a number in it is not finite")
-            elif value is not None:
-                raise ValueError(f"a value in it is no text, number, boolean, list or map: {ascii(value)[:100]}")
-        level = inner
-        if size + len(level) > TREE_SIZE:
-            raise ValueError(f"more than {TREE_SIZE} values are in it")
-    if level:
+def check_tree(tree: Any, levels: int = TREE_DEPTH) -> None:
+    """Check that a tree is finite, printable, and at most `TREE_DEPTH` levels deep."""
+    if not levels:
         raise ValueError(f"more than {TREE_DEPTH} levels are in it")
+    match tree:
+        case dict() if all(isinstance(key, str) for key in tree):
+            check_tree([*tree, *tree.values()], levels)
+        case list() | tuple():
+            for value in tree:
+                check_tree(value, levels - 1)
+        case None | int():
+            pass
+        case float() if isfinite(tree):
+            pass
+        case str() if len(tree) <= 4000 and _TEXT.match(tree):
+            pass
+        case _:
+            raise ValueError(f"a value in it is no finite number, printable text, list or map: {ascii(tree)[:100]}")
 
 
 PLANT = "plant"

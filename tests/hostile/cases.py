@@ -177,7 +177,7 @@ def _values(type_: Any) -> Iterator[tuple[Any, bool | None]]:
             case inspect.AnyType():
                 yield from ((1.0, True), ("x", True), ({"a b": [None, True]}, True), (math.nan, False), (b"x", False))
                 yield from (("\x1b[2J", False), ("x" * 4001, False), ({"x": {"\x1b": 1}}, False), ({1: 2}, False))
-                yield from ((_nested(6), True), (_nested(7), False), ([1] * 3900, True), ([1] * 4001, False))
+                yield from ((_nested(6), True), (_nested(7), False))
             case inspect.DictType(value_type=inspect.AnyType()):
                 yield from (({}, True), ({"\x1b": 0.1}, False), (7, False))
                 yield {f"x{i}": 0.1 for i in range(part.max_length + 1)}, False
