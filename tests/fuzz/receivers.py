@@ -35,7 +35,6 @@ from gridpeers.wire.messages import AgentStatus, Answer, LinkAcknowledgement, Li
 from tests.fuzz.journals import Journals
 from tests.fuzz.mutation import EPOCH
 from tests.hostile.scenes import (
-    INSTANCES,
     KEYS,
     NAMES,
     AgentScene,
@@ -43,7 +42,7 @@ from tests.hostile.scenes import (
     RealtimeAgentScene,
     RealtimePlantScene,
     Scene,
-    plate,
+    meet,
 )
 from tests.toy.toy_configs import agent_config
 
@@ -145,13 +144,7 @@ class LinkedAgentScene(RealtimeAgentScene):
         config = replace(agent_config("inv1"), clock="wall", epoch=EPOCH, links=LATE, record="all")
         self.side = AgentNode(config, "a", links_of("inv1", LATE))
         self.side.start(self.now)
-        self.join()
-
-    def join(self) -> None:
-        self.side.appeared(KEYS.alive_plant(EPOCH), self.now)
-        for name in NAMES[1:]:
-            self.side.appeared(KEYS.alive_agent(name, INSTANCES[name]), self.now)
-            self.hear(KEYS.nameplate(name, INSTANCES[name]), plate(name))
+        meet(self, *NAMES[1:])
 
 
 class Recording:

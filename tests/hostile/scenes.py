@@ -47,15 +47,24 @@ def measurement(k: int) -> Measurement:
 class Scene:
     """A core in the middle of a run: what it is told, and what it does."""
 
-    def __init__(self, side: AgentNode | PlantNode | AgentNode | PlantNode) -> None:
+    def __init__(self, side: AgentNode | PlantNode, *, wall: bool) -> None:
         self.side: Any = side
+        self._wall = wall
         self.now = 100.0
         self.done: list[object] = []
         self.side.start(self.now)
 
     def honest(self, k: int) -> None:
         """Bring all that is truly sent at tick k, and let it work."""
-        raise NotImplementedError
+        agent = isinstance(self.side, AgentNode)
+        if agent:
+            self.hear(KEYS.measurement("inv1"), measurement(k))
+        for name in NAMES[1:] if agent else NAMES:
+            self.hear(KEYS.state(name), state(name, k))
+        if self._wall:
+            self.now = self.now + T_C + 1e-9 if agent else self.side.deadline
+            self.side.expire(self.now)
+        self.take()
 
     def hear(self, key: str, *messages: Message) -> None:
         """Bring messages on a key."""
@@ -82,41 +91,21 @@ class RealtimeAgentScene(Scene):
     """inv1 in real time."""
 
     def __init__(self) -> None:
-        super().__init__(AgentNode(replace(agent_config("inv1"), clock="wall", epoch=EPOCH), "a"))
-        self.side.appeared(KEYS.alive_plant(EPOCH), self.now)
-        for name in NAMES[1:]:
-            self.side.appeared(KEYS.alive_agent(name, INSTANCES[name]), self.now)
-            self.hear(KEYS.nameplate(name, INSTANCES[name]), plate(name))
-
-    def honest(self, k: int) -> None:
-        """Bring what is sent to it at tick k."""
-        self.hear(KEYS.measurement("inv1"), measurement(k))
-        for name in NAMES[1:]:
-            self.hear(KEYS.state(name), state(name, k))
-        self.now += T_C + 1e-9
-        self.side.expire(self.now)
-        self.take()
+        super().__init__(AgentNode(replace(agent_config("inv1"), clock="wall", epoch=EPOCH), "a"), wall=True)
+        meet(self, *NAMES[1:])
 
 
 class AgentScene(Scene):
     """inv1 in simulated time."""
 
     def __init__(self) -> None:
-        super().__init__(AgentNode(replace(agent_config("inv1"), epoch=EPOCH), "a"))
-        self.side.appeared(KEYS.alive_plant(EPOCH), self.now)
-        for name in NAMES[1:]:
-            self.side.appeared(KEYS.alive_agent(name, INSTANCES[name]), self.now)
-            self.hear(KEYS.nameplate(name, INSTANCES[name]), plate(name), plate(name))
+        super().__init__(AgentNode(replace(agent_config("inv1"), epoch=EPOCH), "a"), wall=False)
+        meet(self, *NAMES[1:])
         instances = tuple(INSTANCES[name] for name in NAMES)
         prepare = Prepare(sender="plant", epoch=EPOCH, seq=0, t=0.0, roster=NAMES, instances=instances)
         self.hear(KEYS.control, prepare)
-
-    def honest(self, k: int) -> None:
-        """Bring what is sent to it at tick k."""
-        self.hear(KEYS.measurement("inv1"), measurement(k))
         for name in NAMES[1:]:
-            self.hear(KEYS.state(name), state(name, k))
-        self.take()
+            self.hear(KEYS.nameplate(name, INSTANCES[name]), plate(name))
 
 
 class RealtimePlantScene(Scene):
@@ -125,16 +114,8 @@ class RealtimePlantScene(Scene):
     def __init__(self) -> None:
         config, _ = toy_configs(3, end=None)  # type: ignore[arg-type]
         config = replace(config, clock="wall", epoch=EPOCH)
-        super().__init__(PlantNode(config, ToyPlant(config)))
-        _join(self)
-
-    def honest(self, k: int) -> None:
-        """Bring what is sent to it at tick k."""
-        for name in NAMES:
-            self.hear(KEYS.state(name), state(name, k))
-        self.now = self.side.deadline
-        self.side.expire(self.now)
-        self.take()
+        super().__init__(PlantNode(config, ToyPlant(config)), wall=True)
+        meet(self, *NAMES)
 
 
 class PlantScene(Scene):
@@ -143,21 +124,18 @@ class PlantScene(Scene):
     def __init__(self) -> None:
         config, _ = toy_configs(3, end=1e4)
         config = replace(config, epoch=EPOCH)
-        super().__init__(PlantNode(config, ToyPlant(config)))
-        _join(self)
+        super().__init__(PlantNode(config, ToyPlant(config)), wall=False)
+        meet(self, *NAMES)
         for name in NAMES:
             self.hear(KEYS.ready(name), Ready(sender=name, epoch=EPOCH, seq=0, t=0.0))
         self.take()
 
-    def honest(self, k: int) -> None:
-        """Bring what is sent to it at tick k."""
-        for name in NAMES:
-            self.hear(KEYS.state(name), state(name, k))
-        self.take()
 
-
-def _join(scene: Scene) -> None:
-    for name in NAMES:
+def meet(scene: Scene, *names: str) -> None:
+    """Bring the plant's token, and token and nameplate of agents."""
+    scene.side.appeared(KEYS.alive_plant(EPOCH), scene.now)
+    for name in names:
         scene.side.appeared(KEYS.alive_agent(name, INSTANCES[name]), scene.now)
         scene.hear(KEYS.nameplate(name, INSTANCES[name]), plate(name))
-    scene.take()
+    if isinstance(scene.side, PlantNode):
+        scene.take()
