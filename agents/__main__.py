@@ -9,4 +9,4 @@ from gridpeers.agents.agent_process import AgentProcess, run_agents
 from gridpeers.wire.driver.process import main
 
 if __name__ == "__main__":
-    main("gridpeers.agents", "the agents of one inverter or several", AgentProcess, run_agents)
+    main("gridpeers.agents", AgentProcess, run_agents)

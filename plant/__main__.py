@@ -7,4 +7,4 @@ from gridpeers.plant.plant_process import run_plant
 from gridpeers.wire.driver.process import main
 
 if __name__ == "__main__":
-    main("gridpeers.plant", "the feeder and its inverters", PlantConfig, run_plant)
+    main("gridpeers.plant", PlantConfig, run_plant)

@@ -12,9 +12,4 @@ def run(process: AgentProcess) -> str:
 
 
 if __name__ == "__main__":
-    main(
-        "gridpeers.scenarios.emulation.emulated_agent",
-        "the agents of one inverter or several behind emulated links",
-        AgentProcess,
-        run,
-    )
+    main("gridpeers.scenarios.emulation.emulated_agent", AgentProcess, run)

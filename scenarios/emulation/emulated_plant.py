@@ -15,4 +15,4 @@ def run(config: PlantConfig) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(main("gridpeers.scenarios.emulation.emulated_plant", "the plant behind emulated links", PlantConfig, run))
+    sys.exit(main("gridpeers.scenarios.emulation.emulated_plant", PlantConfig, run))

@@ -116,4 +116,4 @@ class ToyPlant(RecordedPlant):
 
 
 if __name__ == "__main__":
-    main("toy_plant", "a toy", PlantConfig, lambda config: run_plant(config, ToyPlant, links_of))
+    main("toy_plant", PlantConfig, lambda config: run_plant(config, ToyPlant, links_of))

@@ -15,7 +15,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from types import UnionType
-from typing import Any, NoReturn, TypeVar, get_args
+from typing import Any, NoReturn, TypeVar
 
 import msgspec
 
@@ -36,13 +36,8 @@ _GRACE = 5.0
 """Time (s) for a proper end once the parent is gone."""
 
 LEASH = "--leash"
-"""Option: end when standard input ends, that is, when the parent is gone."""
-
-_USAGE = """usage: python -m {module} [{leash} [NAME]] < CONFIG.json
-
-Runs {what}. The configuration is one JSON object on standard input; see {config}.
-With {leash} it must be on one line, and the process ends when standard input does; NAME is only for `ps`.
-"""
+"""Option: the configuration is one line, and the process ends when standard input does, as its parent is gone. A name
+after it is for `ps` alone."""
 
 
 def new_epoch() -> int:
@@ -72,20 +67,18 @@ def no_links(name: str, tree: Mapping[str, Any]) -> None:
         )
 
 
-def main(module: str, what: str, config_type: type[C] | UnionType, run: Callable[[C], str]) -> NoReturn:
+def main(module: str, config_type: type[C] | UnionType, run: Callable[[C], str]) -> NoReturn:
     """Read the configuration, run, and end the process; `run` returns why the run broke, or an empty text."""
-    leave(_main(module, what, config_type, run) + (IN_ORDER if LEASH in sys.argv[1:2] else 0))
+    leave(_main(module, config_type, run) + (IN_ORDER if LEASH in sys.argv[1:2] else 0))
 
 
-def _main(module: str, what: str, config_type: type[C] | UnionType, run: Callable[[C], str]) -> int:
+def _main(module: str, config_type: type[C] | UnionType, run: Callable[[C], str]) -> int:
     watch_readers(quits=False)
     raise_limit()
     options = sys.argv[1:]
     if options[:1] not in ([], [LEASH]) or len(options) > 2:
-        named = get_args(config_type)[0] if isinstance(config_type, UnionType) else config_type
-        config_name = f"{named.__module__}.{named.__name__}"
-        sys.stderr.write(_USAGE.format(module=module, what=what, leash=LEASH, config=config_name))
-        return OK if options in (["-h"], ["--help"]) else BAD_CONFIG
+        sys.stderr.write(f"usage: python -m {module} [{LEASH} [NAME]] < CONFIG.json\n")
+        return BAD_CONFIG
     logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(asctime)s %(levelname)s %(message)s")
     log = logging.getLogger(module)
     stop_at_signals(StoppedError)
