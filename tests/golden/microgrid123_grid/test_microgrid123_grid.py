@@ -16,7 +16,6 @@ from gridpeers.plant.tables import read_feeder
 HERE = Path(__file__).parent
 Z_GFM = 0.0025 + 0.05j
 """Coupling impedance of the GFM in the study (pu of the own rating)."""
-A = np.exp(2j * np.pi / 3.0)
 
 
 def rows(file: str) -> list[dict[str, str]]:
@@ -54,15 +53,6 @@ def test_voltages_agree_with_an_independent_power_flow(network: Network, V: NDAr
     assert len(expected) == 283
     assert np.abs(np.abs(V) / V_nom - [float(row["V_pu"]) for row in expected]).max() < 1e-5
     assert np.abs(np.degrees(np.angle(V * np.exp(-1j * angle)))).max() < 0.001
-
-
-def test_positive_sequence_at_the_inverters(network: Network, V: NDArray[np.complex128]) -> None:
-    """The inverters' terminals have the positive-sequence voltages of the independent power flow."""
-    for inverter, row in zip(network.inverters, rows("inverters.csv"), strict=True):
-        v = [V[network.index(inverter.bus, phase)] for phase in "ABC"]
-        V1 = abs(v[0] + A * v[1] + A**2 * v[2]) / 3.0 / inverter.V_nom
-
-        assert pytest.approx(float(row["V_positive_sequence_pu"]), abs=6e-5) == V1
 
 
 def test_power_balance(network: Network, V: NDArray[np.complex128]) -> None:
