@@ -166,7 +166,7 @@ def _evaluated(rule: Graph, members: Members, name: str) -> dict[str, frozenset[
 def make_graph(plugin: Plugin) -> Graph:
     rule = made(GRAPHS, plugin)
     if not callable(rule):
-        raise PluginError(f"{plugin.name}: an instance of its class cannot be called with the members' nameplates")
+        raise PluginError(f"{plugin.use}: an instance of its class cannot be called with the members' nameplates")
     return rule  # type: ignore[no-any-return]
 
 

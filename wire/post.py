@@ -214,10 +214,6 @@ class Post:
 def _ignore(*arguments: object) -> None: ...
 
 
-MOST_PLANTS = 64
-"""Plants of one run that may hold tokens: two, while one replaces another; some that a recorder has outlived."""
-
-
 class FollowedPlant:
     """The plant that a node follows: the first present one that sends, until its token is gone."""
 
@@ -228,13 +224,8 @@ class FollowedPlant:
         post.plant = self
 
     def appeared(self, part: str) -> bool:
-        """Note a plant's token by its last part; return False if that is no epoch, or one of too many."""
-        epoch = epoch_of(part)
-        if epoch is None:
-            return False
-        if len(self.present) >= MOST_PLANTS and epoch not in self.present:
-            text = f"the token of one more plant; {MOST_PLANTS} hold tokens"
-            self._post.rejects.add("excess", self._post.keys.alive_plant(epoch), text)
+        """Note a plant's token by its last part; return False if that is no epoch."""
+        if (epoch := epoch_of(part)) is None:
             return False
         self.present.add(epoch)
         return True

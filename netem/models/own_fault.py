@@ -109,7 +109,7 @@ def judge_of(plugin: Plugin, src: str, dst: str, stream: Stream, tell: Callable[
     try:
         fault = made(FAULTS, plugin)
     except ValueError as error:
-        tell(f"link fault {plugin.name} on {src} -> {dst} does nothing: {error}")
+        tell(f"link fault {plugin.use} on {src} -> {dst} does nothing: {error}")
         return lambda seq, t, size: 0.0
     failed = False
 
@@ -128,7 +128,7 @@ def judge_of(plugin: Plugin, src: str, dst: str, stream: Stream, tell: Callable[
         except ANYTHING as error:  # a fault is anybody's code
             why = f"raised {named(error)}"
         failed = True
-        tell(f"link fault {plugin.name} on {src} -> {dst} {why} at t = {t:.6g} s, message {seq}; it does nothing since")
+        tell(f"link fault {plugin.use} on {src} -> {dst} {why} at t = {t:.6g} s, message {seq}; it does nothing since")
         return 0.0
 
     return judge

@@ -205,7 +205,7 @@ class Fault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
                 value = _SHORTHANDS[kind].of(float(value))
             if value is not None:
                 found[kind] = value
-        return found | {plugin.name: plugin for plugin in self.own}
+        return found | {plugin.use: plugin for plugin in self.own}
 
     def spans(self, src: str, dst: str, microgrids: Mapping[str, str]) -> list[Span]:
         if not parse(self.on).matches(src, dst, microgrids):
@@ -222,7 +222,7 @@ class Fault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
             text = "does nothing; give it one of profile, " + ", ".join(KINDS)
             found.append(Problem("cut" if self.cut is False else "", text))
         for plugin in self.own:
-            found += below(plugin.name, plugin_problems(FAULTS, plugin))
+            found += below(plugin.use, plugin_problems(FAULTS, plugin))
         return found
 
 

@@ -18,7 +18,6 @@ from gridpeers.scenarios.console import in_order, short
 from gridpeers.wire.keys import Keys, epoch_of, run_of_plant
 from gridpeers.wire.membership import MOST_PROCESSES
 from gridpeers.wire.messages import MOST_INVERTERS, AgentStatus, Pacing, PlantEvent, Telemetry
-from gridpeers.wire.post import MOST_PLANTS
 
 
 class RunTokens:
@@ -38,13 +37,13 @@ class RunTokens:
 
     def appeared(self, key: str) -> None:
         match self._keys.parts(key):
-            case ("alive", "plant", part) if (epoch := epoch_of(part)) is not None and len(self.epochs) < MOST_PLANTS:
+            case ("alive", "plant", part) if (epoch := epoch_of(part)) is not None:
                 self.epochs.add(epoch)
             case ("alive", "agent", name, instance) if (
                 len(self.agents[name]) < MOST_PROCESSES if name in self.agents else len(self.agents) < MOST_INVERTERS
             ):
                 self.agents.setdefault(name, set()).add(instance)
-            case () if run_of_plant(key) and len(self._others) < MOST_PLANTS:
+            case () if run_of_plant(key):
                 self._others.add(key)
             case _:
                 return

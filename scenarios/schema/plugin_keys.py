@@ -40,7 +40,7 @@ def law_of(scenario: ScenarioModel, case: str) -> LawChoice:
 
 def graph_of(case: Case) -> tuple[str, Plugin | None]:
     plugin = plugin_of(case.graph)
-    return (plugin.use, None) if plugin.use in OUR_GRAPHS else (plugin.name, plugin)
+    return (plugin.use, None) if plugin.use in OUR_GRAPHS else (plugin.use, plugin)
 
 
 def metrics_of(scenario: ScenarioModel) -> list[tuple[str, Plugin]]:
@@ -199,7 +199,7 @@ def _check_graphs(scenario: ScenarioModel, feeder: Tables | None, problems: Prob
         try:
             rule = make_graph(plugin)
             for roster in _rosters(scenario, feeder, name):
-                check_graph(rule, roster, plugin.name)
+                check_graph(rule, roster, plugin.use)
         except ValueError as error:  # a `GraphError`, or a `PluginError` of one that cannot be called
             problems.add(path, str(error))
 

@@ -40,10 +40,6 @@ class Plugin(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     parameters: tuple[tuple[str, float | int | bool | str], ...] = ()
     """Name and value of those that do not keep their default, in the order of the names."""
 
-    @property
-    def name(self) -> str:
-        return self.use
-
 
 def table_of(key: str | Mapping[str, Any]) -> dict[str, Any]:
     """Return a scenario's key as a table, a copy: a text alone is its `use`."""
@@ -63,7 +59,7 @@ def made(registry: Registry[Any], plugin: Plugin) -> Any:
     given = dict(plugin.parameters)
     if not isinstance(found, type):
         if given:
-            raise PluginError(f"{plugin.name} is a function and takes no parameters; leave out {', '.join(given)}")
+            raise PluginError(f"{plugin.use} is a function and takes no parameters; leave out {', '.join(given)}")
         return found
     try:
         values = parameter_values(found, given)
@@ -74,7 +70,7 @@ def made(registry: Registry[Any], plugin: Plugin) -> Any:
             setattr(it, name, value)
     except ANYTHING as error:  # its __init__ is foreign code
         text = printable(str(error), 300) if type(error) is ValueError else named(error)
-        raise PluginError(f"{plugin.name} cannot be made: {text}") from error
+        raise PluginError(f"{plugin.use} cannot be made: {text}") from error
     return it
 
 

@@ -8,7 +8,6 @@ from gridpeers.scenarios.drivers.telemetry_stream import QUIET, TelemetryEndpoin
 from gridpeers.wire.codec import encode
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import Answer, LinkReport, LinkRequest, Telemetry
-from gridpeers.wire.post import MOST_PLANTS
 
 KEYS = Keys("demo")
 
@@ -81,18 +80,3 @@ def test_only_the_answer_to_the_last_question_counts() -> None:
     assert asked is not None
     assert it.taken == [telemetry(0), telemetry(1)]
     assert it.core.rejects.counts == {"unexpected": 1}
-
-
-def test_plants_that_have_gone_keep_no_place() -> None:
-    """Somebody who holds the tokens of many plants for a moment keeps no recorder from the plant that comes then."""
-    it = recorder()
-    for epoch in range(100, 100 + MOST_PLANTS):
-        it.core.appeared(KEYS.alive_plant(epoch))
-    it.core.appeared(KEYS.alive_plant(7))
-    for epoch in range(100, 100 + MOST_PLANTS):
-        it.core.vanished(KEYS.alive_plant(epoch))
-    it.core.appeared(KEYS.alive_plant(7))
-    it.hear(telemetry(0))
-
-    assert it.core.rejects.counts == {"excess": 1}
-    assert it.taken == [telemetry(0)]
