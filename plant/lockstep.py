@@ -3,10 +3,9 @@
 Measurement(k) grants tick k, and the plant advances to k + 1 when it has State(k) of every agent on the roster. Each
 wait has a deadline, and names the agents that are missing. `now` (s on the driver's clock) serves deadlines only.
 
-The roster changes between two ticks alone. *gathering*: until every agent of the configuration has a token and a
-nameplate, and every recorder a token. *preparing*: from `Prepare` with a roster, until every agent on it is `Ready`.
-*joining*: the plant holds the tick until the scheduled newcomers have a token and a nameplate; telemetry names them,
-once, as awaited. Because the tick is held, no number depends on how long a process took to start.
+The roster changes between two ticks alone: from `Prepare` with a roster until every agent on it is `Ready`, and before
+a join until the scheduled newcomers have a token and a nameplate; telemetry names them, once, as awaited. Because the
+tick is held, no number depends on how long a process took to start.
 
 At a scheduled leave the plant sends the agent a stop request and disconnects its inverter; at a join it connects the
 inverter at no load. At a scheduled death it sends the stop request, but the inverter stays. When an agent dies by

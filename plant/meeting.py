@@ -45,7 +45,8 @@ def agent_schedule(config: PlantConfig, inverters: tuple[str, ...]) -> dict[int,
 class Meeting:
     def __init__(self, post: Post, stepper: PlantStepper, phases: Phases, feed: RecorderFeed) -> None:
         self.post, self.stepper, self.phases, self.feed = post, stepper, phases, feed
-        self.recorders: set[str] = set()
+        self.recorders: set[str] = set()  # those present; in real time also those lost while the run went on
+        self._live = stepper.config.clock == "wall"
         self._needed = stepper.config.recorders
         self._tokens: set[str] = set()
         """Tokens of agents and recorders that take part; while the run ends, also of agents that were told to stop."""
@@ -89,9 +90,10 @@ class Meeting:
         self._tokens.discard(key)
         match self.post.token(key, now, appeared=False):
             case ("alive", "recorder", name):
-                self.recorders.discard(name)
-                if self.phases.now == "running" and (news := self.feed.gone(name)):
-                    self.post.say(news)
+                if name in self._needed and self._live and self.phases.now == "running":
+                    self.post.say(f"recorder {name} is out of reach; what it misses is kept for a while")
+                else:
+                    self.recorders.discard(name)
             case ("alive", "agent", name, instance) if self.post.process_gone(name, instance):
                 return name
         return ""
@@ -107,10 +109,10 @@ class Meeting:
             text = f"the token of recorder {name}; {MOST_RECORDERS} others hold tokens"
             self.post.rejects.add("excess", key, text)
             return
+        if name in self.recorders and key not in self._tokens:
+            self.post.say(f"recorder {name} is back")
         self._tokens.add(key)
         self.recorders.add(name)
-        if news := self.feed.came(name):
-            self.post.say(news)
 
     def _agent_came(self, key: str, name: str, instance: str, reason: str, now: float) -> None:
         ends = not self.phases.allows("end")

@@ -50,7 +50,6 @@ class RecorderFeed:
         self._due: deque[tuple[int, memoryview]] = deque()
         self._room = memoryview(bytearray())  # what is left of the last block
         self._bytes = 0
-        self._out_of_reach: set[str] = set()  # recorders whose token went while the run went on
         self.paced = False  # whether `replay` publishes a little in each period; else all goes at once
 
     @property
@@ -59,28 +58,12 @@ class RecorderFeed:
         return self._limit is None and self._bytes > WINDOW
 
     def serves(self, present: Iterable[str]) -> bool:
-        """Return whether a recorder still needs the plant: it has not acknowledged all, is present or out of reach."""
-        if self._limit is None:
-            return bool(self._kept)
-        return not self._needs.keys().isdisjoint(self._out_of_reach.union(present))
+        """Return whether a recorder still needs the plant: in simulated time until it has acknowledged all."""
+        return bool(self._kept) if self._limit is None else not self._needs.keys().isdisjoint(present)
 
     def is_silent(self, now: float) -> bool:
         """Return whether a recorder has not asked for a while; its process also starts the agents."""
         return any(now > at + SILENT for at in self._asked_at.values())
-
-    def came(self, name: str) -> str:
-        """Note a recorder's token; return a sentence if it was out of reach."""
-        if name not in self._out_of_reach:
-            return ""
-        self._out_of_reach.discard(name)
-        return f"recorder {name} is back"
-
-    def gone(self, name: str) -> str:
-        """Note that a recorder's token went while the run goes on; return a sentence if the run needs it."""
-        if self._limit is None or name not in self._needs:
-            return ""
-        self._out_of_reach.add(name)
-        return f"recorder {name} is out of reach; what it misses is kept for a while"
 
     def publish(self, number: int, payload: bytes) -> None:
         """Publish and keep a message of this number; it waits if others before it are published again."""
