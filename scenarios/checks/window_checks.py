@@ -12,7 +12,7 @@ from gridpeers.scenarios.checks.checked_case import CheckedCase, IslandWindow
 from gridpeers.scenarios.results.history import Flags, Floats
 from gridpeers.scenarios.results.metric import label
 from gridpeers.scenarios.results.metrics import FEWEST, ends_of, measure
-from gridpeers.scenarios.results.sharing_index import NO_LOAD, sharing_index, total_load
+from gridpeers.scenarios.results.sharing_index import sharing_index
 from gridpeers.wire.schema.table_schema import Below, Plausible, Unit
 
 _SETTLING = Plausible("a settling time", 0.0, 3600.0)
@@ -135,9 +135,9 @@ def _unequal(check: PowerSharing | VarSharing, case: CheckedCase, index: str) ->
             return None
         power, m = (history.P, plates.m_p) if index == "MPSI" else (history.Q, plates.m_q)
         x, s = power[end], plates.s
-        if total_load(x, s, shares).mean() < NO_LOAD:
+        found = float(np.mean(sharing_index(x, s, m, shares)))
+        if np.isnan(found):
             return None
-        found = float(np.nanmean(sharing_index(x, s, m, shares)))
         equal = np.where(shares, x, 0.0).sum() / np.where(shares, s / m, 0.0).sum()
         far = int(np.abs(np.where(shares, m * x / s - equal, 0.0)).sum(axis=0).argmax())
         return [part.violation(f"{index}, {part.label}", far, found, check.limit)] if found > check.limit else []

@@ -20,7 +20,7 @@ import numpy as np
 
 from gridpeers.scenarios.results.history import Flags, Floats, History, Nameplates, Window
 from gridpeers.scenarios.results.metric import DIGITS, UNITS, Measure
-from gridpeers.scenarios.results.sharing_index import NO_LOAD, mean_over, sharing_index, total_load
+from gridpeers.scenarios.results.sharing_index import NO_LOAD, mean_over, sharing_index
 
 F_BAND, MPSI_BAND = 0.01, 0.01  # Frequency (Hz) and MPSI below which a microgrid counts as restored
 LOAD_BAND = 0.02  # Part of the steady total real power within which the load counts as taken over
@@ -135,6 +135,9 @@ def measure(history: History, nameplates: Nameplates, window: Window, f_nom: flo
     )
 
 
+_NO_LOAD = f"nothing shared: the total is below {NO_LOAD:.1%} of the ratings"
+
+
 def _reasons(
     history: History, nameplates: Nameplates, ends: Ends, sharing: Floats, voltage: Floats, vars_: Floats
 ) -> dict[str, str]:
@@ -142,25 +145,17 @@ def _reasons(
     sharing_now = present & nameplates.shares
     dead = "de-energised: no inverter is on the network"
     nobody = dead if nameplates.shares.all() else "nothing shared: no inverter with an agent is on the network"
+    alone = nobody if not sharing_now[ends.steady].any(axis=1).all() else _NO_LOAD
     leaderless = "no grid-forming inverter is on the network" if forming.any() else "there is no grid-forming inverter"
     f, leaders = np.where(present, history.f, np.nan)[:, forming], tuple(np.array(nameplates.names)[forming])
     found = {
         "f_error_Hz": reason("f_error_Hz", f, ends, f"no leader: {leaderless}", leaders if len(leaders) > 1 else ()),
-        "MPSI": _idle(history.P, nameplates, ends, sharing_now) or reason("MPSI", sharing, ends, nobody),
+        "MPSI": reason("MPSI", sharing, ends, alone),
         "V_error": reason("V_error", voltage, ends, dead),
-        "MQSI": _idle(history.Q, nameplates, ends, sharing_now) or reason("MQSI", vars_, ends, nobody),
+        "MQSI": reason("MQSI", vars_, ends, alone),
         "p": reason("p", history.P / nameplates.s, ends, dead, nameplates.names),
     }
     return {name: text for name, text in found.items() if text}
-
-
-def _idle(x: Floats, nameplates: Nameplates, ends: Ends, present: Flags) -> str:
-    """Return why a share of x (W or var) means nothing: there is next to nothing to share. "" where there is."""
-    rows = ends.steady
-    if not rows.any() or not present[rows].any(axis=1).all():
-        return ""  # `reason` says that nobody is present, or that there are no rows
-    load = _mean(total_load(x[rows], nameplates.s, present[rows]))
-    return f"nothing shared: the total is below {NO_LOAD:.1%} of the ratings" if load < NO_LOAD else ""
 
 
 def _mean(x: Floats) -> float:

@@ -27,21 +27,16 @@ def sharing_index(x: Floats, s: Floats, m: Floats, present: Flags | None = None)
 
     .. math:: \frac{1}{N} \sum_i \left| \frac{m_i x_i / s_i - \eta}{\eta} \right|
 
-    N counts the inverters that are present in the row, as the sums do. It is not a number where eta = 0.
+    N counts the inverters that are present in the row, as the sums do. Where the total of x is below `NO_LOAD` of the
+    ratings, there is next to nothing to share, and the index is not a number.
     """
     everybody = np.ones(x.shape, bool) if present is None else present
     equal = eta(x, s, m, everybody)[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         index = mean_over(np.abs((m * x / s - equal) / equal), everybody)
-    index[equal[:, 0] == 0.0] = np.nan
+    total, rated = (np.where(everybody, of, 0.0).sum(axis=1) for of in (x, s))
+    index[np.abs(total) < NO_LOAD * rated] = np.nan
     return index
-
-
-def total_load(x: Floats, s: Floats, present: Flags) -> Floats:
-    """Return abs(total x) of the inverters present in each row, as a part of their ratings s; nan without any."""
-    total: Floats = np.abs(np.where(present, x, 0.0).sum(axis=1))
-    rated: Floats = np.where(present, s, 0.0).sum(axis=1)
-    return total / np.where(rated > 0.0, rated, np.nan)
 
 
 def mean_over(x: Floats, present: Flags) -> Floats:

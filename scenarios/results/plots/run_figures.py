@@ -18,7 +18,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gridpeers.scenarios.results import metrics
-from gridpeers.scenarios.results.history import Floats, History, Nameplates
+from gridpeers.scenarios.results.history import Floats, History
 from gridpeers.scenarios.results.island_membership import RowMeasure, part_of, worst
 from gridpeers.scenarios.results.plots.drawing import Drawing
 from gridpeers.scenarios.results.plots.style import (
@@ -34,7 +34,6 @@ from gridpeers.scenarios.results.plots.style import (
     save,
     stacked_styles,
 )
-from gridpeers.scenarios.results.sharing_index import NO_LOAD, total_load
 from gridpeers.wire.wording import suggestion
 
 WIDTH = 7.4  # Width of a page (inches)
@@ -133,17 +132,6 @@ def drawn(page: Page, drawing: Drawing) -> Figure:
     return figure
 
 
-def _where_shared(index: RowMeasure, power: str) -> RowMeasure:
-    """Return a sharing index that is no number where the total is below `NO_LOAD` of the ratings: it divides dust."""
-
-    def measure(history: History, nameplates: Nameplates) -> Floats:
-        sharing = history.present & nameplates.shares
-        load = total_load(getattr(history, power), nameplates.s, sharing)
-        return np.where(load < NO_LOAD, np.nan, index(history, nameplates))
-
-    return measure
-
-
 class PlotMeasure(NamedTuple):
     """A measure over time as figures show it."""
 
@@ -164,16 +152,12 @@ _VOLTAGE = Bounds(least=0.01, shown=0.98)  # Spikes at a switching are ten times
 
 MEASURES = {
     "frequency": PlotMeasure("Frequency", "mean of the GFM, f (Hz)", "f (Hz)", metrics.mean_frequency, None),
-    "MPSI": PlotMeasure(
-        "Mean power sharing index, MPSI", "MPSI", "MPSI", _where_shared(metrics.MPSI, "P"), 0.0, _SHARING
-    ),
+    "MPSI": PlotMeasure("Mean power sharing index, MPSI", "MPSI", "MPSI", metrics.MPSI, 0.0, _SHARING),
     "V_error": PlotMeasure(
         "Voltage error, V_error", "mean of abs(V - 1) (pu)", "V_error (pu)", metrics.V_error, 0.0, _VOLTAGE
     ),
     "voltage": PlotMeasure("Mean voltage", "mean of all inverters, V (pu)", "mean V (pu)", metrics.mean_voltage, 1.0),
-    "MQSI": PlotMeasure(
-        "Mean var sharing index, MQSI", "MQSI", "MQSI", _where_shared(metrics.MQSI, "Q"), 0.0, _SHARING
-    ),
+    "MQSI": PlotMeasure("Mean var sharing index, MQSI", "MQSI", "MQSI", metrics.MQSI, 0.0, _SHARING),
 }
 """By the name of their figure. V_error judges the voltages: in the mean voltage, which the paper's figure shows,
 terminals that are too high and too low cancel."""
