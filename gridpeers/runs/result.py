@@ -107,7 +107,7 @@ class Results(_FromFolder, Mapping[str, "Result"]):
 
     @property
     def failures(self) -> pd.DataFrame:
-        """Laws that failed, a row each: case, t (s), agent, why, and line, as "mine.py:12"; empty if none did."""
+        """Laws that failed, a row each: case, t (s), agent, and why; empty if none did."""
         return frames.failures_frame({case: law_failures(result.plant_events) for case, result in self.items()})
 
     @property

@@ -12,16 +12,11 @@ from gridpeers.plant.plant_config import OnLawFailure
 from gridpeers.plant.plant_stepper import IDLE
 from gridpeers.wire.messages import PlantEvent
 
-_LINE = re.compile(r"(?:law|graph) (?:(?!: ).)*? \((?P<line>[^()]+:\d+)\)(?::| of )")
-"""Beginning of the reason of a failure whose line is known: what follows a colon and a blank is the reason itself."""
-
 
 class LawFailure(NamedTuple):
     t: float
     agent: str
     why: str
-    line: str
-    """File and line, as "mine.py:12"; empty of a program or an FMU."""
 
     @property
     def sentence(self) -> str:
@@ -34,8 +29,7 @@ def law_failures(events: Iterable[PlantEvent]) -> tuple[LawFailure, ...]:
     for event in events:
         if event.kind == "law":
             why = event.text.removeprefix(f"{event.subject}: ").removesuffix(IDLE)
-            line = _LINE.match(why)
-            found.append(LawFailure(event.t, event.subject, why, line["line"] if line else ""))
+            found.append(LawFailure(event.t, event.subject, why))
     return tuple(sorted(found, key=lambda failure: (failure.t, natural_order(failure.agent))))
 
 

