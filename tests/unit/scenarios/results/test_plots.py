@@ -1,8 +1,5 @@
 """Figures: that they are made, that a case looks the same in all of them, that nothing warns."""
 
-import os
-import subprocess
-import sys
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -187,13 +184,3 @@ def test_a_curve_that_settles_beyond_the_frame_is_told() -> None:
     from_zero(axes, [spike, settled], Bounds(most=5.0))
 
     assert [text.get_text() for text in axes.texts] == ["one rests at 7"]
-
-
-def test_figures_without_a_home_begin_with_no_warning() -> None:
-    """Matplotlib says of a home that cannot be written what its user can do nothing about."""
-    environment = {name: value for name, value in os.environ.items() if name not in ("MPLCONFIGDIR", "XDG_CONFIG_HOME")}
-    words = [sys.executable, "-c", "import gridpeers.scenarios.results.plots.run_figures"]
-
-    done = subprocess.run(words, env=environment | {"HOME": "/proc/none"}, capture_output=True, text=True, check=True)
-
-    assert (done.stdout, done.stderr) == ("", "")
