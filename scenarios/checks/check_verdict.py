@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -24,8 +23,7 @@ if TYPE_CHECKING:
 
 CheckStatus = Literal["passed", "failed", "not judged", "off"]  # Off: the scenario takes it out of the verdict
 
-SHOWN_VIOLATIONS = 20  # Most violations that a verdict keeps; it counts up to `MOST_VIOLATIONS`
-MOST_VIOLATIONS = 1_000_000  # After so many a check is asked for no more: one that never ends yields ever more
+SHOWN_VIOLATIONS = 20  # Most violations that a verdict keeps; it counts all
 
 
 class NotJudgedError(Exception):
@@ -74,7 +72,7 @@ class CheckVerdict(msgspec.Struct, frozen=True, kw_only=True):
     violations: tuple[Violation, ...] = ()
     """The first `SHOWN_VIOLATIONS`."""
     count: int = 0
-    """Number of all violations, at most `MOST_VIOLATIONS`."""
+    """Number of all violations."""
 
     @property
     def sentence(self) -> str:
@@ -132,7 +130,7 @@ def _verdict(name: str, plugin: Plugin, case: CheckedCase) -> CheckVerdict:
         found = made(CHECKS, plugin)(case)
         if not isinstance(found, Iterable) or isinstance(found, str | Mapping):
             raise TypeError(f"returned {printable(repr(found), 60)}; return violations, none for a run that passes")
-        for number, violation in enumerate(islice(found, MOST_VIOLATIONS), 1):
+        for number, violation in enumerate(found, 1):
             checked, count = _checked(violation), number
             if count <= SHOWN_VIOLATIONS:
                 violations.append(checked)
