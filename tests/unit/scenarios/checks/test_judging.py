@@ -105,7 +105,7 @@ def test_a_scenario_names_checks_of_its_own_and_other_limits() -> None:
     [
         (["frequncy"], 'checks[0]: there is no check "frequncy"; did you mean "frequency"?'),
         ([{"use": "frequency", "band_Hz": 60.0}], "checks[0].band_Hz: 60 Hz is not plausible for a band of frequency"),
-        ([{"use": "frequency", "within": 1}], "checks[0].within: unknown parameter; write within_s"),
+        ([{"use": "frequency", "within": 1}], 'checks[0].within: unknown parameter; did you mean "within_s"?'),
         ([{"use": "voltage", "low_pu": 1.1, "high_pu": 0.9}], "checks[0].low_pu: 1.1 pu must be below high_pu = 0.9"),
         ([{"use": "rating", "longest_s": -1}], "checks[0].longest_s: a time of overload must not be negative, got -1"),
         ([{"use": "steady", "off": 1}], "checks[0].off: must be true or false"),
