@@ -12,7 +12,7 @@ from msgspec.structs import replace
 
 from gridpeers.agents.agent import Agent
 from gridpeers.agents.agent_config import Control, DegradedCommunication, Gains
-from gridpeers.agents.degraded_communication import IslandDetector, SaturationDetector, StalenessWeights, gains_in_force
+from gridpeers.agents.degraded_communication import IslandDetector, SaturationDetector
 from gridpeers.wire.codec import encode
 from gridpeers.wire.messages import Measurement, State
 from tests.toy.toy_configs import agent_config
@@ -90,18 +90,6 @@ def test_a_state_fades_beside_the_usual_age_of_its_own_link() -> None:
     r = exp(-T / 0.1)
     P = moved(P, (0.8 + r * 0.6) / (1 + r), (1 + r) * KAPPA)
     assert it.tick(measured(8), ROSTER[1:]).P_set / 1e5 == pytest.approx(P, rel=1e-12)
-
-
-@given(st.floats(0.0, 5.0), st.floats(0.0, 5.0), st.floats(0.01, 10.0))
-def test_the_older_the_less_it_is_worth(age: float, longer: float, T_age: float) -> None:
-    """From 1 for what is new down to 0, whatever the ages."""
-    worth = StalenessWeights(DegradedCommunication(stale="age-weighted", T_age=T_age))
-    worth.arrived("inv2")
-    new, later = worth.at_tick({"inv2": age})["inv2"], worth.at_tick({"inv2": age + longer})["inv2"]
-
-    assert new == 1.0
-    assert 0.0 <= later <= 1.0
-    assert later == pytest.approx(exp(-longer / T_age), rel=1e-6, abs=1e-12)
 
 
 def test_a_neighbour_older_than_max_age_is_none() -> None:
@@ -200,14 +188,6 @@ def test_a_slow_inverter_is_not_saturated(lag: float, up: bool) -> None:
 
     assert {follows.saturated_side(float(sign), y, k * T) for k, y in enumerate(does)} == {0}
     assert [follows.saturated_side(2.0 * sign, does[-1], (300 + k) * T) for k in range(27)] == [0] * 25 + [sign] * 2
-
-
-def test_the_default_is_the_papers() -> None:
-    """Without a word all gains and limits are as given, and every state heard counts in full."""
-    worth = StalenessWeights(DegradedCommunication())
-
-    assert gains_in_force(Gains(P_set_max=0.7), DegradedCommunication()) == Gains(P_set_max=0.7)
-    assert [worth.at_tick({"inv2": age}) for age in (0.02, 1e6)] == [{"inv2": 1.0}] * 2
 
 
 @pytest.mark.parametrize(

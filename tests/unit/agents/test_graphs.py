@@ -133,28 +133,16 @@ def test_a_function_and_a_class_with_parameters_are_rules(folder: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("use", "parameters", "said"),
+    ("use", "said"),
     [
-        ("my_graphs:Next", {"k": 9}, "must be from 1 to 8, got 9"),
-        ("my_graphs:Next", {"kk": 1}, 'unknown parameter; did you mean "k"? The parameters are k'),
-        ("my_graphs:star", {"k": 1}, "my_graphs:star is a function and takes no parameters; leave out k"),
-        (
-            "my_graphs:sta",
-            {},
-            'module my_graphs has no "sta"; did you mean "star"? The names there are star, Next, of_three',
-        ),
-        ("my_graphs:Wrong", {}, "my_graphs:Wrong is no graph: the class needs a method __call__(self, members)"),
-        ("my_graphs:of_two", {}, "my_graphs:of_two is no graph: it is called with one argument, the members: missing"),
-        ("my_graphs:MODULE", {}, 'module my_graphs has no "MODULE"'),
-        ("no_graphs:star", {}, 'there is no module "no_graphs" in '),
-        ("rings", {}, 'there is no graph "rings"; did you mean "ring"? The graphs are full, none, GFM-only, clustered'),
+        ("my_graphs:Wrong", "my_graphs:Wrong is no graph: the class needs a method __call__(self, members)"),
+        ("my_graphs:of_two", "my_graphs:of_two is no graph: it is called with one argument, the members: missing"),
+        ("rings", 'there is no graph "rings"; did you mean "ring"? The graphs are full, none, GFM-only, clustered'),
     ],
 )
-def test_a_rule_that_cannot_be_is_told_in_one_line(
-    folder: str, use: str, parameters: dict[str, int], said: str
-) -> None:
-    """One line says what is wrong with the rule, and what would be right."""
-    (wrong,) = plugin_problems(GRAPHS, plugin_of({"use": use, **parameters}, folder))
+def test_a_rule_that_cannot_be_is_told_in_one_line(folder: str, use: str, said: str) -> None:
+    """What is wrong with the rule, and what would be right."""
+    (wrong,) = plugin_problems(GRAPHS, plugin_of({"use": use}, folder))
     make_graph(Plugin(use="my_graphs:star", folder=folder))
 
     assert said in wrong[1]
@@ -167,9 +155,7 @@ def test_a_rule_that_cannot_be_is_told_in_one_line(
         (lambda members: {"inv1": ["inv9"]}, "graph mine lets inv1 listen to inv9, which is no agent of the run"),
         (lambda members: {"inv9": []}, "graph mine names inv9, which is no agent of the run"),
         (lambda members: {"inv1": ["inv1"]}, "graph mine lets inv1 listen to itself; leave it out"),
-        (lambda members: {"inv1": [3]}, "graph mine lets inv1 listen to 3, which is no agent of the run"),
         (lambda members: {"inv1": 3}, "of inv1, inv2 failed: TypeError: 'int' object is not iterable"),
-        (lambda members: None, "of inv1, inv2 failed: TypeError"),
         (
             lambda members: 1 / 0,
             "of inv1, inv2 failed: ZeroDivisionError: division by zero",

@@ -210,17 +210,6 @@ def test_an_adaptive_alpha_rests_where_it_stands_against_the_vars(v: float, d: f
     assert V_set_step(1.0, z, z_bar, d, v, leader=True, gains=gains, T=T) == pytest.approx(1.0, abs=1e-12)
 
 
-def test_a_big_inverter_far_from_the_leaders_makes_vars_grow_at_any_period_as_in_continuous_time() -> None:
-    """Where the law ends: one of threefold rating at the end of a path is stable at every period, tenfold at none."""
-    i, j = np.indices((9, 9))
-    A, leader = np.asarray(abs(i - j) == 1, float), np.isin(np.arange(9), [4, 5])
-
-    for big, stable in ((3.0, True), (10.0, False)):
-        net = Vars.drawn(A, leader, np.where(np.arange(9) == 8, big, 1.0), 0, UNBOUNDED)
-        assert (np.linalg.eigvals(net.continuous()[0]).real.min() > 0.0) == stable
-        assert [radius(net.affine(T)[0]) < 1.0 for T in (0.002, 0.02, 0.1, 1.0)] == [stable] * 4
-
-
 @settings(max_examples=50)
 @given(fleets(), st.integers(0, 2**32 - 1))
 def test_a_short_period_gives_the_papers_derivative(fleet: tuple[Matrix, NDArray[np.bool_], Matrix], seed: int) -> None:
@@ -260,14 +249,6 @@ def test_frequency_and_sharing_rest_where_the_papers_law_rests(
 
     assert step_all(agreed, A, leader, np.zeros(len(A)), T) == pytest.approx(agreed, abs=1e-15)
     assert np.linalg.matrix_rank(np.eye(len(A)) - as_matrix(A, leader, w, T), tol=1e-12) == len(A)
-
-
-def test_a_pair_moves_as_in_continuous_time() -> None:
-    """Two linked followers approach each other by exp(-2 kappa T) exactly."""
-    A, T = np.array([[0.0, 1.0], [1.0, 0.0]]), 0.3
-    y = step_all(np.array([0.002, 0.008]), A, np.zeros(2, bool), np.zeros(2), T)
-
-    assert y == pytest.approx(0.005 + np.array([-0.003, 0.003]) * np.exp(-2.0 * KAPPA * T), rel=1e-12)
 
 
 def test_the_papers_law_has_the_parameters_and_defaults_of_its_table() -> None:

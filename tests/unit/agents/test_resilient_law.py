@@ -126,17 +126,6 @@ def test_a_rate_limit_holds_vars_as_well_and_grows_with_the_time_of_silence() ->
         assert V_set(-0.9, silent) == pytest.approx(V_set(-most, silent), abs=1e-12)
 
 
-def test_asking_why_changes_nothing() -> None:
-    """Terms may be asked for at any time: trust ages by steps alone."""
-    asked, law = (Resilient(F=0, tolerance=0.1, T_out=0.2) for _ in range(2))
-    for k in range(5):
-        law.step(own(t=k * T), [neighbour("a", 5.0)], T)
-        assert named(asked.step(own(t=k * T), [neighbour("a", 5.0)], T)) == [("implausible", "a")]
-
-    later = own(t=5 * T), [neighbour("a", 0.6)], T
-    assert asked.step(*later)[:4] == law.step(*later)[:4]
-
-
 def test_who_is_implausible_ages_out_and_comes_back_slowly() -> None:
     """After three times T_out its weight is e^-3; a start forgets it."""
     law, T_out = Resilient(F=0, tolerance=0.1, T_out=0.2), 0.2

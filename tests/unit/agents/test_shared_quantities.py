@@ -20,7 +20,6 @@ from gridpeers.agents.laws.law import Law, Neighbour, Own, SetPoints
 from gridpeers.scenarios.schema.plugin_keys import law_of
 from gridpeers.wire.messages import SHARED_LIMIT, Measurement, State
 from tests.toy.toy_configs import ALL_FULL, agent_config
-from tests.unit.agents.realtime_lab import running
 
 OMEGA = SharedQuantity(name="Omega", unit="pu", low=-0.05, high=0.05, help="Integral.")
 PROGRAM = {"command": ["cat"], "shared": [{"name": "Omega", "unit": "pu", "low": -0.05, "high": 0.05}]}
@@ -152,14 +151,3 @@ def test_a_state_with_a_value_beyond_its_range_is_dropped_and_counted() -> None:
     assert it.rejects.counts == {"implausible": 1}
     (line,) = it.rejects.take_lines()
     assert "it shares Omega, which must be from -0.05 to 0.05 pu, got 0.06" in line
-
-
-def test_a_node_counts_such_a_state_and_its_sender_ages() -> None:
-    """In real time the age is that of the last good state."""
-    lab = running("inv2", control=replace(ALL_FULL, law=LawChoice(shared=(OMEGA,))))
-    lab.state("inv2", 1, shared={"Omega": 0.05})
-    lab.go(0.02)
-    lab.state("inv2", 2, shared={"Omega": 0.06})
-
-    assert lab.side.rejects.counts == {"implausible": 1}
-    assert lab.age("inv2") == pytest.approx(0.02)

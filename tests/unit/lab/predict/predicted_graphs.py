@@ -77,16 +77,11 @@ def on_the_plant(
     graph: str,
     *,
     link: int = 0,
-    measurement: int = 0,
     setpoint: int = 0,
-    frequency_only: bool = False,
     still_voltage: bool = False,
     end_s: float = 7.0,
 ) -> Run:
-    """The real agents on the real plant, with delays in ticks: `gridpeers.lab.predict.linear_model.Ticks`.
-
-    With `frequency_only` V and Q are measured at once, and V_set is held at once.
-    """
+    """The real agents on the real plant, with delays in ticks: `gridpeers.lab.predict.linear_model.Ticks`."""
     scenario, feeder = scenario_of(graph, still_voltage=still_voltage, end_s=end_s)
     plant_config, agent_configs = configs(scenario, feeder, "x")
     plant = build_plant(plant_config)
@@ -104,14 +99,11 @@ def on_the_plant(
             if k - 1 - link >= 0:
                 for other in neighbours:
                     agent.hear(said[k - 1 - link][other])
-            reading, late = readings[k][name], readings[max(k - measurement, 0)][name]
-            reading = reading._replace(f=late.f) if frequency_only else reading._replace(f=late.f, Q=late.Q, V=late.V)
-            states[name] = agent.tick(
-                measurement_of(name, reading, epoch=1, tick=k, t=k * T, roster=roster), neighbours
-            )
+            measured = measurement_of(name, readings[k][name], epoch=1, tick=k, t=k * T, roster=roster)
+            states[name] = agent.tick(measured, neighbours)
         said.append(states)
         for name, late_state in said[max(k - setpoint, 0)].items():
-            plant.hold(name, late_state.P_set, (states if frequency_only else said[max(k - setpoint, 0)])[name].V_set)
+            plant.hold(name, late_state.P_set, late_state.V_set)
         plant.advance()
         readings.append(plant.measure())
     after = readings[round(scenario.events[0].t_s / T) + 1 :]
