@@ -100,10 +100,6 @@ class LiveHearing:
         self._states: deque[State] = deque()
         self._remembers = any(each.lie.reach != 0.0 for each in heard.lies)
 
-    @property
-    def remembered(self) -> int:
-        return len(self._states)
-
     def told(self, state: State) -> State:
         """Return what is heard in place of a true state that has come."""
         if not self._remembers:
