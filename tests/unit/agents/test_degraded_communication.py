@@ -34,7 +34,6 @@ def agent(name: str = "inv1", **degraded_communication: Any) -> Agent:
 
 
 def state(sender: str, k: int, *, P_set: float = 80e3, Q: float = 10e3) -> State:
-    """State of a neighbour at tick k."""
     return State(sender=sender, epoch=1, seq=k, t=T * k, P_set=P_set, V_set=277.0, Q=Q)
 
 

@@ -120,11 +120,9 @@ class Vars:
         return cls(A, leader, H, rng.normal(0.0, 0.02, n), rng.normal(0.0, 0.02, n), gains)
 
     def at(self, V_set: Matrix) -> tuple[Matrix, Matrix]:
-        """Return v and z (pu)."""
         return 1.0 + self.v_0 + self.H @ V_set, self.z_0 + V_set - self.H @ V_set
 
     def step(self, V_set: Matrix, T: float) -> Matrix:
-        """One period, through the law itself."""
         v, z = self.at(V_set)
         d = self.C.sum(axis=1)
         z_bar = self.C @ z / d
@@ -151,7 +149,6 @@ class Vars:
 
 
 def radius(M: Matrix) -> float:
-    """Largest magnitude of an eigenvalue."""
     return float(np.abs(np.linalg.eigvals(M)).max())
 
 

@@ -24,12 +24,10 @@ def own(P_set: float = 0.5, Q: float = 0.0, *, t: float = 1.0, e: float = 0.0, n
 
 
 def neighbour(name: str, P_set: float = 0.5, Q: float = 0.0) -> Neighbour:
-    """A neighbour with these values."""
     return Neighbour(name, False, T, 1.0, P_set, 1.0, Q, 0.01, 0.05, 6e5)
 
 
 def graph_of(rng: np.random.Generator, n: int, links: float) -> np.ndarray:
-    """A random undirected graph."""
     A = np.triu(rng.random((n, n)) < links, 1).astype(float)
     return np.asarray(A + A.T)
 
@@ -71,7 +69,6 @@ def test_w_msr_never_leaves_the_range_of_the_honest_and_they_agree_where_the_gra
 
 
 def named(decided: SetPoints) -> list[tuple[str, str]]:
-    """Name and neighbour of each term of P_set."""
     assert decided.terms is not None
     return [(term.name, term.neighbour) for term in decided.terms().P_set]
 

@@ -24,13 +24,11 @@ T_C = 0.02
 
 
 def channel(seed: int = 1, src: str = "inv1", dst: str = "inv2", **kinds: Any) -> Channel:
-    """One link with one entry."""
     fault = Fault(on=f"{src} -> {dst}", **kinds)
     return Channel(Link(src, dst), fault.spans(src, dst, MICROGRIDS), seed)
 
 
 def fates(judge: Channel, numbers: Iterable[int], size: int = 120) -> list[Fate]:
-    """Deliveries of messages sent every control period."""
     return [judge.judge(seq, seq * T_C, size) for seq in numbers]
 
 
@@ -40,5 +38,4 @@ def delays(judge: Channel, n: int) -> list[float]:
 
 
 def receiver(*links: Fault, name: str = "inv2", **entries: Any) -> Receiver:
-    """One receiver with entries."""
     return Receiver(name, Netem(links=links, **entries), MICROGRIDS)

@@ -17,7 +17,6 @@ time = st.integers(0, 200).map(lambda k: k / 10)
 
 
 def spans(*entries: tuple[str, float, float, object]) -> Channel:
-    """A link with faults of the kinds and times given."""
     return Channel(Link("inv1", "inv2"), [Span(*entry) for entry in entries], seed=1)
 
 

@@ -32,7 +32,6 @@ share = st.floats(0.0, 1.0)
 
 
 def lost(model: LossModel, n: int = N) -> list[bool]:
-    """Which of n messages are lost."""
     return [fate.reason == "loss" for fate in fates(channel(loss=model), range(n))]
 
 

@@ -114,18 +114,6 @@ def test_two_entries_of_one_kind_link_and_time_contradict_each_other(
     assert all("link[0] gives inv1 -> inv" in problem.text for problem in found)
 
 
-def test_partitions_may_overlap_unless_one_keeps_what_the_other_loses() -> None:
-    """Two partitions, or one and a cut, add up; with hold in one of them it is unclear what becomes of a message."""
-    apart, half = Partition(by="microgrid"), Partition(by="halves")
-    held = msgspec.structs.replace(half, hold=True)
-
-    assert not Netem(partitions=(apart, half), links=(Fault(on="* -> inv2", cut=True),)).problems(
-        NAMES, MICROGRIDS, 9.0
-    )
-    (found,) = Netem(partitions=(apart, held)).problems(NAMES, MICROGRIDS, 9.0)
-    assert "only one of them has hold" in found.text
-
-
 @pytest.mark.parametrize(
     ("partition", "groups"),
     [

@@ -51,19 +51,16 @@ LINK = Link("inv1", "inv2")
 
 @pytest.fixture
 def folder(tmp_path: Path) -> str:
-    """A folder with somebody's module `my_faults`."""
     (tmp_path / "my_faults.py").write_text(MODULE, encoding="utf-8")
     return str(tmp_path)
 
 
 def fault(folder: str, name: str, **values: object) -> Fault:
-    """An entry with one fault of `my_faults`, and others."""
     own = Plugin(use=f"my_faults:{name}", folder=folder, parameters=tuple(values.pop("parameters", ())))  # type: ignore[arg-type]
     return Fault(on="inv1 -> inv2", own=(own,), **values)  # type: ignore[arg-type]
 
 
 def channel(entry: Fault, seed: int = 1) -> Channel:
-    """One link with one entry."""
     return Channel(LINK, entry.spans(*LINK, {}), seed)
 
 

@@ -16,12 +16,10 @@ ENDS = [*NAMES, "plant"]
 
 
 def meant(pattern: str) -> set[Link]:
-    """Links that a pattern means."""
     return {link for link in links_among(NAMES) if parse(pattern).matches(*link, MICROGRIDS)}
 
 
 def pairs(left: list[str], right: list[str]) -> set[Link]:
-    """Every directed link from one of the left to one of the right."""
     return {Link(src, dst) for src in left for dst in right if src != dst}
 
 

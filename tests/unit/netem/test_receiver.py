@@ -34,7 +34,6 @@ KINDS: dict[str, Any] = {
 
 
 def faults(on: str) -> st.SearchStrategy[Fault]:
-    """An entry of any kinds, for any time of the first seconds."""
     chosen = st.sets(st.sampled_from(list(KINDS)), min_size=1).map(lambda kinds: {kind: KINDS[kind] for kind in kinds})
     return st.builds(
         lambda kinds, start, length: Fault(on=on, from_s=start / 10, to_s=(start + length) / 10, **kinds),
@@ -55,7 +54,6 @@ def send(to: Receiver, ticks: range, *sources: str) -> list[Arrival]:
 
 
 def outcomes(traces: tuple[LinkTrace, ...]) -> dict[str, Any]:
-    """Last verdict of each message, by sender."""
     return {trace.src: dict(zip(trace.seq, trace.outcome, strict=True)) for trace in traces}
 
 

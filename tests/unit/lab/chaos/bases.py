@@ -16,12 +16,10 @@ NAMES = ("islanding", "plug-n-play", "microgrid-switching")
 
 @cache
 def base_named(name: str) -> ChaosBase:
-    """The last case of a scenario of the catalogue."""
     return _last_case(name)
 
 
 def base_in(file: Path) -> ChaosBase:
-    """The last case of a scenario file."""
     return _last_case(file)
 
 
@@ -32,5 +30,4 @@ def _last_case(name: str | Path) -> ChaosBase:
 
 
 def run_scenario(base: ChaosBase) -> ChaosRow:
-    """Run a base as it stands, and judge it."""
     return judged(base, base.scenario, ChaosRow(number=0, schedule=()), "inprocess")[0]

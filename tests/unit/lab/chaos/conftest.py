@@ -9,6 +9,5 @@ from gridpeers.lab.chaos import campaign, schedules
 
 @pytest.fixture
 def few_schedules(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Batches of four schedules."""
     for module in (campaign, schedules):
         monkeypatch.setattr(module, "BATCH", 4)

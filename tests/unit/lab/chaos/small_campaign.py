@@ -31,13 +31,11 @@ graph = "full"
 
 
 def small(folder: Path, extra: str = "") -> Path:
-    """Write the scenario into a folder, with further keys of its head, and return its file."""
     file = folder / "small.toml"
     file.write_text(SMALL.format(extra=extra), encoding="utf-8")
     return file
 
 
 def rows_of(folder: Path) -> list[dict[str, str]]:
-    """Return the rows of the table of a campaign's folder."""
     with (folder / "chaos.csv").open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))

@@ -27,7 +27,6 @@ class FullDisk:
         self.whole, self.asked = whole, 0
 
     def __call__(self, *words: Any) -> Any:
-        """Run a case, or raise the error."""
         self.asked += 1
         if self.asked > self.whole:
             raise NO_SPACE

@@ -88,20 +88,6 @@ def test_a_switch_that_waits_for_synchronism_may_never_close() -> None:
     assert not base_named("microgrid-switching").is_possible((close, kill))
 
 
-def test_a_failure_is_shrunk_to_what_makes_it() -> None:
-    """Begun with a run of many disturbances, a fault that takes a pause and a cut ends at these two alone."""
-    base = base_named("islanding")
-
-    def fails(schedule: Schedule) -> bool:
-        return {"pause", "cut"} <= {word for it in schedule for word in it.entry}
-
-    number = next(i for i, schedule in enumerate(_batch(1)) if len(schedule) > 3 and fails(schedule))
-    simplest = shrunk(base, 1, BATCH + number, fails)
-
-    assert len(simplest) == 2
-    assert fails(simplest)
-
-
 def test_shrinking_runs_each_schedule_once_and_no_more_than_it_may(monkeypatch: pytest.MonkeyPatch) -> None:
     """The disturbances that are left out one by one at the end count, too, and have a part of the runs for them."""
     base, tries = base_named("islanding"), 20

@@ -10,5 +10,4 @@ from tests.unit.scenarios.checks.cases import ran
 
 @pytest.fixture(scope="module")
 def sound() -> CheckedCase:
-    """Islanding under full coordination."""
     return ran().checked_case

@@ -59,7 +59,6 @@ def missing(
 
 
 def always(k: int) -> int:
-    """One process all the time."""
     return 1
 
 

@@ -13,7 +13,6 @@ from gridpeers.lab.communication.communication_checks import CommunicationSummar
 from gridpeers.lab.communication.sent_states import SentState
 from gridpeers.scenarios.checks.check_verdict import NotJudgedError
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.record.record_file import RecordFile
 from gridpeers.wire.journal import Decision
 from gridpeers.wire.messages import State
 from tests.unit.lab.communication.records import CUT, LOSSY, QUIET
@@ -82,14 +81,6 @@ def test_a_record_of_any_size_is_judged(sound: CheckedCase, monkeypatch: pytest.
     assert verdict(large, "message_account").status == "passed"
     with pytest.raises(NotJudgedError, match="more than the 0 MB that are taken into memory"):
         _ = large.content
-
-
-def test_one_time_that_cannot_be_puts_no_account_off(sound: CheckedCase, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nothing in the file is trusted: its record ends when the run was to end, for every check."""
-    monkeypatch.setattr(RecordFile, "t_end", 1e9)
-    case = replace(sound)
-
-    assert case.communication.t_end == case.content.t_end == case.content.info.plant.end == 7.0
 
 
 @pytest.mark.parametrize("clock", ["simulated", "wall"])

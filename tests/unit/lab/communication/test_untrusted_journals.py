@@ -16,12 +16,10 @@ DECISION = ["decision", 4, 1, ["inv2"], [1], [], []]
 
 
 def packed(*entries: Any) -> bytes:
-    """Entries of a journal."""
     return b"".join(map(msgspec.msgpack.encode, entries))
 
 
 def sent(number: int, t: float) -> list[Any]:
-    """An entry with a state of inv1."""
     state = State(sender="inv1", epoch=1, seq=MOST_COUNT, t=0.5, P_set=0.0, V_set=1.0, Q=0.0)
     values = msgspec.msgpack.decode(encode(state)[:-4]) | {"seq": number, "t": t}
     return ["sent", None, "state/inv1", msgspec.msgpack.encode(values) + bytes(4)]

@@ -19,7 +19,6 @@ T_C = 0.02
 
 
 def state(name: str, number: int, **changes: Any) -> State:
-    """A state of an agent."""
     values: dict[str, Any] = dict(P_set=6e4, V_set=277.5, Q=1e3, island="inv1")
     return State(sender=name, epoch=1, seq=number, t=round(number * T_C, 9), **values | changes)
 

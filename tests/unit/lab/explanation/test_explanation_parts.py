@@ -24,7 +24,6 @@ NOBODY = record_of(messages=lambda *words, **more: iter(()))
 
 
 def sent(name: str, *numbers: int, **changes: Any) -> list[State]:
-    """States as their sender sent them."""
     return [replace(state(name, number), **changes) for number in numbers]
 
 
@@ -130,17 +129,14 @@ class Wrong(Law):
     """A law whose terms are not numbers."""
 
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
-        """Stay, by what is no number."""
         return SetPoints(own.P_set, own.V_set, terms=lambda: Terms((Term("x", float("nan")),), ()))
 
 
 def of_law(law: Law, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Have this law made for an explanation."""
     monkeypatch.setattr(module, "make_law", lambda control: law)
 
 
 def step_of(decided: RecordedDecision, *before: RecordedDecision) -> LawStep:
-    """The step of a decision with those before it."""
     step = law_step(record_of(*before, decided), decided)
     assert step is not None
     return step

@@ -50,7 +50,6 @@ def scenario_of(
 
 
 def inverters(graph: str, *, kappa: float | None = None) -> InverterGroup:
-    """All nine inverters on a graph."""
     return inverter_group_of(*scenario_of(graph, kappa=kappa), "x")
 
 

@@ -95,7 +95,6 @@ def by_definition(A: np.ndarray) -> int:
 
 
 def random_graph(seed: int, n: int, *, directed: bool = False) -> np.ndarray:
-    """A random graph without loops."""
     rng = np.random.default_rng(seed)
     A = (rng.random((n, n)) < rng.uniform(0.2, 0.95)).astype(float)
     np.fill_diagonal(A, 0.0)
@@ -128,7 +127,6 @@ def test_known_graphs() -> None:
 
 
 def notes(law: dict[str, object], graph: str) -> list[str]:
-    """Return what is said of islanding IV with another law and graph."""
     scenario = gp.load("islanding").replace({"case.IV.law": law, "case.IV.graph": graph, "paper": ""})
     return list(robustness_notes(scenario.spec, scenario.feeder))
 

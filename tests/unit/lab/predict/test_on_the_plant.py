@@ -25,7 +25,6 @@ def event() -> LoadStep:
 
 @pytest.fixture(scope="module")
 def answers() -> VarResponse:
-    """How vars and voltages answer to V_set on the islanded feeder."""
     return var_response(*load_scenario("islanding"))
 
 

@@ -30,12 +30,10 @@ CUT = Netem(links=(Fault(on="inv1 -> inv2", cut=True, from_s=0.3, to_s=0.8),))
 
 
 def told(messages: list[Telemetry]) -> tuple[Rows, list[PlantEvent]]:
-    """Rows and events of telemetry."""
     return [row for each in messages for row in each.rows], [event for each in messages for event in each.events]
 
 
 def again(record: RunRecord, changes: Changes | None = None, **rule: Any) -> tuple[Rows, list[PlantEvent]]:
-    """Rows and events of the closed loop."""
     found: list[Telemetry] = []
 
     def take(message: Telemetry | LinkReport) -> None:
@@ -50,7 +48,6 @@ def again(record: RunRecord, changes: Changes | None = None, **rule: Any) -> tup
 
 
 def links_of(record: RunRecord, netem: Netem) -> dict[str, Any]:
-    """Configuration of emulated links between the agents of a record."""
     microgrids = {agent.name: agent.microgrid for agent in record.info.agents}
     return EmulationConfig(netem=netem, microgrids=microgrids, real_nodes=True).to_tree()
 
@@ -124,15 +121,3 @@ def test_messages_that_the_record_lacks_come_as_those_of_their_link(tmp_path: Pa
     assert again(saving, Changes(law="consensus"), control=ALL_FULL) == told(list(talking.telemetry()))
     assert again(talking, Changes(law="event-triggered"), control=saves) == told(list(saving.telemetry()))
     assert told(list(saving.telemetry()))[0] != told(list(talking.telemetry()))[0]
-
-
-def test_link_commands_happen_again(tmp_path: Path) -> None:
-    """A link that somebody cut by hand is cut in the replay too."""
-    tree = {"fault": {"on": "inv1 -> inv2", "cut": True}}
-    record = fake_clock_record(
-        tmp_path / "case",
-        netem=Netem(),
-        happens=lambda run: run.at(0.4, lambda: run.command("link", link_command=tree)),
-    )
-
-    assert again(record) == told(list(record.telemetry()))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from math import inf
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -43,7 +42,6 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> RunRecord:
 
 
 def parts_of(record: RunRecord) -> dict[str, list[ReplayedPart]]:
-    """The parts of a replay by their names."""
     found: dict[str, list[ReplayedPart]] = {}
     for part in replay(record, ToyPlant).parts:
         found.setdefault(part.name, []).append(part)
@@ -89,7 +87,6 @@ def test_another_gain_is_named_where_it_first_acts(record: RunRecord) -> None:
 
 
 def steps_of(record: RunRecord, name: str) -> list[tuple[RecordedProcess, list[RecordedStep]]]:
-    """The lives of a process, with their steps."""
     return [(each, list(each.steps())) for each in processes_of(record) if each.name == name]
 
 
@@ -130,22 +127,6 @@ def test_what_was_rejected_unseen_is_rejected_again_by_its_number(
 
     assert again.take(step, process.message(step)) == []
     assert again.node.rejects.counts == counts
-
-
-def test_a_replay_counts_what_a_flood_had_dropped(tmp_path: Path) -> None:
-    """An agent tells the number with its status; so does the agent of the replay, and nothing else differs."""
-
-    def happens(run: FakeClockRun) -> None:
-        run.at(0.4, lambda: run.lose("inv1", "state/inv2", 5_000))
-
-    flooded = fake_clock_record(tmp_path / "case", happens=happens)
-    (entry,) = [each for each in flooded.entries("inv1") if isinstance(each, RejectedCount)]
-    ((_, steps),) = steps_of(flooded, "inv1")
-
-    assert (entry.key, entry.kind, entry.count) == ("state/inv2", "excess", 5_000)
-    assert entry.at is not None
-    assert [step.entry for step in steps if isinstance(step.entry, RejectedCount)] == [entry]
-    assert all(part.difference is None for of in parts_of(flooded).values() for part in of)
 
 
 # -------------------------------------------------------------------- differences
