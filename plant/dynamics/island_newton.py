@@ -117,26 +117,3 @@ def _newton(equations: _Equations, guess: Complex, part: float) -> Complex | Non
             F_next, size_next = equations.residual(V + length * dV, part)
         V, F, size = V + length * dV, F_next, size_next
     return None
-
-
-def weak_branches(Y: sp.csc_array, C: sp.csc_array, loads: LoadLaw, V_nom: Real) -> dict[int, float]:
-    """Return branches of constant power that are too much even alone, and the short-circuit powers there (VA).
-
-    A power S behind an impedance Z has a solution where V^2 >= 2 (|Z S| + Re(Z S^*)). A load that grows from nothing
-    comes to this solution only if V^2 / |S| is at least |Z|, too. `Y`, `C`: at the nodes of unknown voltage.
-    """
-    S, rows = loads.S.astype(complex), loads.law
-    S[loads.limited_at] = np.where((rows[:, 3] == 0.0) & (rows[:, 4] == 0.0), rows[:, 0] + 1j * rows[:, 1], 0.0)
-    at = np.flatnonzero((S != 0.0) & (np.diff(C.indptr) > 0))
-    try:
-        factors = splu(sp.csc_matrix(Y))
-    except RuntimeError:  # singular: nothing can be said
-        return {}
-    weak = {}
-    for branch in at.tolist():
-        ends = C[:, [branch]].toarray().ravel()
-        Z = complex(ends @ factors.solve(ends.astype(complex)))
-        size, V_square = abs(Z * S[branch]), V_nom[branch] ** 2
-        if not V_square >= max(size, 2.0 * (size + (Z * S[branch].conjugate()).real)):
-            weak[branch] = V_square / abs(Z)
-    return weak

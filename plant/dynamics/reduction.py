@@ -19,7 +19,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import SuperLU, splu
 
 from gridpeers.plant.dynamics.circuit import Circuit
-from gridpeers.plant.dynamics.island_newton import Island, solve_island, weak_branches
+from gridpeers.plant.dynamics.island_newton import Island, solve_island
 from gridpeers.plant.dynamics.kept_network import kept_network
 from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Integers, Real
 from gridpeers.plant.dynamics.kernel.network_arrays import COPY, Reduced, SparseMaps, factorise_blocks
@@ -204,11 +204,25 @@ class Reduction:
         return V_b, tuple(failed)
 
     def weak_branches(self) -> dict[int, float]:
-        """Return load branches of constant power too large even alone, and the short-circuit powers there (VA)."""
-        at = self.unknown
-        V_nom = np.abs(self.circuit.V_branch[self.branches])
-        weak = weak_branches(self.Y[at][:, at].tocsc(), self.C.tocsr()[at].tocsc(), self.loads, V_nom)
-        return {int(self.branches[k]): S for k, S in weak.items()}
+        """Return branches of constant power that are too much even alone, and the short-circuit powers there (VA).
+
+        A power S behind an impedance Z has a solution where V^2 >= 2 (|Z S| + Re(Z S^*)). A load that grows from
+        nothing comes to this solution only if V^2 / |S| is at least |Z|, too.
+        """
+        S, law = self.loads.S.astype(complex), self.loads.law
+        S[self.loads.limited_at] = np.where((law[:, 3] == 0.0) & (law[:, 4] == 0.0), law[:, 0] + 1j * law[:, 1], 0.0)
+        C = self.C.tocsr()[self.unknown].tocsc()
+        weak = {}
+        for k in np.flatnonzero((S != 0.0) & (np.diff(C.indptr) > 0)).tolist():
+            ends, branch = C[:, [k]].toarray().ravel(), int(self.branches[k])
+            try:
+                Z = complex(ends @ self._factors.solve(ends.astype(complex)))
+            except RuntimeError:  # singular: nothing can be said
+                return {}
+            size, V_square = abs(Z * S[k]), abs(self.circuit.V_branch[branch]) ** 2
+            if not V_square >= max(size, 2.0 * (size + (Z * S[k].conjugate()).real)):
+                weak[branch] = V_square / abs(Z)
+        return weak
 
     @cached_property
     def _islands(self) -> list[tuple[int, Integers, Integers, Island]]:

@@ -73,19 +73,14 @@ def current_reference(g: Any, P: float, Q: float, u_d: float) -> complex:
 
 
 @compiled
-def lock_others(
-    g: Any, x0: Any, x: Any, d: Any, u_q_B: float, u_q_C: float, h: float, second: bool
-) -> tuple[float, float]:
-    """Advance the PLLs of phases B and C; return their speeds (rad/s, relative to nominal)."""
-    dw_B, dw_C = g.k_iPLL * u_q_B, g.k_iPLL * u_q_C
-    x.w_i_B = heun(x0.w_i_B, d.w_i_B, dw_B, h, second)
-    x.w_i_C = heun(x0.w_i_C, d.w_i_C, dw_C, h, second)
-    w_B, w_C = x.w_i_B + g.k_pPLL * u_q_B, x.w_i_C + g.k_pPLL * u_q_C
-    x.theta_B = heun(x0.theta_B, d.theta_B, w_B, h, second)
-    x.theta_C = heun(x0.theta_C, d.theta_C, w_C, h, second)
-    if not second:
-        d.w_i_B, d.theta_B, d.w_i_C, d.theta_C = dw_B, w_B, dw_C, w_C
-    return w_B, w_C
+def lock(
+    g: Any, w_i0: float, theta0: float, w_i1: float, theta1: float, u_q: float, h: float, second: bool
+) -> tuple[float, float, float, float]:
+    """Advance a PLL; return its integrator and angle, and their slopes, of which the second is its speed (rad/s)."""
+    dw = g.k_iPLL * u_q
+    w_i = heun(w_i0, w_i1, dw, h, second)
+    w = w_i + g.k_pPLL * u_q
+    return w_i, heun(theta0, theta1, w, h, second), dw, w
 
 
 @compiled
@@ -171,13 +166,13 @@ class Gfl(InverterModel, frozen=True, kw_only=True):
 
         # 2: PLL
         u_q = u_A.imag if g.balanced_power else u.imag
-        dw = g.k_iPLL * u_q
-        x.w_i = heun(x0.w_i, d.w_i, dw, h, second)
-        w = x.w_i + g.k_pPLL * u_q
-        x.theta = heun(x0.theta, d.theta, w, h, second)
+        x.w_i, x.theta, dw, w = lock(g, x0.w_i, x0.theta, d.w_i, d.theta, u_q, h, second)
         x.w = w
         if g.balanced_power:
-            w_B, w_C = lock_others(g, x0, x, d, u_B.imag, u_C.imag, h, second)
+            x.w_i_B, x.theta_B, dw_B, w_B = lock(g, x0.w_i_B, x0.theta_B, d.w_i_B, d.theta_B, u_B.imag, h, second)
+            x.w_i_C, x.theta_C, dw_C, w_C = lock(g, x0.w_i_C, x0.theta_C, d.w_i_C, d.theta_C, u_C.imag, h, second)
+            if not second:
+                d.w_i_B, d.theta_B, d.w_i_C, d.theta_C = dw_B, w_B, dw_C, w_C
             x.w = (w + w_B + w_C) / 3.0
         x.f = (g.w_nom + x.w) / (2.0 * pi)
 

@@ -168,6 +168,8 @@ class InverterModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     BOUNDS_AT_REST: ClassVar[tuple[tuple[str, str, str, str], ...]] = ()
     """What is checked at the start: "P", "Q" or "E" (pu), its unit, and the parameters of its lowest and highest."""
 
+    measures_positive_sequence: ClassVar[bool] = False
+
     @staticmethod
     def advance(g: Any, t: Any, x0: Any, x: Any, d: Any, h: float, second: bool) -> None:
         """Take one pass; compiled.
@@ -222,10 +224,6 @@ class InverterModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     def current_limit(self) -> float:
         """Largest current of a phase (pu), which the plant enforces; infinite without."""
         return float(getattr(self, "I_max", inf))
-
-    @property
-    def measures_positive_sequence(self) -> bool:
-        return False
 
     @property
     def holds_terminal(self) -> bool:

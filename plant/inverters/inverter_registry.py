@@ -157,16 +157,12 @@ def given(own: msgspec.Struct) -> dict[str, Any]:
 BOUNDS_OF_SET_POINTS = frozenset({"P_set_lim", "V_set_min", "V_set_max"})  # of ours alone, not of a published model
 
 
-def _published(own: InverterModel) -> dict[str, Any]:
-    return {name: value for name, value in given(own).items() if name not in BOUNDS_OF_SET_POINTS}
-
-
 ParameterSet = dict[str, Any]
 """Parameters by name."""
 
 PUBLISHED_SETS: dict[str, ParameterSet] = {
-    "regfm_a1": _published(REGFM_A1),
-    "regfm_a1_vflag0": _published(REGFM_A1_VFLAG0),
+    name: {key: value for key, value in given(own).items() if key not in BOUNDS_OF_SET_POINTS}
+    for name, own in (("regfm_a1", REGFM_A1), ("regfm_a1_vflag0", REGFM_A1_VFLAG0))
 }
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import pi
-from typing import Any
+from typing import Any, ClassVar
 
 from msgspec.structs import replace
 
@@ -15,6 +15,7 @@ class RegfmA1(GfmDroop, frozen=True, kw_only=True):
     """The grid-forming inverter "gridlabd" whose controller measures power and voltage of the positive sequence."""
 
     model: str = "regfm_a1"
+    measures_positive_sequence: ClassVar[bool] = True
 
     @staticmethod
     def advance(g: Any, t: Any, x0: Any, x: Any, d: Any, h: float, second: bool) -> None:
@@ -22,10 +23,6 @@ class RegfmA1(GfmDroop, frozen=True, kw_only=True):
         I_1 = (t.I_A + A120 * t.I_B + A120.conjugate() * t.I_C) / 3.0
         S = 3.0 * V_1 * I_1.conjugate() / g.S_b
         advance_droop(g, t, x0, x, d, S.real, S.imag, magnitude(V_1) / g.V_b, h, second)
-
-    @property
-    def measures_positive_sequence(self) -> bool:
-        return True
 
 
 REGFM_A1 = RegfmA1(
