@@ -103,18 +103,6 @@ def test_three_islands_each_at_their_own_frequency() -> None:
     assert not any(reading.grid_connected for reading in now.values())
 
 
-def test_an_island_without_gfm_is_dead_and_said() -> None:
-    """A GFL without a GFM stops, its island has no voltage, the event names the load lost, and the rest goes on."""
-    p = plant(*opened(0.1, "13-152"), *opened(0.5, "60-160"))
-
-    run(p, 1.0)
-    events = p.take_events()
-
-    assert [event.kind for event in events] == ["switch", "island", "switch", "dead"]
-    assert "1252 kW" in events[-1].text
-    assert all(reading.P > 0.0 for reading in p.measure().values())
-
-
 def test_a_gfl_alone_stops_and_comes_back() -> None:
     """A GFL cut off from every GFM delivers nothing; reconnected it ramps up again without an error."""
     network = Network(read_feeder("microgrid123", "main"))

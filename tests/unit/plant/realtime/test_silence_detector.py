@@ -9,6 +9,7 @@ from msgspec.structs import replace
 
 from gridpeers.plant.realtime.silence_detector import SilenceDetector
 from gridpeers.wire.messages import AgentStatus
+from tests.golden.messages.message_values import STATUS
 from tests.unit.plant.plant_lab import KEYS
 from tests.unit.plant.realtime.realtime_lab import T_C, Lab, running
 
@@ -18,25 +19,8 @@ MAX_AGE = 0.25
 
 def status(name: str, ages: dict[str, float], seq: int = 0) -> AgentStatus:
     """Status of an agent on its neighbours."""
-    return AgentStatus(
-        sender=name,
-        epoch=1,
-        seq=seq,
-        t=0.0,
-        phase="running",
-        waits_for="",
-        island="",
-        neighbours=tuple(ages),
-        ages=tuple(ages.values()),
-        used=(),
-        received=0,
-        sent=0,
-        rejected=0,
-        lost=0,
-        ticks=0,
-        missed=0,
-        lateness=0.0,
-    )
+    of_neighbours = {"phase": "running", "neighbours": tuple(ages), "ages": tuple(ages.values())}
+    return AgentStatus(**STATUS | of_neighbours, sender=name, epoch=1, seq=seq, t=0.0)
 
 
 def all_tick(lab: Lab, steps: int, names: Iterable[str] = NAMES) -> None:
