@@ -52,18 +52,11 @@ def _corpus() -> list[bytes]:
 
 
 class Mutation:
-    """Make messages from a seed.
-
-    Parameters
-    ----------
-    seed : int
-        The same seed makes the same messages.
-    """
+    """Makes messages from a seed, the same each time."""
 
     def __init__(self, seed: int) -> None:
         self.rng = random.Random(seed)
         self._corpus = _corpus()
-        self._sound = [kind for kind in MESSAGES]
         ways: dict[str, tuple[int, Callable[[], bytes]]] = {
             "random bytes": (1, self._random),
             "random bytes, sealed": (1, lambda: sealed(self._random())),
@@ -116,7 +109,7 @@ class Mutation:
         rng = self.rng
         seq, t = rng.choice(((3, 0.06), (0, 0.0), (rng.randrange(2000), rng.random() * 40.0), (2**53 - 1, 1e9)))
         epoch = rng.choice((EPOCH, EPOCH, EPOCH, 1, 0, EPOCH + 1))
-        return sound(rng.choice(self._sound), sender=rng.choice(SENDERS), epoch=epoch, seq=seq, t=t)
+        return sound(rng.choice(MESSAGES), sender=rng.choice(SENDERS), epoch=epoch, seq=seq, t=t)
 
     def _of_anybody(self) -> bytes:
         return packed(self._tree())
@@ -133,54 +126,39 @@ class Mutation:
     def _with_change(self, tree: dict[str, Any]) -> dict[str, Any]:
         rng, tree = self.rng, dict(tree)
         name = rng.choice(list(tree))
+        held = tree[name]
         match rng.randrange(10):
             case 0:
                 del tree[name]
                 tree.setdefault("type", "State")
             case 1:
-                tree[rng.choice(TEXTS)] = self._value(2)
+                tree[rng.choice(TEXTS)] = self._value(None)
+            case 2 | 3 | 4 if isinstance(held, list | tuple) and held:
+                several = [*held[1:], self._value(held[0])]
+                tree[name] = several * rng.choice((1, 1, 1, 300))
+            case 2 | 3 | 4 if isinstance(held, dict):
+                tree[name] = held | {rng.choice([*held, *TEXTS]): self._value(1.0)}
             case _:
-                held = tree[name]
-                if isinstance(held, list | tuple) and held and rng.random() < 0.5:
-                    several = list(held)
-                    several[rng.randrange(len(several))] = self._value(2)
-                    tree[name] = several * rng.choice((1, 1, 1, 300))
-                elif isinstance(held, dict) and held and rng.random() < 0.5:
-                    tree[name] = held | {rng.choice([*held, *TEXTS]): self._value(3)}
-                else:
-                    tree[name] = self._alike(held) if rng.random() < 0.6 else self._value(3)
+                tree[name] = self._value(held)
         return tree
 
-    def _alike(self, held: Any) -> Any:
+    def _value(self, held: Any) -> Any:
+        """Return a value like the one that is held, or any other."""
         rng = self.rng
+        like: tuple[Any, ...] = ()
         match held:
-            case bool():
-                return not held
             case int():
-                return rng.choice((held + 1, held + 50, 2 * held + 7, 0, 2**40))
+                like = held + 1, held + 50, 2 * held + 7, 2**40, not held
             case float():
-                return rng.choice((held * rng.uniform(-3.0, 3.0), held + rng.uniform(-1.0, 1.0), 0.0, 1e-300, 1e5))
-            case str():
-                return rng.choice(
-                    (*SENDERS, "a", "b", "grid", "open", "close", "down", "stop", "telemetry", "0", "sw1")
+                like = (
+                    held * rng.uniform(-3.0, 3.0),
+                    held + rng.uniform(-1.0, 1.0),
+                    struct.unpack("<d", rng.randbytes(8))[0],
                 )
-            case _:
-                return self._value(3)
-
-    def _value(self, depth: int) -> Any:
-        rng = self.rng
-        match rng.randrange(9 if depth else 6):
-            case 0 | 1 | 2:
-                return rng.choice(NUMBERS)
-            case 3:
-                return rng.choice(TEXTS)
-            case 4:
-                return rng.choice((None, True, False))
-            case 5:
-                return struct.unpack("<d", rng.randbytes(8))[0]
-            case 6:
-                return [self._value(depth - 1) for _ in range(rng.choice((0, 1, 2, 5)))]
-            case 7:
-                return {rng.choice(TEXTS): self._value(depth - 1) for _ in range(rng.choice((0, 1, 3)))}
-            case _:
-                return rng.randbytes(rng.choice((0, 3, 300)))
+            case str():
+                like = *SENDERS, "a", "b", "open", "close", "down", "stop", "telemetry"
+        if like and rng.random() < 0.6:
+            return rng.choice(like)
+        number, text = rng.choice(NUMBERS), rng.choice(TEXTS)
+        others = None, True, [], [number, text], [[text]], {text: number}, {text: {text: [number]}}, rng.randbytes(300)
+        return rng.choice((number, number, text, text, rng.choice(others)))

@@ -25,15 +25,7 @@ PATIENCE = 60.0
 
 
 class Intruder:
-    """A session that is ready to publish anything. Use it as a context.
-
-    Parameters
-    ----------
-    endpoint : str
-        Where the plant listens.
-    credentials : Credentials or None
-        What it shows.
-    """
+    """A session at the plant's endpoint, with what credentials it shows, that is ready to publish anything."""
 
     def __init__(self, endpoint: str, credentials: Credentials | None) -> None:
         listen = ("tcp/127.0.0.1:0",) if credentials is None else ("tls/127.0.0.1:0",)
