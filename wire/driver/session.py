@@ -22,7 +22,6 @@ from gridpeers.wire.driver.inbox import Inbox, Stamped
 from gridpeers.wire.driver.machine import limit
 from gridpeers.wire.driver.zenoh_settings import (
     ONE_THREAD,
-    PROFILES,
     RUNTIME,
     Clock,
     zenoh_settings,
@@ -116,7 +115,7 @@ class Session:
             zenoh.init_log_from_env_or(_REFUSED_LINKS)
         self.inbox = inbox or Inbox(lossless=clock == "simulated")
         self._zenoh = zenoh
-        self._drops = PROFILES[clock].may_drop
+        self._drops = clock == "wall"
         self._publishers: dict[str, zenoh.Publisher] = {}
         self._declared: list[Any] = []
         self._tokens: dict[str, zenoh.LivelinessToken] = {}

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 RUNTIME = "(rx: (worker_threads: 1), acc: (handover: app), net: (handover: app), tx: (handover: app))"
 """Few threads: one that receives, and one pool for the rest. Receiving in that pool too is a tenth faster, but then a
@@ -16,31 +16,7 @@ ONE_THREAD = "(rx: (handover: app), acc: (handover: app), net: (handover: app), 
 a message then wakes one thread of Zenoh instead of two."""
 
 
-class Profile(NamedTuple):
-    """Settings that differ between the two kinds of time."""
-
-    lease: int
-    """Silence (ms) after which a link counts as dead."""
-    retry: tuple[int, int, float]
-    """Time between attempts to connect: first (ms), longest (ms), growth."""
-    timeout: int
-    """Longest time for a link to open (ms)."""
-    wait_before_close: int
-    """How long (us) a message that may not be dropped waits for a link that is full; then the link is closed."""
-    may_drop: bool
-    """Whether messages of which only the newest matters are dropped when a link is full."""
-
-
 Clock = Literal["simulated", "wall"]
-
-PROFILES: dict[Clock, Profile] = {
-    # The lease is a day because it must not decide: the death of a process closes its links at once, the deadlines of
-    # the lock-step detect a frozen one, and a whole run may be frozen for hours.
-    "simulated": Profile(86_400_000, (20, 50, 1.5), 10_000, 5_000_000, may_drop=False),
-    # After a cut Zenoh must renew the link soon; control does not wait for it. A plant that waits for a full link holds
-    # up the control of all others, and Zenoh renews a closed link when its other end reads again.
-    "wall": Profile(2_000, (100, 500, 2.0), 1_000, 200_000, may_drop=True),
-}
 
 MOST_BYTES = 8_000_000
 """Longest message that Zenoh puts together, in bytes; its default is 1 GiB for each link. After a longer one it passes
@@ -51,8 +27,9 @@ def zenoh_settings(
     listen: tuple[str, ...], connect: tuple[str, ...], *, gossip: bool, clock: Clock, meets_all: bool
 ) -> dict[str, Any]:
     """Return Zenoh's configuration of a peer; parameters are those of `gridpeers.wire.driver.session.Session`."""
-    profile = PROFILES[clock]
-    first, longest, growth = profile.retry
+    wall = clock == "wall"
+    first, longest, growth = (100, 500, 2.0) if wall else (20, 50, 1.5)
+    open_within = 1_000 if wall else 10_000
     return {
         "mode": "peer",
         "listen": {"endpoints": list(listen)},
@@ -81,14 +58,18 @@ def zenoh_settings(
             "unicast": {
                 "lowlatency": False,
                 "qos": {"enabled": False},
-                "open_timeout": profile.timeout,
-                "accept_timeout": profile.timeout,
+                "open_timeout": open_within,
+                "accept_timeout": open_within,
             },
             "link": {
                 "tx": {
-                    "lease": profile.lease,
+                    # In simulated time a day, because it must not decide: the death of a process closes its links at
+                    # once, the deadlines of the lock-step detect a frozen one, and a whole run may be frozen for hours.
+                    "lease": 2_000 if wall else 86_400_000,
                     "keep_alive": 4,
-                    "queue": {"congestion_control": {"block": {"wait_before_close": profile.wait_before_close}}},
+                    # A message that may not be dropped waits so long (us) for a full link; then the link is closed. A
+                    # plant that waits holds up the control of all others in real time.
+                    "queue": {"congestion_control": {"block": {"wait_before_close": 200_000 if wall else 5_000_000}}},
                 },
                 "rx": {"max_message_size": MOST_BYTES},
             },
