@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from contextlib import suppress
 
 UNPRINTABLE = (
     "\x00-\x1f\x7f-\x9f\xad\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb\U000e0000-\U000e007f"
@@ -105,26 +104,5 @@ def not_importable(error: ImportError) -> str:
     module = (error.name or "").partition(".")[0]
     if isinstance(error, ModuleNotFoundError):
         package = DISTRIBUTIONS.get(module, module)
-        return f"{package} is not installed; gridpeers needs it: pip install {requirement(module)}"
+        return f"{package} is not installed; gridpeers needs it: pip install {package}"
     return damaged(module or "a package", f"{type(error).__name__}: {error}", "gridpeers")
-
-
-def requirement(module: str) -> str:
-    """Return what pip is to install for a package: its version of ours, or the smallest extra that has it.
-
-    Examples
-    --------
-    >>> requirement("zenoh").startswith("'eclipse-zenoh"), requirement("perfetto"), requirement("torch")
-    (True, "'gridpeers[trace]'", 'torch')
-    """
-    from importlib import metadata  # it brings a mail reader; starts need none of this
-
-    package = DISTRIBUTIONS.get(module, module).partition(" ")[0]
-    required: list[str] = []
-    with suppress(metadata.PackageNotFoundError):  # run from its sources
-        required = metadata.requires("gridpeers") or []
-    named = [text for text in required if re.split(r"[\[<>=~! ;]", text)[0].lower() == package.lower()]
-    extras, all_extras = (re.findall(r"extra == [\"']([\w-]+)", " ".join(texts)) for texts in (named, required))
-    if named and not extras:
-        return f"'{named[0].partition(';')[0].strip()}'"
-    return f"'gridpeers[{min(extras, key=all_extras.count)}]'" if extras else package

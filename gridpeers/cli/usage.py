@@ -19,7 +19,7 @@ from gridpeers.scenarios.console import terminal as terminal
 from gridpeers.wire.driver.command_line import command_line
 from gridpeers.wire.driver.ending import stop_handler
 from gridpeers.wire.driver.machine import too_few_files
-from gridpeers.wire.wording import DISTRIBUTIONS, InputError, damaged, printable, requirement, suggestion
+from gridpeers.wire.wording import DISTRIBUTIONS, InputError, damaged, printable, suggestion
 
 if TYPE_CHECKING:
     from gridpeers.plant.equipment import Tables
@@ -97,7 +97,7 @@ def require(modules: Mapping[str, str], install: str = "") -> None:
         lines = [
             f"{DISTRIBUTIONS.get(name, name)} is not installed; it is needed for {modules[name]}" for name in lacking
         ]
-        again = f"install what is missing: pip install {' '.join(map(requirement, lacking))}"
+        again = f"install what is missing: pip install {' '.join(DISTRIBUTIONS.get(name, name) for name in lacking)}"
         fail(*lines, install or again)
 
 
