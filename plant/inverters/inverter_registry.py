@@ -120,6 +120,16 @@ def with_own(common: InverterModel, own: Mapping[str, Any]) -> InverterModel:
 # ------------------------------------------------------ sets of parameters, and parameters of single inverters
 
 
+def own_parameters(values: Mapping[str, Any]) -> msgspec.Struct:
+    """Return the parameters of a single inverter from what it gives, in any process: its model may bring others."""
+    made: msgspec.Struct = chosen_own(values)(**values)
+    return made
+
+
+def _made_again(own: msgspec.Struct) -> tuple[Any, ...]:
+    return own_parameters, (given(own),)
+
+
 @cache
 def optional(*models: type[InverterModel]) -> type[msgspec.Struct]:
     """Return a struct of the parameters of some models, each with its unit and range, and None where it gives none."""
@@ -131,7 +141,7 @@ def optional(*models: type[InverterModel]) -> type[msgspec.Struct]:
         for name, field in fields.items()
     }
     rules: Any = {"frozen": True, "forbid_unknown_fields": True, "kw_only": True, "omit_defaults": True}
-    words = {"__doc__": "Some parameters of an inverter; None gives nothing."}
+    words = {"__doc__": "Some parameters of an inverter; None gives nothing.", "__reduce__": _made_again}
     return msgspec.defstruct(
         "OwnParameters", [(name, it, None) for name, it in types.items()], **rules, module=__name__, namespace=words
     )

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import pickle
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -147,6 +150,11 @@ def test_a_model_of_a_user_gives_the_same_bytes(tmp_path: Path) -> None:
     assert np.ptp(ours.history["inv1", "f"].to_numpy()) > 0.01
     again = gp.read(own.save(tmp_path / "saved"))
     assert again.sha256 == ours.sha256
+    spec = gp.load(path).spec
+    (tmp_path / "sent").write_bytes(pickle.dumps(spec))  # as a sweep sends it to its workers
+    words = [sys.executable, "-c", "import pickle; print(pickle.load(open('sent', 'rb')).plant.inverter['inv4'])"]
+    received = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=True).stdout
+    assert received.strip() == str(spec.plant.inverter["inv4"])
 
 
 def test_what_is_wrong_with_a_model_is_said_at_its_key(tmp_path: Path) -> None:
