@@ -67,9 +67,6 @@ class EngineProcess:
             process, folder = self._running[os.getpid()]
             try:
                 process.send({"path": str(path), **request})
-                # meanwhile: loading it takes longer than the engine takes to read a small file
-                import gridpeers.plant.network  # noqa: F401
-
                 answer = process.answer(monotonic() + LONGEST)
                 self.printed = process.printed()
                 if answer is None:

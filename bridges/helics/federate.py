@@ -50,11 +50,7 @@ SET_POINTS = (Topic("P_set", "double", "W"), Topic("V_set", "double", "V"))
 
 
 def topics(prefix: str, inverters: Iterable[str], *groups: Iterable[Topic]) -> list[Topic]:
-    """Return the topics of some groups for each of some inverters.
-
-    >>> topics("grid", ["inv1"], SET_POINTS)[0]
-    Topic(key='grid/inv1/P_set', type='double', unit='W')
-    """
+    """Return the topics of some groups for each of some inverters, as `grid/inv1/P_set`."""
     return [
         topic._replace(key=f"{prefix}/{inverter}/{topic.key}")
         for inverter in inverters

@@ -44,12 +44,7 @@ def read_opendss(
 
 
 def crashed(how: str, at: str, name: str) -> str:
-    """Return one line on an engine that ended while it read a script, or was loaded, where `at` is empty.
-
-    >>> crashed("was killed by SIGSEGV", "lines.dss:3: New Line.x", "Master.dss")
-    'lines.dss:3: the OpenDSS engine itself crashes (its process was killed by SIGSEGV); change this, or take it out; \
-if it is sound, take out what comes before it, half by half, to find the cause: New Line.x'
-    """
+    """Return one line on an engine that ended while it read a script, or was loaded, where `at` is empty."""
     if not at:
         return damaged("dss", f"its process {how}", "the import of .dss files")
     where, _, command = printable(at).partition(": ")
