@@ -151,6 +151,7 @@ def _of(view: RecordView) -> dict[str, Any]:
         "gridpeers": info.versions.get("gridpeers", ""),
         "names": info.inverters,
         "agents": view.record.agents,
+        "shared": [(quantity.name, quantity.unit) for quantity in view.shared],
         "f_nom": next((config.f_nom for config in info.agents), 0.0),
     }
 

@@ -7,7 +7,8 @@ one time to the next but what speeds it up, so a time has the same frame whichev
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import takewhile
 from math import cos, pi, sin
 
@@ -24,8 +25,8 @@ from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.viewer.link_states import LinkView
 from gridpeers.viewer.record_moments import AgentMoment, AgentMoments, LinkFaults, PlantRows
 from gridpeers.viewer.run_view import Cursor, EventView, Frame, LivenessView, RunView
-from gridpeers.viewer.strips import LENGTH
-from gridpeers.wire.messages import PLANT, AgentStatus, Pacing, PlantEvent, Telemetry
+from gridpeers.viewer.strips import LENGTH, Point
+from gridpeers.wire.messages import PLANT, AgentStatus, Pacing, PlantEvent, State, Telemetry
 
 WINDOW = 1.0
 
@@ -42,6 +43,8 @@ class RecordView:
         self._rows = PlantRows(record, self._configs)
         self._moments = AgentMoments(record)
         self._faults = LinkFaults(record)
+        self.shared = info.agents[0].control.law.shared if info.agents else ()
+        """What the law shares beside the paper's values."""
         self._parts = 0
         self._events: list[EventView] = []
         self._plant_events: list[PlantEvent] = []
@@ -101,7 +104,7 @@ class RecordView:
         links: dict[str, tuple[LinkView, ...]] = dict.fromkeys(self._configs, ()) | frame.links
         stale = row is None or t - row > self._rows.longest_gap
         text = "There are no rows of this time in the record." if stale else "record"
-        points = tuple(self._rows.points(max(since, t - LENGTH), t))
+        points = tuple(self._with_shared(self._rows.points(max(since, t - LENGTH), t)))
         return replace(
             frame,
             live=LivenessView(word="record", text=text),
@@ -115,6 +118,23 @@ class RecordView:
             events=(),
             links=links,
         )
+
+    def _with_shared(self, points: Sequence[Point]) -> Iterator[Point]:
+        """Yield points with what each inverter shared last, one quantity after the other; None once it is too old."""
+        if not (self.shared and points):
+            yield from points
+            return
+        longest = max(WINDOW, 2.0 * self.record.info.T_c)
+        states = self.record.index.messages(State, None, points[0][0] - longest, points[-1][0])
+        coming = deque(sorted(states, key=lambda state: state.t))
+        last: dict[str, State] = {}
+        for t, values in points:
+            while coming and coming[0].t <= t + 1e-9:
+                state = coming.popleft()
+                last[state.sender] = state
+            fresh = {name: state.shared for name, state in last.items() if t - state.t <= longest}
+            shared = (fresh.get(name, {}).get(it.name) for it in self.shared for name in self.record.info.inverters)
+            yield t, (*values, *shared)
 
     def decision(self, agent: str, t: float) -> str:
         self._read_events()

@@ -12,11 +12,17 @@ const QUANTITIES = [
 
 export class Strips {
   constructor(holder) {
-    this.points = []; this.names = []; this.lit = ""; this.ranges = {}; this.end = null; this.length = LENGTH;
-    this.charts = QUANTITIES.map((quantity, i) => {
+    this.points = []; this.names = []; this.lit = ""; this.ranges = {}; this.end = null; this.length = LENGTH; this.holder = holder;
+    this.setShared([]);
+  }
+  // shared: [name, unit] of what the law shares, a value of each inverter behind the others of a point
+  setShared(shared) {
+    const quantities = [...QUANTITIES, ...shared.map(([label, unit]) => ({ key: `shared ${label}`, label, unit, digits: 4, least: 0 }))];
+    this.holder.replaceChildren();
+    this.charts = quantities.map((quantity, i) => {
       const canvas = make("canvas", { role: "img", ariaLabel: `${quantity.label}, last ${LENGTH} s; the table of agents has the present values` }), now = make("span");
-      holder.append(make("figure", {}, make("figcaption", {}, quantity.label + (quantity.unit ? ` (${quantity.unit})` : ""), now), canvas));
-      return { quantity, canvas, now, axis: i === QUANTITIES.length - 1 };
+      this.holder.append(make("figure", {}, make("figcaption", {}, quantity.label + (quantity.unit ? ` (${quantity.unit})` : ""), now), canvas));
+      return { quantity, canvas, now, axis: i === quantities.length - 1 };
     });
   }
   clear() { this.points = []; this.ranges = {}; }
@@ -38,7 +44,8 @@ export class Strips {
       const ratio = devicePixelRatio || 1, w = canvas.clientWidth, h = canvas.clientHeight;
       if (canvas.width !== Math.round(w * ratio) || canvas.height !== Math.round(h * ratio)) { canvas.width = Math.round(w * ratio); canvas.height = Math.round(h * ratio); }
       const g = canvas.getContext("2d"); g.setTransform(ratio, 0, 0, ratio, 0, 0); g.clearRect(0, 0, w, h);
-      const columns = q < 4 ? [...Array(n).keys()].map(i => q * n + i) : [4 * n + q - 4];
+      const each = q < 4 || q > 5, first = q < 4 ? q * n : q > 5 ? 4 * n + 2 + (q - 6) * n : 4 * n + q - 4;
+      const columns = each ? [...Array(n).keys()].map(i => first + i) : [first];
       const [low, high] = this.range(quantity, columns);
       const top = 20, bottom = h - (axis ? AXIS : 4), x = t => LEFT + (w - LEFT - RIGHT) * (t - start) / this.length;
       const y = v => bottom - (bottom - top) * (v - low) / (high - low);
@@ -62,9 +69,9 @@ export class Strips {
       const many = columns.length > 20;
       const order = columns.map((_, i) => i).sort((a, b) => (this.names[a] === this.lit) - (this.names[b] === this.lit));
       for (const i of order) {
-        const column = columns[i], lit = this.names[i] === this.lit && q < 4;
-        g.strokeStyle = q < 4 ? colours[i] : ink; g.lineWidth = lit ? 3 : many ? .8 : 1.5;
-        g.globalAlpha = this.lit && q < 4 && !lit ? .18 : many ? .55 : .95;
+        const column = columns[i], lit = this.names[i] === this.lit && each;
+        g.strokeStyle = each ? colours[i] : ink; g.lineWidth = lit ? 3 : many ? .8 : 1.5;
+        g.globalAlpha = this.lit && each && !lit ? .18 : many ? .55 : .95;
         g.beginPath();
         let pen = false;
         for (const [t, values] of this.points) {
@@ -97,7 +104,7 @@ export class Strips {
     for (const [, values] of this.points) for (const c of columns) { const v = values[c]; if (v !== null && v !== undefined) { if (v < low) low = v; if (v > high) high = v; } }
     if (!(low <= high)) return this.ranges[quantity.key] || [0, 1];
     if (quantity.zero) low = 0;
-    const pad = Math.max((high - low) * .12, quantity.least / 2), before = this.ranges[quantity.key];
+    const pad = Math.max((high - low) * .12, (quantity.least || 1e-3 * Math.max(Math.abs(low), Math.abs(high), 1e-6)) / 2), before = this.ranges[quantity.key];
     if (before && before[0] <= low && before[1] >= high && (before[1] - before[0]) < 2.2 * (high - low + 2 * pad)) return before;
     return this.ranges[quantity.key] = [quantity.zero ? 0 : low - pad, high + pad];
   }

@@ -177,7 +177,7 @@ function fill(select, options) { select.replaceChildren(...options.map(([value, 
 // ---- a record
 function ask(question) { if (S.socket?.readyState !== 1) return false; S.socket.send(JSON.stringify(question)); return true; }
 function takeRecord(record) {
-  clear(); S.frame = null; strips.names = []; player.open(record);
+  clear(); S.frame = null; strips.names = []; strips.setShared(record.shared); player.open(record);
   entitle(record.scenario, record.case);
   if (!record.agents.includes(S.chosen)) choose("");
 }

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import shutil
+from math import isnan
 from pathlib import Path
 
 import msgspec
 import pytest
 
 from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.results.shared_quantities import read_shared
 from gridpeers.viewer.record_view import RecordView
 from gridpeers.viewer.run_view import Frame
 from tests.record.recorded_runs import recorded_in_chunks, recorded_run
@@ -94,6 +96,23 @@ def test_the_links_are_as_the_decisions_have_them(record: RunRecord, view: Recor
                 assert age is not None
                 assert link.age == pytest.approx(age, abs=0.0006)
                 assert (link.state == "used") == (inputs[name].unused == "")
+
+
+def test_what_a_law_shares_is_in_the_strips_too(tmp_path: Path) -> None:
+    """Behind the values of the paper, quantity by quantity, as the record has it at the time of each point."""
+    text = ISLANDED.replace("1.6", "0.6").replace('"full"', '"full"\nlaw = "centralised"')
+    record = recorded_in_chunks(text, tmp_path)
+    view, shared = RecordView(record), read_shared(record)
+    names = [quantity.name for quantity in view.shared]
+    whole = view.frame(0.6).points
+
+    assert names == ["omega", "E", "v"]
+    assert whole[0][1][4 * 9 + 2 :] == (None,) * 27, "the law is on hold"
+    for t, values in (point for point in whole if point[0] > 0.3):
+        row = shared.loc[: t + 1e-9].iloc[-1]
+        expected = [row.get((name, inverter)) for name in names for inverter in record.info.inverters]
+        assert values[4 * 9 + 2 :] == tuple(None if value is None or isnan(value) else value for value in expected)
+    assert view.frame(0.6, since=whole[-4][0]).points == whole[-3:]
 
 
 def test_faults_of_links_are_those_of_the_time(view: RecordView) -> None:
