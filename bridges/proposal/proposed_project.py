@@ -13,7 +13,6 @@ from gridpeers.cli.commands.feeder_commands import folder_of, read_script, save_
 from gridpeers.cli.progress import TRYING, explained
 from gridpeers.cli.usage import fail
 from gridpeers.feeder import Feeder
-from gridpeers.plant.equipment.neutrals import returns_in_words
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.schema.loading import start_problem
 from gridpeers.wire.driver.command_line import command_line
@@ -80,8 +79,6 @@ def propose_project(folder: Path, script: Path, switches: list[str], leave_out: 
     save_readable(with_inverters, folder / folder_of(feeder.name), script.name)
     with explained(lambda: typer.echo(TRYING)):
         _write_scenario(folder / "islanding.toml", feeder, proposal)
-    for text in returns_in_words(with_inverters):
-        typer.echo(f"NOTE  {text}")
     rated = sum(row.P_rated for row in proposal.inverters) / 1e3
     typer.echo(
         f"{feeder.name}: switch {proposal.switch} islands {proposal.load / 1e3:.0f} kW of load; "

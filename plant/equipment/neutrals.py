@@ -6,14 +6,11 @@ from collections.abc import Iterable, Iterator, Mapping
 
 from gridpeers.plant.equipment import PHASES, Bus, Switch, Tables
 from gridpeers.plant.equipment.imported_equipment import LinearElement, LoadPart
-from gridpeers.wire.wording import first_of
 
 EARTH = "earth"  # in place of a neutral: the inverter returns through earth, though its bus has a neutral
 BETWEEN_PHASES = 1.3
 """Voltage of a load (pu of its bus, line-to-neutral) from which on it is between phases: there it is 1.73, or 2 between
 the legs of a split-phase service."""
-
-SHOWN = 6  # inverters that a sentence names
 
 Node = tuple[str, str]
 
@@ -35,21 +32,6 @@ def neutral_for(text: str, bus: Bus, phases: str, neutral: str) -> str:
             f'neutral "{text}": bus "{bus.name}" has no such neutral; possible: {", ".join([*possible, EARTH])}'
         )
     return text
-
-
-def returns_in_words(feeder: Tables) -> list[str]:
-    """Return sentences that say where the inverters of a feeder with neutrals return; none of another feeder."""
-    if not (neutrals := neutrals_of(feeder)):
-        return []
-    rows = (*feeder.inverters, *feeder.spares)
-    to = {
-        "to the neutral of their bus": [row.name for row in rows if row.neutral],
-        "through earth, though their bus has a neutral": [
-            row.name for row in rows if not row.neutral and row.bus in neutrals
-        ],
-        "through earth, as their bus has no neutral": [row.name for row in rows if row.bus not in neutrals],
-    }
-    return [f"inverters that return {where}: {first_of(names, SHOWN)}" for where, names in to.items() if names]
 
 
 def neutrals_by_bus(

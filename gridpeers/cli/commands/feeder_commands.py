@@ -13,7 +13,6 @@ from gridpeers.feeder import Feeder, is_foreign
 from gridpeers.output_folders import files_written, shown, whole_folder, write_whole
 from gridpeers.plant.equipment.connectivity import Connectivity
 from gridpeers.plant.equipment.imported_equipment import is_behind
-from gridpeers.plant.equipment.neutrals import returns_in_words
 from gridpeers.plant.tables import FeederError, feeders
 from gridpeers.rooms import ROOMS
 from gridpeers.wire.wording import counted
@@ -71,8 +70,6 @@ def check(feeder: FeederName, load_set: LoadSet = None, switch: Switches = None,
             cut += [row.name for row in tables.inverters if row.bus in behind]
             state = f"closed; open, it cuts off {', '.join(cut)}"
         typer.echo(f"switch {each.alias or each.name}: {state}")
-    for text in returns_in_words(tables):
-        typer.echo(text)
 
 
 @app.command()
