@@ -15,9 +15,9 @@ from gridpeers.scenario import Scenario, as_scenario, plain
 from gridpeers.scenarios.results.metric import METRICS, unit_of
 from gridpeers.scenarios.schema.plugin_keys import check_portable, metrics_of
 from gridpeers.scenarios.schema.scenario_errors import Problems, ScenarioError
+from gridpeers.scenarios.sweep.axes import Sweep
 from gridpeers.scenarios.sweep.study import results_frame
 from gridpeers.scenarios.sweep.sweep_case import FATE, SweepRow, run_one
-from gridpeers.scenarios.sweep.sweep_model import Sweep
 from gridpeers.scenarios.sweep.sweep_reading import BaseScenario, Plan, plan_of
 from gridpeers.scenarios.sweep.workers import cores, on_workers
 from gridpeers.wire.wording import suggestion

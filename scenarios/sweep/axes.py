@@ -1,20 +1,86 @@
-"""The axes of a sweep: each is a list of settings, and every combination of them is a sample."""
+"""A sweep file as types, and its axes: each is a list of settings, and every combination of them is a sample."""
 
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import partial
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import combinations, product
-from typing import Any, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
+import msgspec
 import numpy as np
 
 from gridpeers.scenarios.schema.scenario_errors import Problems
 from gridpeers.scenarios.sweep.paths import flatten
-from gridpeers.scenarios.sweep.sweep_model import GraphAxis, Sweep, ValueRange
 from gridpeers.wire.schema.table_reading import read_table
-from gridpeers.wire.schema.table_schema import fields_of, problems_of
+from gridpeers.wire.schema.table_schema import Example, Problem, Range, fields_of, problems_of
+
+MOST_POINTS = 1_000_000  # Most values of one range: more are a slip, and would fill the memory before any message
+
+
+class ValueRange(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A range of values in place of their list."""
+
+    low: float = msgspec.field(name="from")
+    """First value."""
+    high: float = msgspec.field(name="to")
+    """Last value."""
+    count: Annotated[int, Range(2, MOST_POINTS)]
+    """How many values."""
+    spacing: Literal["lin", "log"] = "lin"
+    """Whether their differences or their ratios are equal."""
+
+    def relations(self) -> list[Problem]:
+        if self.low == self.high:
+            return [Problem("", f"a range goes from one number to another, got {self.low:g} twice")]
+        if self.spacing == "log" and min(self.low, self.high) <= 0:
+            text = f"spacing log needs two numbers above 0, got {self.low:g} and {self.high:g}; or use spacing lin"
+            return [Problem("", text)]
+        return []
+
+    def listed(self) -> list[float]:
+        """Return the values, rounded to 12 digits: 0.1 + 0.2 is meant to be 0.3."""
+        log, ratio = self.spacing == "log", self.high / self.low if self.low else 0.0
+        fractions = [i / (self.count - 1) for i in range(self.count)]
+        raw = [self.low * ratio**x if log else self.low + (self.high - self.low) * x for x in fractions]
+        return [float(f"{value:.12g}") for value in raw]
+
+
+class GraphAxis(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Table `[graph]`: random connected communication graphs of all inverters, for every case of the sweep."""
+
+    links: Annotated[tuple[int, ...], Example("[8, 12, 36]")] = ()
+    """Numbers of links, e.g. [8, 12, 36]."""
+    per_count: Annotated[int, Range(1, 10_000)] = 10
+    """Different graphs for each number of links; fewer where there are no more."""
+    seed: int = 1
+    """Seed of the graphs. A graph depends on it, its number of links and its own number, and on nothing else here."""
+
+
+class Sweep(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The keys outside any table come first in the file."""
+
+    name: str = ""
+    """Name of the results' folder; without it, that of the file."""
+    title: str = ""
+    """One line on the study."""
+    scenario: str
+    """The scenario that is varied: of the catalogue, or the path of a file, seen from this one."""
+    cases: Annotated[tuple[str, ...], Example('["IV"]')] = ()
+    """Cases that are run for every sample; all when left out."""
+    seeds: Annotated[int, Range(1, 10_000)] = 1
+    """How many seeds every point is run with: the scenario's, and those that follow it."""
+    max_runs: Annotated[int, Range(low=1)] = 20_000
+    """A sweep with more runs than this is refused as a slip; raise it when it is meant."""
+    set: dict[str, Any] = {}
+    """Table `[set]`: keys of the scenario that are other than there, the same in every run."""
+    grid: dict[str, Any] = {}
+    """Table `[grid]`: every combination of these keys' values: [...] or {from, to, count, spacing = "lin" | "log"}."""
+    zip: dict[str, Any] = {}
+    """Table `[zip]`: keys that go together, first values with first, so all of one length."""
+    graph: GraphAxis = GraphAxis()
+    """Table `[graph]`."""
+
 
 Edges = tuple[tuple[int, int], ...]  # Pairs i < j, sorted
 
@@ -73,11 +139,12 @@ class Setting(NamedTuple):
 
 
 class Axis(NamedTuple):
-    """Keys that vary together; its points are of use only when no problem is noted."""
+    """Keys that vary together."""
 
     origin: Mapping[str, str]
     """Key of the sweep file by key of the scenario."""
-    settings: Callable[[], Sequence[Setting]]
+    settings: Sequence[Setting]
+    """Its points, of use only when no problem is noted."""
 
 
 def samples(settings: Iterable[Sequence[Setting]]) -> Iterator[Setting]:
@@ -89,28 +156,22 @@ def samples(settings: Iterable[Sequence[Setting]]) -> Iterator[Setting]:
         )
 
 
-def of_values(values: Mapping[str, Sequence[Any]]) -> Sequence[Setting]:
-    """Return the points of keys that go together, first values with first."""
-    rows = [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)]
-    return [Setting(row, row) for row in rows]
+def axis_of(values: Mapping[str, Sequence[Any]], origin: Mapping[str, str]) -> Axis:
+    """Return the axis of keys that go together, first values with first."""
+    rows = [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=False)]
+    return Axis(origin, [Setting(row, row) for row in rows])
 
 
 def own_axes(sweep: Sweep, problems: Problems) -> list[Axis]:
     """Return the axes of the tables [grid] and [zip]."""
-    grid = [
-        Axis({path: f"grid.{path}"}, partial(of_values, {path: values}))
-        for path, values in _values_of(sweep.grid, "grid", problems).items()
-    ]
-    return [*grid, *_zip_axes(sweep.zip, problems)]
-
-
-def _zip_axes(table: Mapping[str, Any], problems: Problems) -> list[Axis]:
-    values = _values_of(table, "zip", problems)
-    counts = {path: len(items) for path, items in values.items()}
+    grid = _values_of(sweep.grid, "grid", problems)
+    axes = [axis_of({path: values}, {path: f"grid.{path}"}) for path, values in grid.items()]
+    together = _values_of(sweep.zip, "zip", problems)
+    counts = {path: len(items) for path, items in together.items()}
     if len(set(counts.values())) > 1 and all(counts.values()):
         listed = ", ".join(f"{path} has {count}" for path, count in counts.items())
         problems.add("zip", f"keys that go together need equally many values, but {listed}; for all combinations: grid")
-    return [Axis({path: f"zip.{path}" for path in values}, partial(of_values, values))] if values else []
+    return [*axes, axis_of(together, {path: f"zip.{path}" for path in together})] if together else axes
 
 
 def graph_axes(axis: GraphAxis, inverters: Sequence[str], cases: Sequence[str], problems: Problems) -> list[Axis]:
@@ -121,23 +182,19 @@ def graph_axes(axis: GraphAxis, inverters: Sequence[str], cases: Sequence[str], 
             why = "fewer cannot join them" if links < low else "there are no more pairs"
             problems.add("graph.links", f"{n} inverters have {low} to {high} links, got {links}: {why}")
     keys = [f"case.{case}.{key}" for case in cases for key in ("graph", "links")]
-    return [Axis(dict.fromkeys(keys, "graph"), lambda: _graphs(axis, inverters, cases))] if axis.links else []
-
-
-def _graphs(axis: GraphAxis, inverters: Sequence[str], cases: Sequence[str]) -> Sequence[Setting]:
-    points = []
-    for links in axis.links:
-        for number, edges in enumerate(connected_graphs(len(inverters), links, axis.per_count, axis.seed)):
+    points = list[Setting]()
+    for links in () if problems.any else axis.links:
+        for number, edges in enumerate(connected_graphs(n, links, axis.per_count, axis.seed)):
             pairs = [[inverters[i], inverters[j]] for i, j in edges]
             shown = {
                 "graph.links": links,
                 "graph.number": number,
-                "graph.lambda_2": algebraic_connectivity(len(inverters), edges),
+                "graph.lambda_2": algebraic_connectivity(n, edges),
                 "graph.edges": " ".join("-".join(pair) for pair in pairs),
             }
             put = {f"case.{case}.graph": "links" for case in cases} | {f"case.{case}.links": pairs for case in cases}
             points.append(Setting(shown, put))
-    return points
+    return [Axis(dict.fromkeys(keys, "graph"), points)] if axis.links else []
 
 
 _RANGE = tuple(field.key for field in fields_of(ValueRange))

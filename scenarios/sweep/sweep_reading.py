@@ -23,9 +23,8 @@ from gridpeers.scenarios.schema import ScenarioError, ScenarioModel, find_scenar
 from gridpeers.scenarios.schema.loading import check_tables, find_file, read_toml
 from gridpeers.scenarios.schema.participants import inverters_of
 from gridpeers.scenarios.schema.scenario_errors import Problems
-from gridpeers.scenarios.sweep.axes import Axis, Setting, graph_axes, of_values, own_axes, samples
+from gridpeers.scenarios.sweep.axes import Axis, Setting, Sweep, axis_of, graph_axes, own_axes, samples
 from gridpeers.scenarios.sweep.paths import PathError, Tree, flatten, put, steps
-from gridpeers.scenarios.sweep.sweep_model import Sweep
 from gridpeers.wire.schema.table_schema import problems_of
 
 
@@ -180,9 +179,9 @@ def _plan(sweep: Sweep, text: str, axes: Sequence[Axis], base: BaseScenario, pro
     axes = [*axes, *graph_axes(sweep.graph, names, cases, problems)]
     if sweep.seeds > 1:
         seeds = range(scenario.seed, scenario.seed + sweep.seeds)
-        axes.append(Axis({"seed": "seeds"}, lambda: of_values({"seed": seeds})))
-    origin = _origins([Axis({path: f"set.{path}" for path in fixed}, lambda: ()), *axes], problems)
-    points = [] if problems.any else [axis.settings() for axis in axes]
+        axes.append(axis_of({"seed": seeds}, {"seed": "seeds"}))
+    origin = _origins([Axis({path: f"set.{path}" for path in fixed}, ()), *axes], problems)
+    points = [] if problems.any else [axis.settings for axis in axes]
     count = math.prod(map(len, points))
     size = count * len(cases)
     settings = list(islice(samples(points), count if size <= sweep.max_runs else 1))
