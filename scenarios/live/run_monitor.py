@@ -6,7 +6,7 @@ Pure: messages and the time are arguments.
 from __future__ import annotations
 
 import re
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Any
@@ -21,47 +21,46 @@ from gridpeers.wire.messages import MOST_INVERTERS, AgentStatus, Pacing, PlantEv
 
 
 class RunTokens:
-    """The tokens that are there, as far as there is room for them."""
+    """The tokens that are there, as far as there is room for those of each kind."""
 
     def __init__(self, run: str) -> None:
         self._run, self._keys = run, Keys(run)
-        self.epochs: set[int] = set()
-        self.agents: dict[str, set[str]] = {}
-        self._others: set[str] = set()
-        self._noted: set[str] = set()
+        self._plants: dict[str, int] = {}
+        """Epoch of each plant of the run, by its token."""
+        self._others: dict[str, str] = {}
+        """Run of each other plant, by its token."""
+        self._names: dict[str, str] = {}
+        """Name of each process of an agent, by its token."""
+        self.agents = Counter[str]()
+        """How many processes have the name of each agent."""
+
+    @property
+    def epochs(self) -> set[int]:
+        return set(self._plants.values())
 
     @property
     def runs(self) -> set[str]:
-        runs = set(map(run_of_plant, self._others))
-        return runs | {self._run} if self.epochs else runs
+        return {*self._others.values(), *([self._run] if self._plants else ())}
 
     def appeared(self, key: str) -> None:
         match self._keys.parts(key):
             case ("alive", "plant", part) if (epoch := epoch_of(part)) is not None:
-                self.epochs.add(epoch)
-            case ("alive", "agent", name, instance) if (
-                len(self.agents[name]) < MOST_PROCESSES if name in self.agents else len(self.agents) < MOST_INVERTERS
+                self._plants[key] = epoch
+            case ("alive", "agent", name, _) if key not in self._names and (
+                self.agents[name] < MOST_PROCESSES if name in self.agents else len(self.agents) < MOST_INVERTERS
             ):
-                self.agents.setdefault(name, set()).add(instance)
-            case () if run_of_plant(key):
-                self._others.add(key)
-            case _:
-                return
-        self._noted.add(key)
+                self._names[key] = name
+                self.agents[name] += 1
+            case () if run := run_of_plant(key):
+                self._others[key] = run
 
     def vanished(self, key: str) -> None:
-        if key not in self._noted:
-            return
-        self._noted.discard(key)
-        match self._keys.parts(key):
-            case ("alive", "plant", part):
-                self.epochs.discard(int(part))
-            case ("alive", "agent", name, instance):
-                self.agents[name].discard(instance)
-                if not self.agents[name]:
-                    del self.agents[name]
-            case _:
-                self._others.discard(key)
+        self._plants.pop(key, None)
+        self._others.pop(key, None)
+        if (name := self._names.pop(key, None)) is not None:
+            self.agents[name] -= 1
+            if not self.agents[name]:
+                del self.agents[name]
 
 
 class PlantStatus(msgspec.Struct, frozen=True, kw_only=True):

@@ -207,7 +207,7 @@ def test_a_name_that_many_claim_keeps_no_other_out() -> None:
 
     assert tokens.epochs == set(range(100))
     assert tokens.runs == {"lab", *(f"run{number}" for number in range(100))}
-    assert {name: len(of) for name, of in tokens.agents.items()} == {"inv1": MOST_PROCESSES, "inv2": 1}
+    assert dict(tokens.agents) == {"inv1": MOST_PROCESSES, "inv2": 1}
 
 
 def test_what_has_gone_leaves_nothing() -> None:
@@ -225,7 +225,7 @@ def test_what_has_gone_leaves_nothing() -> None:
     tokens.vanished(Keys("mine").alive_plant(1))
 
     assert tokens.runs == {"lab", "mine"}
-    assert {name: len(of) for name, of in tokens.agents.items()} == {"who0": MOST_PROCESSES, "inv1": 1}
+    assert dict(tokens.agents) == {"who0": MOST_PROCESSES, "inv1": 1}
     for key in there:
         tokens.vanished(key)
     assert (tokens.epochs, tokens.runs, tokens.agents) == (set(), set(), {})
