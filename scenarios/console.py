@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Container, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
@@ -66,14 +66,3 @@ def duration(seconds: float) -> str:
     """Return a length of time (s) in words, of two digits: more would promise too much."""
     unit, name = next((unit, name) for bound, unit, name in _UNITS if seconds < bound)
     return f"{float(f'{seconds / unit:.2g}'):g} {name}"
-
-
-def aligned(rows: Sequence[Sequence[str]], right: Container[int]) -> Iterator[str]:
-    """Yield the lines of a table, two blanks between its columns; `right` has those that end in line."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        cells = (
-            cell.rjust(width) if i in right else cell.ljust(width)
-            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
-        )
-        yield "  ".join(cells).rstrip()

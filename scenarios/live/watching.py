@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.scenarios.console import aligned, short
+from gridpeers.scenarios.console import short, text_of
 from gridpeers.scenarios.live.run_client import RunClient
 from gridpeers.scenarios.live.run_monitor import InverterStatus, RunMonitor, Snapshot
 from gridpeers.scenarios.live.run_requests import plant_status, read_config
@@ -86,19 +86,15 @@ def head(snapshot: Snapshot) -> str:
 
 def plain(snapshot: Snapshot) -> str:
     """Return the text for `gridpeers status`: no colour, no line drawing, columns that `awk` can cut."""
-    columns = _columns(snapshot)
-    titles = [f"{column.head} {column.unit}".strip() for column in columns]
-    rows = [titles, *([column.text(one) for column in columns] for one in snapshot.inverters)]
-    text = [head(snapshot)]
-    text += aligned(rows, right=[i for i, column in enumerate(columns) if column.right]) if snapshot.inverters else ()
-    return "\n".join([*text, *snapshot.events[-EVENTS:]]) + "\n"
+    return text_of(lambda console: console.print(table(snapshot, " ")))
 
 
-def table(snapshot: Snapshot) -> Group:
+def table(snapshot: Snapshot, before_unit: str = "\n") -> Group:
+    """Return a line per agent below the head of a run, and its latest events."""
     grid = Table(box=None, padding=(0, 2, 0, 0), header_style="bold")
     columns = _columns(snapshot)
     for column in columns:
-        title = f"{column.head}\n{column.unit}" if column.head else ""
+        title = f"{column.head}{before_unit}{column.unit}".rstrip(" ")
         grid.add_column(title, justify="right" if column.right else "left", no_wrap=column.head != "hears")
     for one in snapshot.inverters:
         wrong = {
@@ -111,7 +107,7 @@ def table(snapshot: Snapshot) -> Group:
         styles = ["yellow" if wrong.get(column.head) else "" for column in columns]
         grid.add_row(*(Text(column.text(one), style) for column, style in zip(columns, styles, strict=True)))
     events = [Text(line, style="dim", no_wrap=True, overflow="ellipsis") for line in snapshot.events[-EVENTS:]]
-    return Group(Text(head(snapshot), style="bold"), Text(), grid, Text(), *events, Text("Ctrl-C: quit", style="dim"))
+    return Group(Text(head(snapshot), style="bold"), *([grid] if snapshot.inverters else ()), *events)
 
 
 class TakesMessages(Protocol):
@@ -230,4 +226,5 @@ def watch(client: RunClient, console: Console, seconds: float | None) -> None:
     with Live(console=console, screen=True, auto_refresh=False) as live:
         while monotonic() < end:
             subscriber.take_until(monotonic() + REFRESH)
-            live.update(table(monitor.snapshot(client.present, monotonic())), refresh=True)
+            shown = table(monitor.snapshot(client.present, monotonic()))
+            live.update(Group(shown, Text("Ctrl-C: quit", style="dim")), refresh=True)

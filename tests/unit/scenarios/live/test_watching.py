@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import io
-
 import msgspec
 from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import AgentConfig, Control
 from gridpeers.plant.equipment.named_loads import named_loads
-from gridpeers.scenarios.console import terminal
 from gridpeers.scenarios.live.feeder_map import FeederMap, feeder_map, read_feeder_map
 from gridpeers.scenarios.live.live_options import configure
 from gridpeers.scenarios.live.run_monitor import InverterStatus, PlantStatus, RunMonitor, Snapshot
-from gridpeers.scenarios.live.watching import plain, table
+from gridpeers.scenarios.live.watching import plain
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.wire.messages import AgentStatus, Pacing, PlantEvent, Telemetry
 
@@ -117,16 +114,6 @@ def test_after_the_end_of_a_run_no_number_of_it_is_shown_as_if_it_went_on() -> N
     assert (look.t, look.pace, look.impaired) == (2.2, "the run has ended", ())
     assert plain(look).splitlines()[2].split() == ["inv1", *"-" * 13, "no", "agent"]
     assert broke.snapshot((), now=10.3).pace == "the run has ended: the deadline of inv1 passed"
-
-
-def test_watch_shows_the_same_as_a_table() -> None:
-    """Every number of the text is in the table, with the keys below."""
-    console = terminal(width=160, record=True, file=io.StringIO())
-    console.print(table(monitor().snapshot({"inv1"}, now=10.0)))
-    text = console.export_text()
-
-    for word in ("run lab", "60.010", "310.0", "without inv2", "no agent", "13-152 opened", "Ctrl-C: quit"):
-        assert word in text
 
 
 def test_impaired_links_are_shown_only_while_there_are_any() -> None:
