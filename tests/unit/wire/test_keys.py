@@ -1,12 +1,74 @@
+"""Keys; and docs/protocol.md, from which people write agents of their own, against the code."""
+
 from __future__ import annotations
+
+import re
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gridpeers.wire.keys import Keys, check_name, is_token
+from gridpeers.agents.agent_config import AgentConfig, Control
+from gridpeers.wire.codec import decode, encode
+from gridpeers.wire.keys import KEY_SPECS, Keys, check_name, is_token
+from gridpeers.wire.messages import (
+    Leave,
+    LinkAcknowledgement,
+    LinkRequest,
+    Measurement,
+    Message,
+    Nameplate,
+    Prepare,
+    Ready,
+    State,
+    Stop,
+    Waiting,
+)
 
 zenoh = pytest.importorskip("zenoh")
+
+PAGE = (Path(__file__).parents[3] / "docs" / "protocol.md").read_text()
+SECTION = PAGE.split("## Write an agent of your own")[1].split("\n## ")[0]
+NEEDED = (Nameplate, Ready, State, Leave, LinkAcknowledgement, Prepare, Measurement, Stop, Waiting, LinkRequest)
+
+
+def words(text: str) -> set[str]:
+    return set(re.findall(r"`([^`]+)`", re.sub(r"```.*?```", "", text, flags=re.DOTALL)))
+
+
+def test_the_bytes_on_the_page_are_those_of_the_codec() -> None:
+    """The example is a whole message, byte for byte."""
+    rows = re.findall(r"^((?:[0-9a-f]{2} )+)", SECTION, re.MULTILINE)
+    payload = bytes.fromhex("".join(rows))
+    ready = Ready(sender="inv2", epoch=7, seq=0, t=0.0)
+
+    assert decode(payload) == ready
+    assert encode(ready) == payload
+
+
+@pytest.mark.parametrize("message", NEEDED)
+def test_every_field_that_an_agent_meets_is_on_the_page(message: type[Message]) -> None:
+    """Whoever adds a field to a message says on the page what an agent of other people has to do with it."""
+    assert message.__name__ in words(SECTION)
+    assert set(message.__struct_fields__) - words(SECTION) == set()
+
+
+@pytest.mark.parametrize("config", [AgentConfig, Control])
+def test_every_field_of_the_configuration_is_on_the_page(config: type[AgentConfig | Control]) -> None:
+    """The plant's answer to an agent's request."""
+    named = words(SECTION)
+    named |= {word.removeprefix("control.") for word in named}
+
+    assert set(config.__struct_fields__) - named == set()
+
+
+def test_every_key_of_an_agent_is_on_the_page() -> None:
+    """Keys that an agent publishes on, subscribes to, asks or answers, without those that the page calls optional."""
+    kinds = {spec.expression.split("/")[2] for spec in KEY_SPECS if "agent" in (*spec.writers, *spec.readers)}
+    told = {word.split("/")[0] for word in words(SECTION)}
+
+    assert kinds - told == {"report", "journal", "status", "request", "answer"}  # which may be left out
 
 
 @pytest.mark.parametrize("bad", ["", "a/b", "a*", "a b", "$x", "what?", "#1", "@x", "ä", "x" * 65])
