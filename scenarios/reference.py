@@ -24,7 +24,7 @@ from gridpeers.scenarios.schema.scenario_model import Case, ScenarioModel
 from gridpeers.wire import keys, messages
 from gridpeers.wire.codec import KINDS
 from gridpeers.wire.plugins.registry import PluginError, Registry
-from gridpeers.wire.schema.table_reading import in_words, kinds_of, shown
+from gridpeers.wire.schema.table_reading import in_words, kinds_of, shown, table_of, tables_in
 from gridpeers.wire.schema.table_schema import INLINE, NO_KEY, Field, NamedTables, OtherKeys, fields_of, shared_fields
 
 
@@ -174,34 +174,13 @@ def _scenario() -> Iterator[str]:
     yield "inverter's own rating or nominal voltage); parameters of laws alone have no suffix. What has no default"
     yield "must be given. A value out of its range is an error, and so is an unknown key."
     titles: dict[type, list[str]] = {ScenarioModel: ["Top of the file"]}
-    for title, cls in _tables_in(ScenarioModel, ""):
+    for title, cls in tables_in(ScenarioModel):
         titles.setdefault(cls, []).append(title)
     for cls, places in titles.items():
         yield from ("", f"## {', '.join(places)}", "", _one_line(inspect.getdoc(cls)), "")
-        elsewhere = [field.name for field in fields_of(cls) if _table_of(field) and cls is not Case]
+        tables = [field.name for field in fields_of(cls) if table_of(field.type) and not field.mark(OtherKeys)]
+        elsewhere = [] if cls is Case else tables
         yield from field_table(cls, left_out=elsewhere)
-
-
-def _tables_in(cls: type, path: str) -> Iterator[tuple[str, type]]:
-    for field in fields_of(cls):
-        key = f"{path}.{field.key}" if path else field.key
-        if INLINE in field.marks:
-            yield from _tables_in(field.type, path)
-        elif named := field.mark(NamedTables):
-            yield from ((f"[{path}.{name}]", table) for name, table in named.known().items())
-        elif table := _table_of(field):
-            container = typing.get_origin(field.type)
-            name = f"{key}.NAME" if container is dict else key
-            yield f"[[{key}]]" if container is tuple else f"[{name}]", table
-            yield from _tables_in(table, name)
-
-
-def _table_of(field: Field) -> type | None:
-    """Return the struct of a field that is a table with a section of its own, or has such tables."""
-    inner = [field.type] if typing.get_origin(field.type) is None else typing.get_args(field.type)
-    if field.mark(OtherKeys) or typing.get_origin(field.type) not in (None, tuple, dict):
-        return None
-    return next((kind for kind in inner if isinstance(kind, type) and issubclass(kind, msgspec.Struct)), None)
 
 
 def _feeder() -> Iterator[str]:

@@ -131,21 +131,21 @@ class _Reader:
     def _value(self, field: Field, raw: Any, path: str, base: Any) -> Any:
         """Convert the value of one key; return the default for a wrong one."""
         kind = _without_none(field.type)
-        structs = _structs_in(kind)
-        if structs == [kind]:
+        structs, table, container = _structs_in(kind), table_of(kind), get_origin(kind)
+        if table is not None and container is None:
             return self.table(*self._kind(field, raw, path), path, base)
         if structs and isinstance(raw, Mapping):
             before, chosen = len(self.problems), self._chosen(structs, raw, path)
             value = self.table(chosen, raw, path) if chosen else None
             return value if len(self.problems) == before else _fallback(field)
-        if inner := _inner_struct(kind, tuple):
+        if table is not None and container is tuple:
             if isinstance(raw, list):
-                return tuple(self.table(inner, item, f"{path}[{i}]") for i, item in enumerate(raw))
+                return tuple(self.table(table, item, f"{path}[{i}]") for i, item in enumerate(raw))
             self._add(path, f"must be written as [[{path}]], got {shown(raw)}")
             return ()
-        if inner := _inner_struct(kind, dict):
+        if table is not None:
             if isinstance(raw, Mapping) and all(isinstance(item, Mapping) for item in raw.values()):
-                return {name: self.table(inner, item, f"{path}.{name}") for name, item in raw.items()}
+                return {name: self.table(table, item, f"{path}.{name}") for name, item in raw.items()}
             example = field.mark(Example)
             right = f"a table such as {example.text}" if example else f"written as tables [{path}.NAME]"
             self._add(path, f"must be {right}, got {shown(raw)}")
@@ -192,7 +192,8 @@ class _Reader:
         """Say what to write instead of an unknown key."""
         known = [*_names(cls)]
         if f"{key}s" not in known:
-            for where, table in _tables(self._root, "", "at the top of the file, before any table"):
+            places = [("at the top of the file, before any table", self._root)]
+            for where, table in [*places, *((f"into {title}", table) for title, table in tables_in(self._root))]:
                 if table is not cls and key in keys_of(table):
                     return f"unknown key here; it belongs {where}"
         return f"unknown {self._noun}; {suggestion(key, known, f'{self._noun}s')}"
@@ -223,22 +224,25 @@ def _names(cls: type) -> Iterator[str]:
             yield from _names(field.type)
 
 
-def _tables(struct: type, path: str, where: str) -> Iterator[tuple[str, type]]:
-    """Yield the tables of a file with the words that say where each is."""
-    if where:
-        yield where, struct
-    for field in fields_of(struct):
-        kind, key = field.type, _join(path, field.key)
+def tables_in(cls: type, path: str = "") -> Iterator[tuple[str, type]]:
+    """Yield the tables below one as a file names them, such as `[[link]]` or `[load.NAME]`, and their structs."""
+    for field in fields_of(cls):
+        key, container = _join(path, field.key), get_origin(field.type)
         if INLINE in field.marks:
-            yield from _tables(kind, path, "")
+            yield from tables_in(field.type, path)
         elif named := field.mark(NamedTables):
-            yield from ((f"into [{path}.{name}]", table) for name, table in named.known().items())
-        elif _structs_in(kind) == [kind]:
-            yield from _tables(kind, key, f"into [{key}]")
-        elif inner := _inner_struct(kind, dict):
-            yield from _tables(inner, f"{key}.NAME", f"into [{key}.NAME]")
-        elif (inner := _inner_struct(kind, tuple)) and not field.mark(OtherKeys):
-            yield f"into [[{key}]]", inner
+            yield from ((f"[{path}.{name}]", table) for name, table in named.known().items())
+        elif (table := table_of(field.type)) and not field.mark(OtherKeys):
+            name = f"{key}.NAME" if container is dict else key
+            yield f"[[{key}]]" if container is tuple else f"[{name}]", table
+            yield from tables_in(table, name)
+
+
+def table_of(kind: Any) -> type[msgspec.Struct] | None:
+    """Return the struct that is a type, or that is in its `tuple[Struct, ...]` or `dict[str, Struct]`; else None."""
+    place = {tuple: 0, dict: 1}.get(get_origin(kind))
+    inner = kind if place is None else get_args(kind)[place]
+    return inner if _structs_in(inner) == [inner] else None
 
 
 def _tag_field(cls: type) -> str | None:
@@ -275,14 +279,6 @@ def _without_none(kind: Any) -> Any:
 
 def _structs_in(kind: Any) -> list[Any]:
     return [part for part in kinds_of(kind) if isinstance(part, type) and issubclass(part, msgspec.Struct)]
-
-
-def _inner_struct(kind: Any, container: type) -> type[msgspec.Struct] | None:
-    """Return the struct in a `tuple[Struct, ...]` or a `dict[str, Struct]`."""
-    if get_origin(kind) is not container:
-        return None
-    inner = get_args(kind)[1 if container is dict else 0]
-    return inner if _structs_in(inner) == [inner] else None
 
 
 def shown(raw: object) -> str:
