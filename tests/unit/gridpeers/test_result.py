@@ -27,17 +27,6 @@ def run(scenario: gp.Scenario) -> gp.Result:
     return scenario.run("IV")
 
 
-def test_a_history_is_a_table_by_inverter_and_quantity_with_units(run: gp.Result) -> None:
-    """Columns (inverter, quantity), time as the index, units beside."""
-    history = run.history
-
-    assert history["inv1"].columns.tolist() == ["f", "P", "Q", "V", "P_set", "V_set"]
-    assert history.index.name == "t"
-    assert len(history) == 151
-    assert history.attrs["units"]["Q"] == "var"
-    assert history["inv1"]["f"].iloc[-1] == run.record.f[-1, 0]
-
-
 def test_metrics_events_and_links_are_those_of_the_files(run: gp.Result) -> None:
     """A row per window, an event per row, a row per message on an emulated link."""
     assert run.metrics.index.tolist() == ["islanding"]

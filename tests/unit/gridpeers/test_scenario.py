@@ -49,29 +49,10 @@ def test_a_scenario_of_keyword_tables_is_the_scenario_of_the_same_file(tmp_path:
     assert gp.load(file) == built
 
 
-def test_every_problem_of_a_change_comes_at_once_and_names_its_key() -> None:
-    """Paths that lead nowhere, wrong types and values out of range are told together, without a line of the file."""
-    with pytest.raises(gp.ScenarioError) as caught:
-        gp.load("islanding").replace({"case.VI.graph": "ring", "gains.k_p": "much", "time.T_c_s": 20, "gians": {}})
-
-    assert [line.partition(": ")[0] for line in caught.value.problems] == ["replace"] * 4
-    assert all(
-        key in str(caught.value) for key in ("case.VI", "gains.k_p: must be", "time.T_c_s", "gians: unknown key")
-    )
-
-
 def test_a_problem_that_a_change_makes_elsewhere_keeps_its_line() -> None:
     """A key that was not changed is found in the file."""
     with pytest.raises(gp.ScenarioError, match=r"islanding\.toml:\d+: event\[1\]\.t_s"):
         gp.load("islanding").replace({"time.end_s": 2.0})
-
-
-def test_a_table_makes_a_new_case_and_none_takes_a_key_out() -> None:
-    """A case that is given whole is new; what is taken out has its default."""
-    scenario = gp.load("islanding").replace({"case.V": {"secondary": "all", "graph": "ring"}, "case.I": None})
-
-    assert list(scenario.cases) == ["II", "III", "IV", "V"]
-    assert gp.load("islanding").replace({"seed": None}).spec.seed == 1
 
 
 def test_numpy_values_and_classes_become_what_a_file_would_hold() -> None:
@@ -95,21 +76,6 @@ def test_what_no_file_can_hold_is_refused_with_its_key() -> None:
     assert "replace: seed: a value of type object" in str(caught.value)
     assert "replace: title: " in str(caught.value)
     assert "defined inside a function" in str(caught.value)
-
-
-def test_an_unknown_case_driver_or_clock_is_one_line() -> None:
-    """A run that is impossible is refused before anything starts."""
-    scenario = gp.load("islanding")
-
-    for words, text in (
-        ({"case": "VI"}, 'no case "VI"'),
-        ({"case": "IV", "driver": "process"}, 'did you mean "processes"'),
-        ({"case": "IV", "clock": "wall"}, "needs a process per agent"),
-        ({"case": "IV", "speed": 2.0}, "no pace to keep"),
-    ):
-        with pytest.raises(gp.ScenarioError, match=text) as caught:
-            scenario.run(**words)  # type: ignore[call-overload]
-        assert "\n" not in str(caught.value)
 
 
 def test_every_argument_of_a_run_has_its_text_and_the_command_its_option() -> None:

@@ -171,30 +171,6 @@ def test_a_model_for_gridlabd_goes_the_same_ways(elsewhere: Path) -> None:
     assert "switch head islands" in made
 
 
-@pytest.mark.parametrize(("words", "text"), [
-    (("import", "nothere.dss"), "there is no such file"),
-    (("import", "nothere.glm"), "there is no such file"),
-    (("import", "bad.txt"), "a feeder is a .dss file (OpenDSS) or a .glm file (GridLAB-D)"),
-    (("check", "nothere"), "no such feeder and no such folder"),
-    (("solve", "microgrid123", "--open", "sw9"), 'switch "sw9": no such switch'),
-    (("solve", "microgrid123", "--switch", "Line.l1"), "switches, leave_out and f_nom are for .dss and .glm files"),
-    (("solve", "microgrid123", "--load-set", "evnt2"), 'load set "evnt2": no such set; there are event2, main'),
-    (("solve", "bad.dss", "--load-set", "main"), "load_set is for a folder of tables"),
-    (("import", "bad.dss"), "3 problems"),
-])  # fmt: skip
-def test_a_feeder_that_cannot_be_used_is_told_in_lines(elsewhere: Path, words: tuple[str, ...], text: str) -> None:
-    """Exit code 2, every problem with its file and line, nothing written."""
-    Path("bad.dss").write_text(
-        "clear\nnew circuit.x basekv=4.16\nredirect missing.dss\nnew line.l1 lenth=3\nnew foo.l\n"
-    )
-
-    code, printed = invoke("feeder", *words)
-
-    assert code == 2
-    assert text in printed
-    assert [path.name for path in Path().iterdir()] == ["bad.dss"]
-
-
 @pytest.mark.skipif(sys.platform != "linux", reason="limits the size of files as Linux does")
 def test_a_disk_that_fills_up_leaves_nothing_half_written(elsewhere: Path) -> None:
     """A file or folder is there as a whole, or not at all; the error names it."""

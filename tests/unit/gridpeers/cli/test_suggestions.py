@@ -13,32 +13,6 @@ from gridpeers.lab.commands import CHANGES, replay
 from tests.command_line import invoke
 
 
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
-        (["rnu"], ('no command "rnu"; did you mean "run"?',)),
-        (["link", "sett"], ('no command "sett"; did you mean "set"? The commands are set, cut, heal',)),
-        (["run", "x", "--driver", "inproces"], ("--driver", "inproces", "'inprocess'; gridpeers run -h shows what")),
-        (["run", "x", "--speed", "fast"], ("--speed", "number")),
-        (["run", "x", "--seed", "-1"], ("--seed", "0")),
-        (["run", "x", "--spede", "2"], ("--spede", "--speed")),
-        (["why", "x", "inv2", "-1"], ("-1; gridpeers why -h shows what can be given",)),
-        (["run", "x", "--case"], ("--case", "argument")),
-        (["run", "x", "y"], ("(y); gridpeers run -h shows what can be given",)),
-        (["link", "cut", "inv1", "inv4", "--for", "long"], ("--for", "number; gridpeers link cut -h shows")),
-        (["event", "open"], ("SWITCH", "; gridpeers event -h shows what can be given")),
-    ],
-)
-def test_a_mistyped_word_is_one_line(words: list[str], told: tuple[str, ...]) -> None:
-    """Where, what, and the command that shows what would be right."""
-    code, text = invoke(*words)
-
-    assert code == 2
-    assert text.startswith("gridpeers: ")
-    assert all(word in text for word in told)
-    assert text.count("\n") == 1
-
-
 @pytest.mark.parametrize("words", [(), ("link",)])
 def test_a_command_alone_shows_its_help(words: tuple[str, ...]) -> None:
     """A command without arguments shows its help."""
