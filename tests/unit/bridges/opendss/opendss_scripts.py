@@ -69,6 +69,8 @@ ELEMENTS = {
     "reactor, in series": "New Reactor.x bus1=c bus2=d phases=3 r=0.01 x=0.03\n"
     "New Load.d bus1=d phases=3 kv=0.48 kw=40 kvar=10",
     "fault": "New Fault.f bus1=c.1 phases=1 r=2",
+    "disabled": "New Load.off bus1=c phases=3 kv=0.48 kw=200 kvar=50 enabled=no\n"
+    "New Capacitor.k bus1=c kvar=100 kv=0.48\nDisable Capacitor.k",
 }
 
 LINES = {

@@ -25,6 +25,17 @@ from tests.unit.bridges.opendss.opendss_solutions import (
 pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")
 
 
+LINE_D = """New Line.l bus1=c bus2=d r1=0.01 x1=0.02 r0=0.02 x0=0.05 length=1
+New Load.da bus1=d.1 phases=1 kv=0.277 kw=40
+New Load.dc bus1=d.3 phases=1 kv=0.277 kw=30
+"""
+RING = """New Line.tie bus1=c bus2=d switch=yes r1=0.001 x1=0.001 r0=0.001 x0=0.001 c1=0 c0=0
+New Line.l bus1=c bus2=e r1=0.01 x1=0.02 r0=0.02 x0=0.05 length=1
+New Line.m bus1=e bus2=d r1=0.01 x1=0.02 r0=0.02 x0=0.05 length=1
+New Load.d bus1=d phases=3 kv=0.48 kw=90 kvar=30
+"""
+
+
 @pytest.mark.parametrize("what", SCRIPTS)
 def test_voltages_are_those_of_the_engine(tmp_path: Path, what: str) -> None:
     """Every element, load and generator, of each connection, law and range of voltage, has the engine's voltages."""
@@ -41,27 +52,18 @@ def test_an_admittance_matrix_may_be_asymmetric(tmp_path: Path) -> None:
     assert largest_difference(path) < TOLERANCE
 
 
-@pytest.mark.parametrize("state", ["closed", "open"])
-def test_a_switch_stands_as_in_the_script(tmp_path: Path, state: str) -> None:
-    """Line with `switch=yes` becomes a switch that stands as in the script; what it cuts off has no voltage."""
-    ring = """New Line.tie bus1=c bus2=d switch=yes r1=0.001 x1=0.001 r0=0.001 x0=0.001 c1=0 c0=0
-New Line.l bus1=c bus2=e r1=0.01 x1=0.02 r0=0.02 x0=0.05 length=1
-New Line.m bus1=e bus2=d r1=0.01 x1=0.02 r0=0.02 x0=0.05 length=1
-New Load.d bus1=d phases=3 kv=0.48 kw=90 kvar=30
-"""
-    path = write(tmp_path, LINE, STEP_DOWN, ring, "Open Line.tie 1" if state == "open" else "")
-    feeder = read_opendss(path)
+@pytest.mark.parametrize(("script", "switches"), [
+    pytest.param(RING, [("tie", True)], id="switch=yes"),
+    pytest.param(f"{RING}Open Line.tie 1", [("tie", False)], id="opened by the script"),
+    pytest.param(f"{LINE_D}New SwtControl.s SwitchedObj=Line.l SwitchedTerm=1", [("l", True)], id="SwtControl"),
+    pytest.param(f"{LINE_D}Open Line.l 1 2", [], id="open in one phase alone"),
+    pytest.param(f"{LINE_D}New Line.off bus1=c bus2=e switch=yes enabled=no", [], id="disabled"),
+])  # fmt: skip
+def test_switches_are_those_of_the_script(tmp_path: Path, script: str, switches: list[tuple[str, bool]]) -> None:
+    """What can open is a switch, and stands as in the script; voltages are the engine's."""
+    path = write(tmp_path, LINE, STEP_DOWN, LOADS, script)
 
-    assert [(switch.alias, switch.closed) for switch in feeder.switches] == [("tie", state == "closed")]
-    assert largest_difference(path) < TOLERANCE
-
-
-def test_a_line_with_a_control_that_switches_it_is_a_switch(tmp_path: Path) -> None:
-    """A line that a SwtControl can open becomes a switch, though the script does not call it one."""
-    line = "New Line.tie bus1=c bus2=d r1=0.01 x1=0.02 r0=0.02 x0=0.05\nNew Load.d bus1=d kv=0.48 kw=90 kvar=30"
-    path = write(tmp_path, LINE, STEP_DOWN, line, "New SwtControl.s SwitchedObj=Line.tie SwitchedTerm=1")
-
-    assert [switch.alias for switch in read_opendss(path).switches] == ["tie"]
+    assert [(switch.alias, switch.closed) for switch in read_opendss(path).switches] == switches
     assert largest_difference(path) < TOLERANCE
 
 
@@ -108,16 +110,6 @@ Open Line.l 2
             assert abs(ours[name] - V) / nominal[name] < TOLERANCE
 
 
-def test_a_line_may_be_open_in_one_phase(tmp_path: Path) -> None:
-    """A line that the script opens in one phase alone keeps the others, and is no switch."""
-    line = "New Line.l bus1=c bus2=d r1=0.01 x1=0.02 r0=0.02 x0=0.05 length=1\nOpen Line.l 1 2"
-    load = "New Load.da bus1=d.1 phases=1 kv=0.277 kw=40\nNew Load.dc bus1=d.3 phases=1 kv=0.277 kw=30"
-    path = write(tmp_path, LINE, STEP_DOWN, LOADS, line, load)
-
-    assert read_opendss(path).switches == ()
-    assert largest_difference(path) < TOLERANCE
-
-
 def test_a_feeder_of_50_hertz_has_its_frequency(tmp_path: Path) -> None:
     """Reactances are those of the script's frequency, which becomes the feeder's nominal one."""
     path = write(tmp_path, LINE, STEP_DOWN, LOADS, ELEMENTS["capacitor, wye"])
@@ -125,15 +117,6 @@ def test_a_feeder_of_50_hertz_has_its_frequency(tmp_path: Path) -> None:
 
     assert read_opendss(path).f_nom == 50.0
     assert largest_difference(path) < TOLERANCE
-
-
-def test_disabled_elements_are_not_there(tmp_path: Path) -> None:
-    """Elements that the script disables are not imported, as the engine does without them."""
-    more = "New Load.off bus1=c phases=3 kv=0.48 kw=200 kvar=50 enabled=no\nNew Capacitor.k bus1=c kvar=100 kv=0.48\n"
-    path = write(tmp_path, LINE, STEP_DOWN, LOADS, more, "Disable Capacitor.k")
-
-    assert largest_difference(path) < TOLERANCE
-    assert not [element for element in read_opendss(path).elements if element.name == "capacitor.k"]
 
 
 @pytest.mark.parametrize(("cut_off", "part"), [(0.98, 1.0), (1.0195, 0.5), (1.05, 0.0), (1.3, 0.0)])
