@@ -32,33 +32,6 @@ class Wheels(NamedTuple):
     neighbour: Path
 
 
-class Environment(NamedTuple):
-    """A fresh virtual environment."""
-
-    folder: Path
-
-    @property
-    def python(self) -> Path:
-        """Its interpreter."""
-        return self.folder / "bin" / "python"
-
-    @property
-    def packages(self) -> Path:
-        """Where distributions are installed."""
-        (found,) = self.folder.glob("lib/python*/site-packages")
-        return found
-
-    def installed(self, name: str) -> Distribution:
-        """Return a distribution in it."""
-        (found,) = self.packages.glob(f"{name.replace('-', '_')}-*.dist-info")
-        return Distribution.at(found)
-
-    def share_dependencies(self) -> None:
-        """Put what the tests' Python has behind what is installed here."""
-        folders = [folder for folder in sys.path if folder.endswith("site-packages")]
-        (self.packages / "dependencies.pth").write_text("\n".join(folders))
-
-
 @pytest.fixture(scope="module")
 def wheels(tmp_path_factory: pytest.TempPathFactory) -> Wheels:
     """Build our wheel, and fetch the neighbour's."""
@@ -77,26 +50,28 @@ def wheels(tmp_path_factory: pytest.TempPathFactory) -> Wheels:
 def test_the_wheel_runs_beside_a_distribution_with_our_rooms_names(wheels: Wheels, tmp_path: Path) -> None:
     """The two have no file in common, so in either order none is overwritten; a run has the same bytes."""
     venv.create(tmp_path / "venv", symlinks=True)
-    fresh = Environment(tmp_path / "venv")
+    python = tmp_path / "venv" / "bin" / "python"
+    (packages,) = (tmp_path / "venv").glob("lib/python*/site-packages")
     elsewhere = tmp_path / "elsewhere"
     (elsewhere / "scenarios").mkdir(parents=True)
     (elsewhere / "scenarios" / "__init__.py").write_text("raise ImportError('a user has a package scenarios')")
 
     def install(wheel: Path) -> set[str]:
         """Install one wheel, and return the files of its distribution."""
-        words = ["--python", fresh.python, "install", "--no-deps", "--no-index", "--no-compile"]
+        words = ["--python", python, "install", "--no-deps", "--no-index", "--no-compile"]
         subprocess.run([*PIP, *words, "--force-reinstall", wheel], check=True)
-        name = NEIGHBOUR if wheel == wheels.neighbour else "gridpeers"
-        return {str(file) for file in fresh.installed(name).files or () if not str(file).startswith("..")}
+        (found,) = packages.glob(f"{wheel.name.partition('-')[0]}-*.dist-info")
+        return {str(file) for file in Distribution.at(found).files or () if not str(file).startswith("..")}
 
     theirs, ours = install(wheels.neighbour), install(wheels.gridpeers)
-    fresh.share_dependencies()
+    of_tests = [folder for folder in sys.path if folder.endswith("site-packages")]
+    (packages / "dependencies.pth").write_text("\n".join(of_tests))  # behind what is installed here
     assert ours & theirs == set()
     assert any(file.startswith("agents/") for file in theirs)
     assert {file.partition("/")[0].partition("-")[0] for file in ours} == {"gridpeers"}
 
     words = ["-m", "gridpeers", "run", "islanding", "--case", "IV", "--out", "out"]
-    done = subprocess.run([fresh.python, *words], cwd=elsewhere, capture_output=True, text=True, check=False)
+    done = subprocess.run([python, *words], cwd=elsewhere, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     recorded, _ = ran("islanding", "IV")
     result = gp.read(elsewhere / "out")
@@ -105,7 +80,7 @@ def test_the_wheel_runs_beside_a_distribution_with_our_rooms_names(wheels: Wheel
 
     install(wheels.neighbour)
     code = "import gridpeers as gp; assert gp.load('islanding').cases; assert gp.Law"
-    subprocess.run([fresh.python, "-c", code], cwd=elsewhere, check=True)
+    subprocess.run([python, "-c", code], cwd=elsewhere, check=True)
 
 
 def test_the_wheel_has_every_file_of_every_room(wheels: Wheels, tmp_path: Path) -> None:

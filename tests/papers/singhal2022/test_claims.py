@@ -178,33 +178,21 @@ def test_an_experiment_without_the_papers_islands_fails_its_table() -> None:
     assert verdicts[0].found == "there is no such number: case IV, event2, island of inv1"
 
 
-def headline_with(case: str, event: str, **values: object) -> list[str]:
-    """Return the headline of the islanding with one number that is not the paper's."""
-    return headline(numbers(Findings(results=changed(case, event, **values)), tables_of("islanding")))
+@pytest.mark.parametrize(("case", "event", "values", "line", "told"), [
+    ("IV", "event1", {"MQSI": 0.0133}, 1, "they are 0.33 to 1 times the paper's, 7 of 8 within a factor of 2; farthest "
+     "off: 0.013 for 0.04 (Table II, case IV, event1)."),
+    ("IV", "event2", {"V_error": 0.0}, 0, "24 of the 24 numbers of Tables I and II that are judged by a tolerance are"),
+    ("IV", "event2", {"V_error": 0.0}, 2, "7 of 8 within 25 % of the paper's number or half of its last digit; "
+     "farthest off: 0.0000 for 0.001 (Table II, case IV, event2)."),
+    ("II", "event1", {"reasons": {"MQSI": "not steady: it grows"}}, 1, "farthest off: not steady for 2.03"),
+])  # fmt: skip
+def test_the_headline_counts_what_is_near_and_names_the_farthest(
+    case: str, event: str, values: dict[str, object], line: int, told: str
+) -> None:
+    """Also of numbers that no tolerance judges; a zero is far from 0.001, what is not steady from any number."""
+    found = Findings(results=changed(case, event, **values))
 
-
-def test_the_numbers_that_no_tolerance_judges_are_counted_and_the_farthest_is_named() -> None:
-    """A third of the paper's MQSI is no difference of any claim, and is told as beyond a factor of 2."""
-    assert headline_with("IV", "event1", MQSI=0.0133)[1] == (
-        "The other 8, all MQSI of Table II, are not judged by a tolerance: they are 0.33 to 1 times the paper's, "
-        "7 of 8 within a factor of 2; farthest off: 0.013 for 0.04 (Table II, case IV, event1)."
-    )
-
-
-def test_a_V_error_of_zero_is_far_from_one_that_is_small() -> None:
-    """0 for 0.001 is within 0.003 pu, and not within a quarter of 0.001 or half of its last digit."""
-    lines = headline_with("IV", "event2", V_error=0.0)
-
-    assert lines[0] == "24 of the 24 numbers of Tables I and II that are judged by a tolerance are within it."
-    assert lines[2].startswith("V_error beside its own size: 7 of 8 within 25 %")
-    assert lines[2].endswith("farthest off: 0.0000 for 0.001 (Table II, case IV, event2).")
-
-
-def test_what_is_not_steady_is_farther_off_than_any_number() -> None:
-    """It counts as not near, and its place is named."""
-    lines = headline_with("II", "event1", reasons={"MQSI": "not steady: it grows"})
-
-    assert "7 of 8 within a factor of 2; farthest off: not steady for 2.03 (Table II, case II, event1)." in lines[1]
+    assert told in headline(numbers(found, tables_of("islanding")))[line]
 
 
 def test_a_scenario_without_tables_has_no_headline() -> None:
