@@ -138,8 +138,6 @@ class PlotMeasure(NamedTuple):
     title: str
     label: str
     """Label of the axis, with the unit."""
-    island_label: str
-    """The same where the figure shows the worst of several islands."""
     of_row: RowMeasure
     nominal: float | None
     """Value from which islands depart; None: the nominal frequency."""
@@ -151,13 +149,11 @@ _SHARING = Bounds(most=5.0)  # The indices have no bound where little is shared:
 _VOLTAGE = Bounds(least=0.01, shown=0.98)  # Spikes at a switching are ten times what is left of them, and last longer
 
 MEASURES = {
-    "frequency": PlotMeasure("Frequency", "mean of the GFM, f (Hz)", "f (Hz)", metrics.mean_frequency, None),
-    "MPSI": PlotMeasure("Mean power sharing index, MPSI", "MPSI", "MPSI", metrics.MPSI, 0.0, _SHARING),
-    "V_error": PlotMeasure(
-        "Voltage error, V_error", "mean of abs(V - 1) (pu)", "V_error (pu)", metrics.V_error, 0.0, _VOLTAGE
-    ),
-    "voltage": PlotMeasure("Mean voltage", "mean of all inverters, V (pu)", "mean V (pu)", metrics.mean_voltage, 1.0),
-    "MQSI": PlotMeasure("Mean var sharing index, MQSI", "MQSI", "MQSI", metrics.MQSI, 0.0, _SHARING),
+    "frequency": PlotMeasure("Frequency", "mean of the GFM, f (Hz)", metrics.mean_frequency, None),
+    "MPSI": PlotMeasure("Mean power sharing index, MPSI", "MPSI", metrics.MPSI, 0.0, _SHARING),
+    "V_error": PlotMeasure("Voltage error, V_error", "mean of abs(V - 1) (pu)", metrics.V_error, 0.0, _VOLTAGE),
+    "voltage": PlotMeasure("Mean voltage", "mean of all inverters, V (pu)", metrics.mean_voltage, 1.0),
+    "MQSI": PlotMeasure("Mean var sharing index, MQSI", "MQSI", metrics.MQSI, 0.0, _SHARING),
 }
 """By the name of their figure. V_error judges the voltages: in the mean voltage, which the paper's figure shows,
 terminals that are too high and too low cancel."""
@@ -184,10 +180,10 @@ def _case_curves(drawing: Drawing, values: Callable[[str, History], Floats]) -> 
 
 def _measure_panel(drawing: Drawing, name: str) -> Panel:
     measure = MEASURES[name]
-    label = f"{measure.island_label}, worst island" if drawing.island_intervals else measure.label
+    title = f"{measure.title}, worst island" if drawing.island_intervals else measure.title
     nominal = drawing.f_nom if measure.nominal is None else measure.nominal
     curves = _case_curves(drawing, lambda case, _: measured(drawing, case, name))
-    return Panel(measure.title, label, curves, None if measure.bounds else nominal, measure.bounds)
+    return Panel(title, measure.label, curves, None if measure.bounds else nominal, measure.bounds)
 
 
 def overview(drawing: Drawing) -> Page:
@@ -323,8 +319,7 @@ def comparison(pairs: Sequence[tuple[str, Mapping[str, Drawing]]]) -> Figure:
                     ((case, history),) = drawing.histories.items()
                     curves.append(PanelCurve(history.t, measured(drawing, case, name), style, run))
                 title = f"{words}: {measure.title}" if words else measure.title
-                label = measure.island_label if name == "frequency" else measure.label
-                _fill(axes, Panel(title, label, curves, bounds=measure.bounds))
+                _fill(axes, Panel(title, measure.label, curves, bounds=measure.bounds))
                 axes.ticklabel_format(axis="y", useOffset=False)
                 axes.set_xlim(0.0, longer.end)
                 mark_events(axes, replace(longer, events=list(colours)), labelled=place < 2, colours=colours)

@@ -72,21 +72,17 @@ class Bounds(NamedTuple):
 
 
 def from_zero(axes: Axes, curves: Iterable[Floats], bounds: Bounds) -> None:
-    """Start the axis at 0, and let spikes of a few ms at a switching leave the frame instead of flattening the rest.
-
-    A note has the value of a curve that settles beyond the frame.
-    """
+    """Start the axis at 0, and let spikes of a few ms at a switching leave the frame instead of flattening the rest."""
     finite = [some for curve in curves if (some := curve[np.isfinite(curve)]).size]
     if not finite:
         return
     values = np.concatenate(finite)
-    settled = max(float(np.median(curve[-max(curve.size // 10, 1) :])) for curve in finite)
     top = min(max(float(np.quantile(values, bounds.shown)) * 1.15, bounds.least), bounds.most)
     peak = float(values.max())
     axes.set_ylim(0.0, top)
     if peak > top:
         axes.annotate(
-            f"one rests at {settled:.2g}" if settled > top else f"spikes reach {peak:.2g}",
+            f"up to {peak:.2g}",
             (0.995, 0.985),
             xycoords="axes fraction",
             ha="right",

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 from matplotlib.image import imread
 
 from gridpeers.plant.tables import read_feeder
@@ -14,7 +13,7 @@ from gridpeers.scenarios.results.history import History, Nameplates
 from gridpeers.scenarios.results.island_membership import IslandInterval, RecordedIsland
 from gridpeers.scenarios.results.plots.drawing import Drawing, Mark
 from gridpeers.scenarios.results.plots.run_figures import draw, draw_all
-from gridpeers.scenarios.results.plots.style import GAP, LETTER, STYLES, Bounds, Format, event_texts, from_zero, save
+from gridpeers.scenarios.results.plots.style import GAP, LETTER, STYLES, Format, event_texts, save
 
 
 def drawing(*cases: str) -> Drawing:
@@ -152,12 +151,7 @@ def test_where_there_are_islands_the_worst_is_drawn() -> None:
     drawn = np.asarray(line.get_ydata())
     assert drawn[history.t <= 4.0] == pytest.approx(60.0)
     assert drawn[history.t > 4.0] == pytest.approx(60.03)
-    assert [axes.get_ylabel() for axes in page.axes] == [
-        "f (Hz), worst island",
-        "MPSI, worst island",
-        "V_error (pu), worst island",
-        "MQSI, worst island",
-    ]
+    assert all(axes.get_title(loc="left").endswith(", worst island") for axes in page.axes)
 
 
 def test_an_island_without_load_draws_no_dust() -> None:
@@ -173,14 +167,3 @@ def test_an_island_without_load_draws_no_dust() -> None:
     assert np.isnan(drawn[history.t > 4.0]).all()
     assert np.isfinite(drawn[history.t <= 4.0]).all()
     assert page.axes[3].get_ylim()[1] == 5.0
-
-
-def test_a_curve_that_settles_beyond_the_frame_is_told() -> None:
-    """A sharing index that rests at 7 is not called a spike."""
-    spike, settled = np.full(1000, 0.1), np.full(1000, 7.0)
-    spike[:3] = 14.0
-    axes = Figure().add_subplot()
-
-    from_zero(axes, [spike, settled], Bounds(most=5.0))
-
-    assert [text.get_text() for text in axes.texts] == ["one rests at 7"]
