@@ -12,7 +12,7 @@ import msgspec
 
 from gridpeers.scenarios.checks.check_verdict import FILE, judge_case, verdicts_json
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.results.claims import NO_BENCHMARK, benchmark_of, judge, judged
+from gridpeers.scenarios.results.claims import NO_BENCHMARK, benchmark_of, claim_of, judge
 from gridpeers.scenarios.results.findings import Findings, find
 from gridpeers.scenarios.results.history import late_moves
 from gridpeers.scenarios.results.metric import UNITS
@@ -63,7 +63,7 @@ def write_measures(
         scenario=scenario.name,
         titles={case: rule.title for case, rule in scenario.cases.items()},
         findings=findings,
-        verdicts=(*judge(findings, benchmark.claims), *judged(findings, own)) if claims else (),
+        verdicts=judge(findings, (*benchmark.claims, *map(claim_of, own))) if claims else (),
         benchmark=benchmark,
         checks=checks,
         failures={name: law_failures(case.events) for name, case in cases.items()},

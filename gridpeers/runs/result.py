@@ -21,7 +21,7 @@ from gridpeers.scenarios.checks import check_verdict
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict, judge_case
 from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.record.record_info import FILE, LIVE
-from gridpeers.scenarios.results.claims import Verdict, benchmark_of, judge, judged
+from gridpeers.scenarios.results.claims import Verdict, benchmark_of, claim_of, judge
 from gridpeers.scenarios.results.findings import Findings, find
 from gridpeers.scenarios.results.history import UNITS, History, as_they_came, windows
 from gridpeers.scenarios.results.island_membership import taken_part
@@ -149,7 +149,7 @@ class Results(_FromFolder, Mapping[str, "Result"]):
         if self.driver == LIVE or any(self._folder.numbers_of(case).get("commands") for case in self):
             return ()
         claims = benchmark_of(self.spec.paper).claims
-        return (*judge(self.findings, claims), *judged(self.findings, claims_of(self.spec)))
+        return judge(self.findings, (*claims, *map(claim_of, claims_of(self.spec))))
 
     def drawing(self, cases: Mapping[str, Result]) -> Drawing:
         """Return the data of the figures of some cases (`gridpeers.scenarios.results.plots`)."""

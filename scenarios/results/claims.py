@@ -14,7 +14,6 @@ A claim is a function of what was found that returns whether it holds, and our v
 
 from __future__ import annotations
 
-import copy
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -149,7 +148,8 @@ def judge(findings: Findings, claims: Sequence[Claim]) -> tuple[Verdict, ...]:
             known = {*findings.results, *(event for of in findings.results.values() for event in of)}
             lacks = isinstance(error, KeyError) and known
             there = f"; cases and events are {', '.join(sorted(known))}" if lacks else ""
-            status, found = "FAIL", f"cannot be judged: {named(error)}{there}"
+            said = str(error) if isinstance(error, PluginError) else f"cannot be judged: {named(error)}{there}"
+            status, found = "FAIL", said
         verdicts.append(Verdict(claim=claim, status=status, found=found))
     return tuple(verdicts)
 
@@ -172,11 +172,16 @@ def _judgement(claim: Claim, findings: Findings) -> tuple[Status, str]:
 
 
 def claim_of(plugin: Plugin) -> Claim:
-    """Return a claim; a function's sentence is the first line of its docstring.
+    """Return a claim, which fails if it cannot be made; a function's sentence is the first line of its docstring."""
+    try:
+        claim = made(CLAIMS, plugin)
+    except PluginError as error:
+        kept = error
 
-    Raise PluginError if there is none, or it cannot be made with these parameters.
-    """
-    claim = made(CLAIMS, plugin)
+        def fail(findings: Findings) -> tuple[bool, str]:
+            raise kept
+
+        return Claim(name=plugin.use, text=plugin.use, source="", judge=fail, measures=())
     if isinstance(claim, Claim):
         return claim
     kind = claim if inspect.isroutine(claim) else type(claim)
@@ -193,17 +198,3 @@ def claim_of(plugin: Plugin) -> Claim:
         return bool(truth), printable(str(value), 200)
 
     return Claim(name=name, text=text, source=plugin.use, judge=holds, measures=())
-
-
-def judged(findings: Findings, plugins: Sequence[Plugin]) -> tuple[Verdict, ...]:
-    """Return the verdicts on a scenario's own claims."""
-    verdicts: list[Verdict] = []
-    for plugin in plugins:
-        try:
-            claim = claim_of(plugin)
-        except PluginError as error:
-            claim = Claim(name=plugin.use, text=plugin.use, source="", judge=lambda _: (False, ""), measures=())
-            verdicts.append(Verdict(claim=claim, status="FAIL", found=str(error)))
-            continue
-        verdicts += judge(copy.deepcopy(findings), (claim,))  # its changes there must not reach another claim
-    return tuple(verdicts)
