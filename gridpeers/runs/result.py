@@ -23,7 +23,7 @@ from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.record.record_info import FILE, LIVE
 from gridpeers.scenarios.results.claims import Verdict, benchmark_of, claim_of, judge
 from gridpeers.scenarios.results.findings import Findings, find
-from gridpeers.scenarios.results.history import UNITS, History, as_they_came, windows
+from gridpeers.scenarios.results.history import UNITS, History, windows
 from gridpeers.scenarios.results.island_membership import taken_part
 from gridpeers.scenarios.results.plots.drawing import Drawing, drawing_of
 from gridpeers.scenarios.results.recorded_events import law_failures
@@ -263,13 +263,12 @@ class Result(_FromFolder):
     def checked_case(self) -> CheckedCase:
         """The case as metrics and checks see it: what a check of one's own is called with."""
         measured = frames.windows_of(self._folder.numbers_of(self.case))  # a live run need not reach all events
-        came = windows(as_they_came(self.spec, self.plant_events), self.spec.time.end_s)
         return CheckedCase(
             scenario=self.spec,
             feeder=self._feeder,
             case=self.case,
             history=taken_part(self.spec, self._feeder, self.record),
-            windows=[window for window in came if window.label in measured],
+            windows=[window for window in windows(self.spec, self.plant_events) if window.label in measured],
             events=self.plant_events,
             messages_saved={label: of["messages_saved"] for label, of in measured.items() if of.get("messages_saved")},
             folder=self.folder / self.case,

@@ -18,7 +18,6 @@ from gridpeers.scenarios.results.history import (
     History,
     Nameplates,
     Window,
-    as_they_came,
     messages_saved,
     read_only,
     windows,
@@ -208,9 +207,8 @@ def _measurable(scenario: ScenarioModel, recorded: Recorded) -> list[Window]:
 
     One that the record ends within 0.2 s of its start is left out, and one without rows at its end.
     """
-    came = windows(as_they_came(scenario, recorded.events), scenario.time.end_s)
     least, found = max(STEADY, 2.0 * scenario.time.record_s), list[Window]()
-    for window in came:
+    for window in windows(scenario, recorded.events):
         if window.end > recorded.ended + 1e-9:
             window = replace(window, end=recorded.ended)
             if window.end - window.start < least - 1e-9:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from hashlib import sha256
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -176,35 +177,32 @@ class Window:
         return history.rows(self.rows(history.t))
 
 
-def windows(events: Sequence[tuple[str, float]], end: float) -> tuple[Window, ...]:
-    """Return the windows of events, each its label and time (s)."""
-    ends = [*(t for _, t in events), end][1:]
-    return tuple(Window(label=label, start=t, end=stop) for (label, t), stop in zip(events, ends, strict=True))
-
-
-def as_they_came(scenario: ScenarioModel, recorded: Iterable[PlantEvent]) -> list[tuple[str, float]]:
-    """Return label and time (s) of each event: the scenario's time, or that at which its last inverter moved.
+def windows(scenario: ScenarioModel, recorded: Iterable[PlantEvent]) -> tuple[Window, ...]:
+    """Return the window of each event: from the scenario's time, or that at which its last inverter moved, to the next.
 
     In real time a process takes its time to start, and inverters join later than the scenario says.
     """
     moved = [(event.t, event.subject) for event in recorded if event.kind == "inverter"]
     ends = [*(event.t_s for event in scenario.events), scenario.time.end_s][1:]
-    came = []
+    starts = []
     for event, end in zip(scenario.events, ends, strict=True):
         names = {*event.leave, *event.join}
         times = [t for t, name in moved if name in names and event.t_s - 1e-9 <= t < end]
-        came.append((event.label, max(times, default=event.t_s)))
-    return came
+        starts.append(max(times, default=event.t_s))
+    pairs = pairwise([*starts, scenario.time.end_s])
+    return tuple(
+        Window(label=event.label, start=start, end=end)
+        for event, (start, end) in zip(scenario.events, pairs, strict=True)
+    )
 
 
 def late_moves(scenario: ScenarioModel, recorded: Iterable[PlantEvent]) -> list[str]:
     """Return sentences on events that came later than the scenario says, as processes, or people, took their time."""
-    came = as_they_came(scenario, recorded)
     return [
-        f"{event.label}, meant for t = {event.t_s:g} s, came at {t:g} s, when the last of its agents had moved; "
-        "what is measured of it begins there"
-        for event, (_, t) in zip(scenario.events, came, strict=True)
-        if t > event.t_s + 1e-9
+        f"{event.label}, meant for t = {event.t_s:g} s, came at {came.start:g} s, when the last of its agents had "
+        "moved; what is measured of it begins there"
+        for event, came in zip(scenario.events, windows(scenario, recorded), strict=True)
+        if came.start > event.t_s + 1e-9
     ]
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.scenarios.results.history import History, Nameplates, as_they_came, windows
+from gridpeers.scenarios.results.history import History, Nameplates, windows
 from gridpeers.scenarios.results.metrics import measure
 from gridpeers.scenarios.run_request import Outcome
 from gridpeers.scenarios.schema import load_scenario
@@ -53,7 +53,7 @@ def test_metrics_are_finite_where_there_is_power_and_absent_where_there_is_none(
     """Before the blackout and after the black start the paper's numbers hold; between there is nothing to measure."""
     history, outcome = blackout
     scenario, feeder = load_scenario("blackout")
-    every = windows(as_they_came(scenario, outcome.events), scenario.time.end_s)
+    every = windows(scenario, outcome.events)
     found = {
         window.label: measure(window.cut(history), Nameplates.of(feeder.inverters), window, 60.0) for window in every
     }

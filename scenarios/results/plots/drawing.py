@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 from gridpeers.scenarios.console import in_order, short
-from gridpeers.scenarios.results.history import History, Nameplates, as_they_came
+from gridpeers.scenarios.results.history import History, Nameplates, windows
 from gridpeers.scenarios.results.island_membership import IslandInterval, Islands, RecordedIsland
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.scenarios.schema.configs import limits_of
@@ -75,7 +75,7 @@ class Drawing:
 def drawing_of(scenario: ScenarioModel, cases: Mapping[str, CheckedCase]) -> Drawing:
     """Return the data of the figures of some cases, which are all that their scenario has."""
     *_, last = cases.values()  # in real time each case has its own events
-    came = [(label, t) for label, t in as_they_came(scenario, last.events) if t < last.history.t[-1]]
+    came = [window for window in windows(scenario, last.events) if window.start < last.history.t[-1]]
     commands = [Mark("", event.t, event.subject) for event in last.events if event.kind == "command"]
     what = {event.label: happening(event, scenario) for event in scenario.events}
     limited = dict.fromkeys(limit.inverter for case in scenario.cases for limit in limits_of(scenario, case))
@@ -84,7 +84,7 @@ def drawing_of(scenario: ScenarioModel, cases: Mapping[str, CheckedCase]) -> Dra
         histories={name: case.history for name, case in cases.items()},
         titles={case: rule.title for case, rule in scenario.cases.items()},
         nameplates=Nameplates.of_columns(last.history.inverters, last.feeder),
-        events=[*(Mark(label, t, what.get(label, "")) for label, t in came), *commands],
+        events=[*(Mark(it.label, it.start, what.get(it.label, "")) for it in came), *commands],
         f_nom=last.f_nom,
         without_agent={case: without_agent(scenario, case) for case in scenario.cases},
         moves=any(event.leave or event.join for event in scenario.events)

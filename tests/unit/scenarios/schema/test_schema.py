@@ -15,7 +15,7 @@ from gridpeers.plant.plant_config import SyncCheck
 from gridpeers.plant.tables.read import DATA
 from gridpeers.scenarios.catalogue_files import CATALOGUE
 from gridpeers.scenarios.live.live_options import configure
-from gridpeers.scenarios.results.history import as_they_came, late_moves
+from gridpeers.scenarios.results.history import late_moves, windows
 from gridpeers.scenarios.schema import catalogue, load_scenario
 from gridpeers.scenarios.schema.configs import configs, limits_of
 from gridpeers.scenarios.schema.participants import inverters_of
@@ -289,8 +289,9 @@ def test_an_event_is_measured_from_when_it_came() -> None:
     back = PlantEvent(t=3.32, kind="inverter", subject="inv2", text="inv2 connected")
     other = PlantEvent(t=3.5, kind="inverter", subject="inv3", text="inv3 disconnected")
 
-    assert as_they_came(scenario, [left, back, other]) == [("islanding", 1.0), ("leave", 2.0), ("return", 3.32)]
-    assert as_they_came(scenario, [left]) == [("islanding", 1.0), ("leave", 2.0), ("return", 3.0)]
+    came, kept = ({it.label: it.start for it in windows(scenario, of)} for of in ([left, back, other], [left]))
+    assert came == {"islanding": 1.0, "leave": 2.0, "return": 3.32}
+    assert kept == {"islanding": 1.0, "leave": 2.0, "return": 3.0}
     assert late_moves(scenario, [left]) == []
     assert late_moves(scenario, [left, back])[0].startswith("return, meant for t = 3 s, came at 3.32 s")
 
