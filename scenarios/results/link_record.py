@@ -24,8 +24,6 @@ class LinkRecord:
         """Verdicts, in parts of one link, as they were reported."""
         self.counts: dict[tuple[str, str], LinkCounts] = {}
         """Counts of the messages of each link (src, dst)."""
-        self.garbled = 0
-        """Reports that could not be read."""
         self.failures: list[str] = []
         """Sentences on plugged-in faults that failed."""
         self._sha256: dict[str, str] = {}
@@ -33,8 +31,7 @@ class LinkRecord:
     def __call__(self, report: LinkReport) -> None:
         try:
             data = data_of(report)
-        except msgspec.DecodeError:
-            self.garbled += 1
+        except msgspec.DecodeError:  # not ours
             return
         if self._keep:
             self.traces += data.traces
