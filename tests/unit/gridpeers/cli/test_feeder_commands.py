@@ -29,7 +29,7 @@ def test_a_script_becomes_an_islanding_that_runs(elsewhere: Path) -> None:
     assert code == 0, made
     assert " kW in all, proposed" in made
     assert end == 0, ran
-    line = next(line for line in ran.splitlines() if line.startswith("ring"))
+    line = next(line for line in ran.splitlines() if line.startswith("islanding "))
     assert " 0.000 " in line
     assert float(line.split()[-2]) < 2.0
     events = pd.read_csv("out/ring/events.csv")
