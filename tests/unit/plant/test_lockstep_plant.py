@@ -8,7 +8,6 @@ from typing import Any, Literal
 import pytest
 from msgspec.structs import replace
 
-from gridpeers.plant import recorder_feed
 from gridpeers.plant.meeting import AGAIN
 from gridpeers.plant.plant_config import ScheduledAction
 from gridpeers.plant.plant_interface import Reading
@@ -258,24 +257,6 @@ def test_the_deadline_names_who_is_missing_but_a_plant_that_stood_still_blames_n
 
 
 # ---------------------------------------------------------------- recorders
-
-
-def test_the_plant_waits_for_its_recorder_however_long(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Beyond a window it goes on with no tick; agents hear every second that it waits, and no deadline passes."""
-    lab = recorded(end=20.0)
-    monkeypatch.setattr(recorder_feed, "WINDOW", 20_000)
-    while lab.node.phase == "running":
-        lab.tick(1)
-    tick = lab.node.stepper.tick
-    lab.wait(600.0)
-    waiting = [message for _, message in lab.sent if isinstance(message, Waiting)]
-
-    assert (lab.node.phase, lab.node.stepper.tick, lab.node.stepper.outcome) == ("holding", tick, "")
-    assert len(waiting) == 600
-    assert waiting[0].waits_for == ("history",)
-    lab.needs(2)
-    assert lab.node.phase == "running"
-    assert lab.last(Measurement).seq == tick
 
 
 def test_what_a_recorder_needs_once_more_is_published_again() -> None:

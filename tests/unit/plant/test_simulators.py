@@ -71,9 +71,7 @@ def test_its_table_goes_from_the_scenario_to_its_start() -> None:
 @pytest.mark.parametrize(
     ("plant", "said"),
     [
-        ({"made_up": {"step_s": 9.0}}, "plant.made_up.step_s: 9 s is not plausible for a step (0.001 to 1 s)"),
         ({"made_up": {"mesh": "fine"}}, 'plant.made_up.mesh: must be "coarse"'),
-        ({"made_up": {"steps": 1}}, 'plant.made_up.steps: unknown key; did you mean "step_s"?'),
         ({"simulator": "made-up"}, 'plant.simulator: there is no "made-up"; did you mean "made_up"?'),
     ],
 )

@@ -164,33 +164,6 @@ def test_a_signal_in_the_middle_of_a_message_ends_the_process_and_not_the_messag
         lab.join("inv1")
 
 
-def test_an_ended_run_stays_for_a_recorder_that_stood_still() -> None:
-    """One that comes back five seconds after the end still gets all of it, the last telemetry too."""
-    lab = Lab(recorders=("r",))
-    recorder = KEYS.alive_recorder("r")
-    lab.node.appeared(recorder, lab.now)
-    lab.join("inv1", "inv2", "inv3")
-    lab.step(10)
-    lab.node.vanished(recorder, lab.now)
-    lab.ask("down")
-    for name in ("inv1", "inv2", "inv3"):
-        lab.token(name, gone=True)
-    lab.take(Telemetry)
-    lab.now += 5.0
-    lab.node.expire(lab.now)
-    lab.node.appeared(recorder, lab.now)
-    lab.do()
-    assert lab.node.phase == "recording"
-
-    lab.ask("telemetry", "0")
-    again = lab.take(Telemetry)
-    lab.node.vanished(recorder, lab.now)
-
-    assert [message.seq for message in again] == list(range(len(again)))
-    assert again[-1].final
-    assert lab.node.finished
-
-
 def test_pace_is_not_kept_if_more_than_one_percent_is_late() -> None:
     """Of the steps so far in a run without an end, after the first of them; it is news only once."""
     pacer = RealTimePacer(1.0, now=0.0)

@@ -75,29 +75,6 @@ def test_loads_are_the_published_ones_and_those_of_the_microgrids() -> None:
     assert [event2[zone] / main[zone] for zone in ("MG2", "MG3")] == pytest.approx([0.95, 0.95])
 
 
-def test_inverters_are_those_of_the_paper() -> None:
-    """Three GFM of 600 kW and six GFL of 350 kW, 1 % and 5 % droop, three in each microgrid."""
-    inverters = read_feeder("microgrid123").inverters
-
-    assert [inverter.name for inverter in inverters] == [f"inv{i}" for i in range(1, 10)]
-    assert {inverter.name for inverter in inverters if inverter.kind == "GFM"} == {"inv1", "inv4", "inv7"}
-    assert {(inverter.kind, inverter.P_rated) for inverter in inverters} == {("GFM", 600e3), ("GFL", 350e3)}
-    assert {(inverter.m_p, inverter.m_q) for inverter in inverters} == {(0.01, 0.05)}
-    assert [inverter.microgrid for inverter in inverters] == ["MG1"] * 3 + ["MG2"] * 3 + ["MG3"] * 3
-
-
-def test_quantities_are_in_si_units() -> None:
-    """Tables give kV, kW, m; the feeder has V (line-to-neutral), W, km."""
-    feeder = read_feeder("microgrid123")
-
-    assert feeder.buses[0].V_nom == pytest.approx(4160 / 3**0.5)
-    assert feeder.lines[0].length == pytest.approx(175 * 0.3048e-3)
-    config = next(config for config in feeder.line_configs if config.name == "1")
-    assert config.Z[0][1] == pytest.approx((0.1560 + 0.5017j) / 1.609344)
-    assert config.Z[1][0] == config.Z[0][1]
-    assert config.B[0][0] == pytest.approx(5.6765e-6 / 1.609344)
-
-
 FLOATING = 'bus "610" stands behind a delta winding without ground'
 MISTAKES: list[tuple[str, int, dict[str, str], str]] = [
     ("buses.csv", 3, {"phases": "BX"}, 'phases must be letters out of A, B, C, each once (as "ABC" or "B"), got "BX"'),
