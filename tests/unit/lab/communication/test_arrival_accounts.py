@@ -62,42 +62,36 @@ def always(k: int) -> int:
     return 1
 
 
-def test_a_message_that_is_lost_between_two_processes_is_missing() -> None:
-    """Nothing else is."""
-    assert missing(always, always, []) == []
-    assert missing(always, always, [40]) == [4.0]
+def restarted(k: int) -> int:
+    """Another process from 5 s on."""
+    return 1 if k < 50 else 2
 
 
-def test_the_first_messages_of_a_new_process_come_before_its_links_do() -> None:
-    """Sender or receiver is another process from 5 s on, and nothing arrives before 5.4 s; later ones must."""
-
-    def restarted(k: int) -> int:
-        return 1 if k < 50 else 2
-
-    for ends in ((restarted, always), (always, restarted)):
-        assert missing(*ends, range(50, 54)) == []
-        assert missing(*ends, [50, 51, 52, 53, 70]) == [7.0]
+def silent(since: int, until: int = 100) -> Callable[[int], int | None]:
+    """One process that is dead, or frozen, between two ticks."""
+    return lambda k: None if since <= k < until else 1
 
 
-def test_the_last_words_of_a_killed_process_may_not_leave_it() -> None:
-    """The sender dies at 6 s: what it sent in the last second may be lost, and what it sent before may not."""
+@pytest.mark.parametrize(
+    ("ends", "lost", "told"),
+    [
+        ((always, always), [], []),
+        ((always, always), [40], [4.0]),
+        ((restarted, always), [50, 51, 52, 53, 70], [7.0]),
+        ((always, restarted), [50, 51, 52, 53, 70], [7.0]),
+        ((silent(60), always), [40, 58, 59], [4.0]),
+        ((silent(30, 60), always), [10, *range(29, 65), 80], [1.0, 8.0]),
+        ((always, silent(30, 60)), [10, *range(29, 65), 80], [1.0, 8.0]),
+        ((silent(30, 40), always), [29], [2.9]),
+    ],
+    ids=["sound", "lost", "sender anew", "receiver anew", "killed", "sender frozen", "receiver frozen", "short pause"],
+)
+def test_a_state_is_missing_between_processes_that_are_there(ends: Any, lost: list[int], told: list[float]) -> None:
+    """The first ones of a new process come before its links do; the last second of a killed one may not leave it.
 
-    def killed(k: int) -> int | None:
-        return 1 if k < 60 else None
-
-    assert missing(killed, always, [58, 59]) == []
-    assert missing(killed, always, [40, 59]) == [4.0]
-
-
-def test_links_of_a_process_that_is_frozen_for_long_are_given_up() -> None:
-    """Frozen from 3 to 6 s, heard again from 6.5 s on: what is lost then is missing, as what was lost before."""
-
-    def frozen(k: int) -> int | None:
-        return None if 30 <= k < 60 else 1
-
-    for ends in ((always, frozen), (frozen, always)):
-        assert missing(*ends, range(29, 65)) == []
-        assert missing(*ends, [10, *range(29, 65), 80]) == [1.0, 8.0]
+    Links of a process that is frozen for long are given up, and made anew; those of a short pause stay.
+    """
+    assert missing(*ends, lost) == told
 
 
 @pytest.mark.parametrize("renewed", LINK)
@@ -125,11 +119,6 @@ def test_a_new_session_over_which_nothing_arrives_is_missed() -> None:
     (first, second) = accounts.accounts[LINK]
     assert not first.missing
     assert min(second.missing.values()) == pytest.approx(12.1)
-
-
-def test_a_short_pause_loses_nothing() -> None:
-    """Silent for a second: its links stay, and what was sent before it must arrive."""
-    assert missing(lambda k: None if 30 <= k < 40 else 1, always, [29]) == [2.9]
 
 
 LOST = range(50, 60)

@@ -32,21 +32,14 @@ def test_a_sound_run_passes(sound: CheckedCase, check: str) -> None:
 
 
 @pytest.mark.parametrize("check", COMMUNICATION)
-def test_without_decisions_in_the_record_nothing_is_judged(check: str) -> None:
-    """Record = "physics" has rows and events alone: the verdict says so, and is not "passed"."""
-    found = verdict(
-        ran_with((("record", repr("physics")), ("time.end_s", "1.5"), ("event", repr(EVENT)))).checked_case, check
-    )
+def test_without_decisions_nothing_is_judged(sound: CheckedCase, check: str) -> None:
+    """A run in memory has no messages to look at, and record = "physics" has rows and events alone."""
+    physics = (("record", repr("physics")), ("time.end_s", "1.5"), ("event", repr(EVENT)))
+    without = verdict(ran_with(physics).checked_case, check)
+    none = verdict(replace(sound, folder=None), check)
 
-    assert (found.status, 'record = "physics"' in found.reason) == ("not judged", True)
-
-
-@pytest.mark.parametrize("check", COMMUNICATION)
-def test_without_a_record_nothing_is_judged(sound: CheckedCase, check: str) -> None:
-    """A run in memory has no messages to look at."""
-    found = verdict(replace(sound, folder=None), check)
-
-    assert (found.status, found.reason) == ("not judged", "the run has no record run.mcap")
+    assert (without.status, 'record = "physics"' in without.reason) == ("not judged", True)
+    assert (none.status, none.reason) == ("not judged", "the run has no record run.mcap")
 
 
 def test_the_pass_over_a_record_agrees_with_its_reader() -> None:
