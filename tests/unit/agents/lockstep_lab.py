@@ -12,9 +12,10 @@ from gridpeers.agents.agent_node import AgentNode
 from gridpeers.wire.codec import decode, encode
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.links import Links
-from gridpeers.wire.messages import Measurement, Message, Nameplate, Prepare, Ready, State
+from gridpeers.wire.messages import Message, Nameplate, Prepare, Ready, State
 from gridpeers.wire.node import Fetch, Listen, Publish
 from tests.toy.toy_configs import agent_config
+from tests.toy.toy_messages import measurement, state
 
 KEYS = Keys("toy")
 
@@ -73,16 +74,11 @@ class Lab:
         self.hear(KEYS.control, Prepare(sender="plant", epoch=1, seq=number, t=0.0, roster=roster, instances=ids))
 
     def measure(self, k: int, t: float | None = None) -> None:
-        t = round(0.02 * k, 9) if t is None else t
-        message = Measurement(
-            sender="plant", epoch=1, seq=k, t=t, to="inv1", P=5e4, Q=0.0, V=277.0, f=59.9,
-            P_set=5e4, V_set=277.0, grid_connected=False, island="inv1",
-        )  # fmt: skip
-        self.hear(KEYS.measurement("inv1"), message)
+        changes = {} if t is None else {"t": t}
+        self.hear(KEYS.measurement("inv1"), measurement(k, f=59.9, **changes))
 
     def state(self, name: str, k: int, P_set: float = 5e4) -> None:
-        state = State(sender=name, epoch=1, seq=k, t=round(0.02 * k, 9), P_set=P_set, V_set=277.0, Q=0.0)
-        self.hear(KEYS.state(name), state)
+        self.hear(KEYS.state(name), state(name, k, P_set=P_set, Q=0.0))
 
     def take(self) -> list[tuple[str, str]]:
         done, self.done = self.done, []

@@ -11,12 +11,12 @@ from gridpeers.agents.agent_node import AgentNode
 from gridpeers.agents.laws.law import Law
 from gridpeers.wire.codec import decode, encode
 from gridpeers.wire.keys import Keys
-from gridpeers.wire.messages import AgentStatus, Measurement, Message, State
+from gridpeers.wire.messages import AgentStatus, Message, State
 from gridpeers.wire.node import Fetch, Listen, Log, Publish
 from tests.toy.toy_configs import agent_config
+from tests.toy.toy_messages import measurement, state
 
 KEYS = Keys("toy")
-T_C = 0.02
 
 
 class Lab:
@@ -68,15 +68,10 @@ class Lab:
             self.plate(name)
 
     def measure(self, k: int, **changes: Any) -> None:
-        values: dict[str, Any] = dict(
-            sender="plant", epoch=1, seq=k, t=round(k * T_C, 9), to="inv1", P=50e3, Q=0.0, V=277.0, f=60.0,
-            P_set=50e3, V_set=277.0, grid_connected=False, island="inv1", roster=(),
-        )  # fmt: skip
-        self.hear(KEYS.measurement("inv1"), Measurement(**values | changes))
+        self.hear(KEYS.measurement("inv1"), measurement(k, **changes))
 
     def state(self, name: str, seq: int, t: float = 0.0, **changes: Any) -> None:
-        values: dict[str, Any] = dict(sender=name, epoch=1, seq=seq, t=t, P_set=80e3, V_set=277.0, Q=0.0, island="inv1")
-        self.hear(KEYS.state(name), State(**values | changes))
+        self.hear(KEYS.state(name), state(name, seq, **{"t": t, "Q": 0.0, "island": "inv1"} | changes))
 
     def go(self, seconds: float) -> None:
         self.now += seconds + 1e-9  # sums of periods are not to fall short of their products

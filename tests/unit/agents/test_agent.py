@@ -1,7 +1,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal
+from functools import partial
+from typing import Literal
 
 import pytest
 from msgspec.structs import replace
@@ -9,35 +10,16 @@ from msgspec.structs import replace
 from gridpeers.agents.agent import Agent
 from gridpeers.agents.agent_config import Control, DegradedCommunication
 from gridpeers.agents.laws.law import Law, Neighbour, Own, SetPoints
-from gridpeers.wire.messages import OFF, Measurement, Nameplate, State
+from gridpeers.wire.messages import OFF, Nameplate
+from tests.toy import toy_messages
 from tests.toy.toy_configs import ALL_FULL, agent_config
 from tests.unit.agents.law_steps import P_set_step, V_set_step
 
 ROSTER = ("inv1", "inv2", "inv3")
 
 
-def measurement(k: int = 0, **changes: Any) -> Measurement:
-    values: dict[str, Any] = {
-        "sender": "plant",
-        "epoch": 1,
-        "seq": k,
-        "t": 0.02 * k,
-        "to": "inv1",
-        "P": 90e3,
-        "Q": 20e3,
-        "V": 271.46,
-        "f": 59.7,
-        "P_set": 50e3,
-        "V_set": 277.0,
-        "grid_connected": False,
-        "island": "inv1",
-        "roster": ROSTER,
-    }
-    return Measurement(**values | changes)
-
-
-def state(sender: str, k: int = 0, *, P_set: float = 60e3, Q: float = 10e3, epoch: int = 1) -> State:
-    return State(sender=sender, epoch=epoch, seq=k, t=0.02 * k, P_set=P_set, V_set=277.0, Q=Q)
+measurement = partial(toy_messages.measurement, P=90e3, Q=20e3, V=271.46, f=59.7, roster=ROSTER)
+state = partial(toy_messages.state, P_set=60e3)
 
 
 def plate(name: str, *, epoch: int = 1, P_rated: float = 100e3) -> Nameplate:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from math import exp
 from typing import Any
 
@@ -14,8 +15,8 @@ from gridpeers.agents.agent import Agent
 from gridpeers.agents.agent_config import Control, DegradedCommunication, Gains
 from gridpeers.agents.degraded_communication import IslandDetector, SaturationDetector
 from gridpeers.wire.codec import encode
-from gridpeers.wire.messages import Measurement, State
 from tests.toy.toy_configs import agent_config
+from tests.toy.toy_messages import measurement, state
 
 T, M_P, M_Q, ALPHA = 0.02, 0.01, 0.05, 1.0
 KAPPA, K_Q = M_P / Gains().k_p, Gains().k_q
@@ -33,17 +34,7 @@ def agent(name: str = "inv1", **degraded_communication: Any) -> Agent:
     return made
 
 
-def state(sender: str, k: int, *, P_set: float = 80e3, Q: float = 10e3) -> State:
-    return State(sender=sender, epoch=1, seq=k, t=T * k, P_set=P_set, V_set=277.0, Q=Q)
-
-
-def measured(k: int, **changes: Any) -> Measurement:
-    """Measurement in an island at nominal frequency and voltage, on the droop characteristic."""
-    values: dict[str, Any] = dict(
-        sender="plant", epoch=1, seq=k, t=T * k, to="inv1", P=50e3, Q=0.0, V=277.0, f=60.0, P_set=50e3,
-        V_set=277.0, grid_connected=False, island="", roster=ROSTER,
-    )  # fmt: skip
-    return Measurement(**values | changes)
+measured = partial(measurement, island="", roster=ROSTER)
 
 
 def moved(P_set: float, P_bar: float, rate: float) -> float:

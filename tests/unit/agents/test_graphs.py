@@ -20,9 +20,9 @@ from gridpeers.agents.graphs import (
     is_pairwise,
     make_graph,
 )
-from gridpeers.wire.messages import Measurement
 from gridpeers.wire.plugins.plugin import Plugin, plugin_of, plugin_problems
 from tests.toy.toy_configs import agent_config
+from tests.toy.toy_messages import measurement
 
 PAPER = {
     f"inv{i}": SimpleNamespace(kind="GFM" if i in (1, 4, 7) else "GFL", microgrid=f"mg{(i + 2) // 3}")
@@ -176,8 +176,7 @@ def test_an_agent_whose_rule_fails_in_a_run_stands_still_and_says_so(folder: str
     agent = Agent(agent_config("inv1", control("my_graphs:of_three", folder)))
     for name in ("inv2", "inv3"):
         agent.meet(Agent(agent_config(name)).nameplate)
-    now = Measurement(sender="plant", epoch=1, seq=0, t=0.0, to="inv1", P=3e4, Q=0.0, V=277.0, f=59.9, P_set=3e4,
-                      V_set=277.0, grid_connected=False, island="inv1", roster=("inv1",))  # fmt: skip
+    now = measurement(P_set=3e4)
 
     assert agent.in_neighbours(("inv1", "inv2", "inv3")) == ()
     assert agent.tick(now).fault == ""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from tests.unit.agents.realtime_lab import T_C, Lab
+from tests.toy.toy_messages import T_C
+from tests.unit.agents.realtime_lab import Lab
 
 
 def test_a_neighbour_whose_certificate_no_link_has_is_not_used() -> None:

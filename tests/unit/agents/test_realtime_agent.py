@@ -8,7 +8,8 @@ from msgspec.structs import replace
 from gridpeers.agents.agent_config import DegradedCommunication
 from gridpeers.wire.messages import Leave, Stop
 from tests.toy.toy_configs import ALL_FULL
-from tests.unit.agents.realtime_lab import KEYS, T_C, Lab, running
+from tests.toy.toy_messages import T_C
+from tests.unit.agents.realtime_lab import KEYS, Lab, running
 
 
 def test_it_waits_visibly_for_a_plant_and_joins_when_it_measures() -> None:

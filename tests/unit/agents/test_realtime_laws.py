@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 from gridpeers.agents.laws.law import Law, Neighbour, Own, SetPoints
 from gridpeers.wire.messages import State
-from tests.unit.agents.realtime_lab import KEYS, T_C, running
+from tests.toy.toy_messages import T_C
+from tests.unit.agents.realtime_lab import KEYS, running
 
 
 class Quiet(Law):
@@ -64,7 +65,7 @@ def test_a_law_that_fails_is_told_once_and_the_agent_says_nothing_more() -> None
 
     step = "step at t = 0.02 s raised ZeroDivisionError: float division by zero"
     assert [state.idle for state in said] == [True]
-    assert said[0].fault == f"law consensus (test_realtime_laws.py:31): {step}"
+    assert said[0].fault == f"law consensus (test_realtime_laws.py:32): {step}"
     assert lab.said[-1].startswith(f"inv1: {said[0].fault}")
     assert not lab.side.finished
     assert not lab.side.session_broken

@@ -3,7 +3,8 @@ from __future__ import annotations
 import pytest
 
 from gridpeers.wire.messages import Waiting
-from tests.unit.agents.realtime_lab import KEYS, T_C, Lab, running
+from tests.toy.toy_messages import T_C
+from tests.unit.agents.realtime_lab import KEYS, Lab, running
 
 
 def test_an_agent_whose_plant_is_there_but_mute_begins_again_with_a_new_session() -> None:

@@ -18,8 +18,9 @@ from gridpeers.agents.carriers.law_check import law_problems
 from gridpeers.agents.carriers.law_registry import shared_by
 from gridpeers.agents.laws.law import Law, Neighbour, Own, SetPoints
 from gridpeers.scenarios.schema.plugin_keys import law_of
-from gridpeers.wire.messages import SHARED_LIMIT, Measurement, State
+from gridpeers.wire.messages import SHARED_LIMIT, State
 from tests.toy.toy_configs import ALL_FULL, agent_config
+from tests.toy.toy_messages import measurement, state
 
 OMEGA = SharedQuantity(name="Omega", unit="pu", low=-0.05, high=0.05, help="Integral.")
 PROGRAM = {"command": ["cat"], "shared": [{"name": "Omega", "unit": "pu", "low": -0.05, "high": 0.05}]}
@@ -54,16 +55,8 @@ def agent(law: Law | None = None) -> Agent:
     return made
 
 
-def measurement(k: int) -> Measurement:
-    return Measurement(
-        sender="plant", epoch=1, seq=k, t=0.02 * k, to="inv1", P=5e4, Q=0.0, V=277.0, f=60.0, P_set=5e4, V_set=277.0,
-        grid_connected=False, island="inv1",
-    )  # fmt: skip
-
-
-def state(k: int, Omega: float) -> State:
-    shared = {"Omega": Omega, "other": 7.0}
-    return State(sender="inv2", epoch=1, seq=k, t=0.02 * k, P_set=5e4, V_set=277.0, Q=0.0, shared=shared)
+def sharing(k: int, Omega: float) -> State:
+    return state("inv2", k, shared={"Omega": Omega, "other": 7.0})
 
 
 def test_a_class_declares_by_fields_that_are_no_parameters() -> None:
@@ -144,8 +137,8 @@ def test_a_state_with_a_value_beyond_its_range_is_dropped_and_counted() -> None:
     """The last good one stays; a value that nobody declared has no range."""
     it = agent()
 
-    assert it.hear(state(1, 0.05))
-    assert not it.hear(state(2, 0.06))
+    assert it.hear(sharing(1, 0.05))
+    assert not it.hear(sharing(2, 0.06))
 
     assert it.heard["inv2"].seq == 1
     assert it.rejects.counts == {"implausible": 1}
