@@ -186,12 +186,7 @@ class NetworkEquations:
         self._Y[self.formed, self.formed] += y_f[:, None]
         self.nodes = K  # nodes whose voltages are the unknowns
         self.rotates = not circuit.sources.size
-        self._factors: tuple[Real, NDArray[np.int32]] | None = None
-
-    @property
-    def factorised(self) -> bool:
-        """Whether there is a tangent."""
-        return self._factors is not None
+        self.factors: tuple[Real, NDArray[np.int32]] | None = None
 
     def branch_voltages(self, V: Complex) -> Complex:
         """Return the voltages (V) of `branches` from those of the nodes."""
@@ -219,12 +214,12 @@ class NetworkEquations:
         for at, change, weight in zip(self.fed, by_voltage, weights, strict=True):
             both, row = np.concatenate([at, at + n]), np.concatenate([weight.real, -weight.imag])
             J[np.ix_(both, both)] -= np.outer(np.concatenate([change.real, change.imag]), row)
-        self._factors = lu_factor(J)
+        self.factors = lu_factor(J)
 
     def step(self, residual: Complex) -> Complex:
         """Return the Newton step (V) of a residual (A)."""
-        assert self._factors is not None
-        d = lu_solve(self._factors, -np.concatenate([residual.real, residual.imag]))
+        assert self.factors is not None
+        d = lu_solve(self.factors, -np.concatenate([residual.real, residual.imag]))
         n = residual.size
         step: Complex = d[:n] + 1j * d[n:]
         return step
@@ -277,10 +272,8 @@ class DaeDynamics(Dynamics):
         units, circuit = self.inverters, self.network.circuit
         if self._solved is circuit:
             return
-        if not self.network.reduction.online.all():
-            raise RuntimeError("the reference has no inverter that is off")
-        if units.single.any():
-            raise RuntimeError("the reference has no single-phase inverter")
+        assert self.network.reduction.online.all()
+        assert not units.single.any()
         self._gfm, self._gfl = GfmEquations(_those(units.units, "GFM")), GflEquations(_those(units.units, "GFL"))
         former, follower = self._places()
         terminals = circuit.terminals
@@ -305,7 +298,7 @@ class DaeDynamics(Dynamics):
         weights = np.conj(TURN) * np.exp(-1j * gfl[1])[:, None] / (3.0 * self._gfl.V_b)[:, None]
         for count in range(60):
             currents, by_u = self._gfl.currents(gfl, V[network.fed])
-            if count % 8 == 7 or not network.factorised:
+            if count % 8 == 7 or network.factors is None:
                 network.factorise(V, by_u, weights)
             step = network.step(network.residual(V, E, currents))
             V = V + step
