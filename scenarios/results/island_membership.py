@@ -48,16 +48,11 @@ def closed_switches(
     for event in events:
         if event.subject not in names:
             continue  # an outside plant may have others
-        if is_closed(event):
+        if event.closed:
             closed.add(names[event.subject])
         else:
             closed.discard(names[event.subject])
     return frozenset(closed)
-
-
-def is_closed(event: PlantEvent) -> bool:
-    """Return the position of a switch from its event on; of a table of events, by its words."""
-    return " closed" in event.text if event.closed is None else event.closed
 
 
 class RecordedIsland(NamedTuple):

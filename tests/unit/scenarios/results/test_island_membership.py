@@ -13,7 +13,6 @@ import gridpeers as gp
 from gridpeers.plant.equipment.connectivity import islands_after
 from gridpeers.scenarios.results.history import Window
 from gridpeers.scenarios.results.island_membership import (
-    closed_switches,
     island_intervals,
     islands_at_end,
     switch_events,
@@ -108,17 +107,6 @@ def test_without_a_wait_the_islands_are_those_that_the_scenario_plans(name: str)
             part.history.inverters for window, of in case.parts.items() if window.label == event.label for part in of
         }
         assert found == members - {()}
-
-
-def test_an_operation_without_effect_leaves_a_switch_as_it_was() -> None:
-    """A table of events has no positions: its words say them, also of a switch that was open already."""
-    feeder = ran("microgrid-switching").checked_case.feeder
-    texts = ("opened", "was open already", "closed in step: 1.0 deg", "was closed already", "opened")
-    events = [PlantEvent(t=1.0, kind="switch", subject="67s-67", text=f"switch sw1_2 (67s-67) {it}") for it in texts]
-
-    found = ["67s-67" in closed_switches(feeder, events[: i + 1]) for i in range(len(events))]
-
-    assert found == [False, False, True, True, False]
 
 
 def test_a_federations_plant_that_tells_of_no_switch_does_what_the_scenario_asks() -> None:
