@@ -61,32 +61,44 @@ _Node = PlantNode | AgentNode
 
 
 class InprocessBus:
-    """Deliver the messages of the nodes, in the order of publication; `newcomer` makes an agent that joins."""
+    """Plant and agents as the nodes that processes have; it delivers their messages in the order of publication."""
 
     def __init__(
         self,
-        plant: PlantNode,
-        agents: Iterable[AgentNode],
+        config: PlantConfig,
+        agents: Sequence[AgentConfig],
+        laws: list[Law],
+        plant: PlantLike,
         on_telemetry: Callable[[Telemetry], None],
         on_other: Callable[[Other], None],
-        newcomer: Callable[[str], AgentNode],
-        known: KnownAgents,
     ) -> None:
-        self._plant, self._agents = plant, list(agents)
-        self._newcomer, self._known = newcomer, known
+        self.plant = PlantNode(config, plant, links_of(PLANT, config.links))
+        self.agents: list[AgentNode] = []
+        """All agents so far, also those that have stopped; their laws are added to `laws`."""
+        self._configs, self._laws = {agent.name: agent for agent in agents}, laws
+        self._known = KnownAgents(agents[0].control if agents else Control(secondary="none", graph="none"))
+        self._running = [self._agent(agent.name) for agent in agents if agent.name in config.agents]
         self._awaited: list[str] = []
         self._on_telemetry, self._on_other = on_telemetry, on_other
         self._subscribers: defaultdict[str, list[_Node]] = defaultdict(list)
-        self._telemetry = plant.keys.telemetry
+        self._telemetry = self.plant.keys.telemetry
         self._nameplates: dict[str, bytes] = {}
         self._queue: deque[tuple[tuple[_Node, ...], str, bytes]] = deque()
         """Messages on their way: receivers, key and bytes."""
 
+    def _agent(self, name: str) -> AgentNode:
+        config = self._configs[name]
+        assert config.control == self._known.control
+        self._laws.append(make_law(config.control))
+        links = links_of(name, config.links)
+        self.agents.append(AgentNode(config, f"p{len(self.agents)}", links, self._laws[-1], self._known))
+        return self.agents[-1]
+
     def run(self) -> None:
         """Run until the plant is over. There is no clock: `now` is 0, and no deadline passes."""
-        plant = self._plant
+        plant = self.plant
         plant.start(0.0)
-        for agent in self._agents:
+        for agent in self._running:
             self._start(agent)
         while not plant.finished:
             self._do(plant, plant.take_actions())
@@ -99,8 +111,10 @@ class InprocessBus:
             self._end_the_stopped()
             awaited, self._awaited = self._awaited, []
             for name in awaited:
-                self._agents.append(self._newcomer(name))
-                self._start(self._agents[-1])
+                config = self._configs[name]
+                self._configs[name] = msgspec.structs.replace(config, epoch=config.epoch + 1)
+                self._running.append(self._agent(name))
+                self._start(self._running[-1])
             if not (plant.finished or plant.work(0.0) or self._queue):
                 missing = "; ".join(f"{what} from {who}" for what, who in plant.missing_messages()[:5])
                 raise AssertionError(f"stalled in phase {plant.phase} at tick {plant.stepper.tick} without {missing}")
@@ -109,18 +123,18 @@ class InprocessBus:
     def _start(self, agent: AgentNode) -> None:
         """Start an agent: it and the plant see each other, and it is introduced to all agents at once."""
         agent.start(0.0)
-        keys = self._plant.keys
+        keys = self.plant.keys
         for key in agent.subscriptions:
             self._subscribers[key].append(agent)
         nameplate, answer = agent.nameplate
         self._nameplates[nameplate] = answer
         _, _, inverter, instance = keys.parts(agent.token)
         for key in (keys.state(inverter), keys.ready(inverter), keys.report(inverter), keys.journal(inverter)):
-            if self._plant not in self._subscribers[key]:
-                self._subscribers[key].append(self._plant)
-        self._plant.appeared(agent.token, 0.0)
-        self._do(self._plant, self._plant.take_actions())
-        agent.appeared(self._plant.token, 0.0)
+            if self.plant not in self._subscribers[key]:
+                self._subscribers[key].append(self.plant)
+        self.plant.appeared(agent.token, 0.0)
+        self._do(self.plant, self.plant.take_actions())
+        agent.appeared(self.plant.token, 0.0)
         introduced = decode(answer)
         assert isinstance(introduced, Nameplate)
         self._known.members.appeared(inverter, instance)
@@ -147,17 +161,17 @@ class InprocessBus:
                 self._subscribers[action.key].append(side)
 
     def _end_the_stopped(self) -> None:
-        stopped = {agent for agent in self._agents if agent.finished}
+        stopped = {agent for agent in self._running if agent.finished}
         if not stopped:
             return
-        self._agents = [agent for agent in self._agents if not agent.finished]
+        self._running = [agent for agent in self._running if not agent.finished]
         for receivers in self._subscribers.values():
             receivers[:] = [node for node in receivers if node not in stopped]
         for agent in stopped:
             self._nameplates.pop(agent.nameplate[0])
-            self._plant.vanished(agent.token, 0.0)
-            self._known.members.vanished(*self._plant.keys.parts(agent.token)[2:])
-            for other in self._agents:
+            self.plant.vanished(agent.token, 0.0)
+            self._known.members.vanished(*self.plant.keys.parts(agent.token)[2:])
+            for other in self._running:
                 other.vanished(agent.token, 0.0)
 
 
@@ -186,8 +200,9 @@ def run_inprocess(
         events.extend(telemetry.events)
         on_telemetry(telemetry)
 
-    known = {config.name: config for config in agent_configs}
+    configs = tuple(agent_configs)
     laws: list[Law] = []
+    bus: InprocessBus | None = None
     with ExitStack() as stack:
         if plant is None:
             from gridpeers.plant.build import start_plant  # numba and scipy: only for who runs a plant
@@ -200,55 +215,25 @@ def run_inprocess(
             stack.callback(plant.close)
         stack.callback(close_laws, laws)
         plant_config = msgspec.structs.replace(plant_config, recorders=())
-        agents: list[AgentNode] = []
-        nodes: tuple[_Node, ...] = ()
-        if messages or messages_decide(plant_config, tuple(known.values())):
-            node = _run_on_bus(plant_config, known, laws, agents, plant, note, on_other)
-            stepper, nodes = node.stepper, (node, *agents)
+        if messages or messages_decide(plant_config, configs):
+            bus = InprocessBus(plant_config, configs, laws, plant, note, on_other)
+            bus.run()
+            stepper = bus.plant.stepper
         else:
-            for config in known.values():  # one by one: those that are made are closed if the next cannot be
+            for config in configs:  # one by one: those that are made are closed if the next cannot be
                 laws.append(make_law(config.control))
-            stepper = _run_direct(plant_config, tuple(known.values()), laws, plant, note, on_other)
-    failed = tuple(agent.failed for agent in agents if agent.failed)
-    rejects = tuple(line for each in nodes for line in each.rejects.take_lines())
+            stepper = _run_direct(plant_config, configs, laws, plant, note, on_other)
+    notes: list[str] = []
+    if bus is not None:
+        notes += [agent.failed for agent in bus.agents if agent.failed]
+        nodes: list[_Node] = [bus.plant, *bus.agents]
+        notes += [line for node in nodes for line in node.rejects.take_lines()]
     return Outcome(
         broke=stepper.outcome,
         reproducible=stepper.reproducible,
         events=tuple(events),
-        notes=(*failed, *rejects),
+        notes=tuple(notes),
         ticks=stepper.tick,
         start_s=started - began,
         run_s=perf_counter() - started,
     )
-
-
-def _run_on_bus(
-    plant_config: PlantConfig,
-    known: dict[str, AgentConfig],
-    laws: list[Law],
-    agents: list[AgentNode],
-    plant: PlantLike,
-    on_telemetry: Callable[[Telemetry], None],
-    on_other: Callable[[Other], None],
-) -> PlantNode:
-    """Run with messages; return the plant's core, and add the agents' cores and their laws to the lists."""
-    side = PlantNode(plant_config, plant, links_of(PLANT, plant_config.links))
-    control = next((config.control for config in known.values()), Control(secondary="none", graph="none"))
-    known_agents = KnownAgents(control)
-
-    def agent_of(config: AgentConfig, instance: str) -> AgentNode:
-        assert config.control == known_agents.control
-        laws.append(make_law(config.control))
-        return AgentNode(config, instance, links_of(config.name, config.links), laws[-1], known_agents)
-
-    agents += [
-        agent_of(config, f"p{i}") for i, config in enumerate(known.values()) if config.name in plant_config.agents
-    ]
-
-    def newcomer(name: str) -> AgentNode:
-        known[name] = msgspec.structs.replace(known[name], epoch=known[name].epoch + 1)
-        agents.append(agent_of(known[name], f"p{len(known) + len(agents)}"))
-        return agents[-1]
-
-    InprocessBus(side, agents, on_telemetry, on_other, newcomer, known_agents).run()
-    return side
