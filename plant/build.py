@@ -9,12 +9,12 @@ from gridpeers.plant.equipment.derived_feeders import changed
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantConfig, PlantSettings
-from gridpeers.plant.plant_interface import LivePlant
+from gridpeers.plant.plant_interface import PlantLike
 from gridpeers.plant.simulators import OURS, SIMULATORS
 from gridpeers.plant.tables import read_feeder
 
 
-def start_plant(config: PlantConfig) -> LivePlant:
+def start_plant(config: PlantConfig) -> PlantLike:
     """Start the plant of the configuration's simulator; its `close` ends it.
 
     FeederError for bad tables; RuntimeError if it cannot start: it says why, and what to do.

@@ -55,11 +55,11 @@ class PlantLike(Protocol):
 
 
 class LivePlant(PlantLike, Protocol):
-    """The further part that real time uses: switches that people operate, and loads that they set."""
+    """The further part that real time uses, in which our plant alone runs: switches and loads that people set."""
 
     @property
     def switches(self) -> Mapping[str, bool]:
-        """Whether each switch is closed, by its name. Empty where another program has the switches."""
+        """Whether each switch is closed, by its name."""
 
     def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
         """Operate a switch ("open" or "close") at the next step; return whether it was in that state already.
@@ -88,21 +88,3 @@ class RecordedPlant:
     def take_events(self) -> tuple[PlantEvent, ...]:
         events, self._events = tuple(self._events), []
         return events
-
-
-class SimulatedPlant:
-    """The plant of another simulator, which runs in simulated time alone: by hand nobody operates or sets anything."""
-
-    @property
-    def switches(self) -> Mapping[str, bool]:
-        return {}
-
-    def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
-        raise ValueError(f"switch {name}: only the events of the scenario operate the switches of this simulator")
-
-    @property
-    def loads(self) -> Mapping[str, complex]:
-        return {}
-
-    def set_load(self, name: str, setting: LoadSetting) -> str:
-        raise ValueError(f"load {name}: nothing sets the loads of this simulator")

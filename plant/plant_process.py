@@ -13,7 +13,7 @@ from msgspec.structs import replace
 
 from gridpeers.plant.known_names import COMPILING, LISTENING, READY
 from gridpeers.plant.plant_config import PlantConfig
-from gridpeers.plant.plant_interface import LivePlant
+from gridpeers.plant.plant_interface import PlantLike
 from gridpeers.plant.plant_node import PlantNode
 from gridpeers.wire.driver.drive import StoppedError, drive, perform, serve
 from gridpeers.wire.driver.machine import OpenFilesError, check_open_files, schedule_as_batch
@@ -23,7 +23,7 @@ from gridpeers.wire.messages import PLANT
 from gridpeers.wire.wording import not_importable
 
 
-def build(config: PlantConfig) -> LivePlant:
+def build(config: PlantConfig) -> PlantLike:
     # numba and scipy take a second: they are imported only once the session is open
     from gridpeers.plant.build import start_plant
 
@@ -35,7 +35,7 @@ print_word = partial(print, flush=True)  # at once, for the parent process
 
 def run_plant(
     config: PlantConfig,
-    builder: Callable[[PlantConfig], LivePlant] = build,
+    builder: Callable[[PlantConfig], PlantLike] = build,
     make_links: MakeLinks = no_links,
     on_word: Callable[[str], None] = print_word,
 ) -> str:
@@ -56,7 +56,7 @@ def run_plant(
         check_open_files(PLANT, processes + len(config.recorders))
     except OpenFilesError as error:
         raise ConfigurationError(str(error)) from None
-    plant: LivePlant | None = None
+    plant: PlantLike | None = None
     listen, connect = config.listen, config.connect
     session = Session(
         "plant",

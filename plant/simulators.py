@@ -11,7 +11,7 @@ from gridpeers.wire.plugins.registry import Registry
 if TYPE_CHECKING:
     from gridpeers.plant.equipment import Tables
     from gridpeers.plant.plant_config import PlantConfig
-    from gridpeers.plant.plant_interface import LivePlant
+    from gridpeers.plant.plant_interface import PlantLike
 
 OURS = "gridpeers"
 
@@ -26,7 +26,7 @@ class Simulator:
     table: ClassVar[type[msgspec.Struct] | None] = None
     """Its own table of a scenario, `[plant.NAME]`; a method `relations` returns what is wrong with the values."""
 
-    def start(self, config: PlantConfig, feeder: Tables) -> LivePlant:
+    def start(self, config: PlantConfig, feeder: Tables) -> PlantLike:
         """Start the plant on a feeder with the scenario's changes; RuntimeError says why it cannot start."""
         raise NotImplementedError
 

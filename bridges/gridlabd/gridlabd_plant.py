@@ -24,7 +24,7 @@ from gridpeers.plant.feeder.protection import Relays
 from gridpeers.plant.feeder.switchboard import Switchboard
 from gridpeers.plant.inverters.gfl import Gfl
 from gridpeers.plant.plant_config import PlantSettings, PowerLimit
-from gridpeers.plant.plant_interface import Reading, RecordedPlant, SimulatedPlant
+from gridpeers.plant.plant_interface import Reading, RecordedPlant
 from gridpeers.plant.request_process import ProcessEndedError, RequestProcess
 from gridpeers.plant.tables.read import DATA
 from gridpeers.wire.messages import PlantEvent
@@ -35,7 +35,7 @@ REST = 0.5
 """Time (s) that GridLAB-D rests before t = 0, holding the set-points of the start: its own equilibrium, not ours."""
 
 
-class GridlabdPlant(SimulatedPlant, RecordedPlant):
+class GridlabdPlant(RecordedPlant):
     """A plant with GridLAB-D's numbers, controlled by the same agents (`gridpeers.plant.plant_interface.PlantLike`).
 
     GridLAB-D's initialisation takes the powers of the inverters and chooses set-points that give them; a scenario gives

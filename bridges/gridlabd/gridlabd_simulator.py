@@ -13,7 +13,7 @@ from gridpeers.plant.equipment import Tables
 from gridpeers.plant.equipment.connectivity import Node
 from gridpeers.plant.inverters.gfl import Gfl
 from gridpeers.plant.plant_config import FeederChanges, PlantConfig
-from gridpeers.plant.plant_interface import LivePlant
+from gridpeers.plant.plant_interface import PlantLike
 from gridpeers.plant.simulators import Simulator
 from gridpeers.scenarios.schema.scenario_errors import Problems
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
@@ -27,7 +27,7 @@ class GridlabdSimulator(Simulator):
     package = "gridlabd"
     words = 'the plant of simulator "gridlabd"'
 
-    def start(self, config: PlantConfig, feeder: Tables) -> LivePlant:
+    def start(self, config: PlantConfig, feeder: Tables) -> PlantLike:
         from gridpeers.bridges.gridlabd.glm import write_tables
         from gridpeers.bridges.gridlabd.gridlabd_plant import GridlabdPlant  # scenarios are checked without it
         from gridpeers.plant.feeder import Plant

@@ -24,7 +24,7 @@ from gridpeers.bridges.helics.federate import (
 from gridpeers.bridges.helics.helics_simulator import settings_of
 from gridpeers.plant.equipment import Tables
 from gridpeers.plant.plant_config import PlantConfig
-from gridpeers.plant.plant_interface import Reading, RecordedPlant, SimulatedPlant
+from gridpeers.plant.plant_interface import Reading, RecordedPlant
 from gridpeers.wire.codec import decode_foreign
 from gridpeers.wire.messages import NAME, PlantEvent
 from gridpeers.wire.timing import time_of
@@ -33,7 +33,7 @@ from gridpeers.wire.wording import first_of
 SHOWN = 4  # topics that an error names
 
 
-class HelicsPlant(SimulatedPlant, RecordedPlant):
+class HelicsPlant(RecordedPlant):
     """The plant's side of our agents, and a controller in the federation.
 
     At record time t it asks for t + `ACT` and reads what was published until t; at a tick it publishes there the

@@ -9,7 +9,7 @@ import msgspec
 
 from gridpeers.plant.equipment import Tables
 from gridpeers.plant.plant_config import PlantConfig, PlantSettings
-from gridpeers.plant.plant_interface import LivePlant
+from gridpeers.plant.plant_interface import PlantLike
 from gridpeers.plant.simulators import Simulator
 from gridpeers.wire.messages import NAME
 from gridpeers.wire.schema.table_schema import Example, Plausible, Problem, Unit
@@ -59,7 +59,7 @@ class HelicsSimulator(Simulator):
     elsewhere = True
     table = HelicsSettings
 
-    def start(self, config: PlantConfig, feeder: Tables) -> LivePlant:
+    def start(self, config: PlantConfig, feeder: Tables) -> PlantLike:
         from gridpeers.bridges.helics.helics_plant import HelicsPlant  # scenarios are checked without it
 
         return HelicsPlant(config, feeder)

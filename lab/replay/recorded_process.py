@@ -15,7 +15,7 @@ from gridpeers.agents.agent_node import AgentNode
 from gridpeers.agents.carriers.law_registry import make_law
 from gridpeers.agents.laws.law import Law
 from gridpeers.plant.plant_config import PlantConfig
-from gridpeers.plant.plant_interface import LivePlant
+from gridpeers.plant.plant_interface import PlantLike
 from gridpeers.plant.plant_node import PlantNode
 from gridpeers.scenarios.drivers.telemetry_client import with_recorder
 from gridpeers.scenarios.emulation.emulated_links import links_of
@@ -192,7 +192,7 @@ def require_arrivals(record: RunRecord) -> None:
 # -------------------------------------------------------------------- a process made again
 
 
-MakePlant = Callable[[PlantConfig], LivePlant]
+MakePlant = Callable[[PlantConfig], PlantLike]
 
 
 class _Outbox(Traffic):
@@ -285,7 +285,7 @@ def agent_again(
         return ReplayedProcess(AgentNode(config, instance, links, laws[-1]), links)
 
 
-def plant_again(recorded: RecordedProcess, info: RecordInfo, plant: LivePlant, links: Links | None) -> ReplayedProcess:
+def plant_again(recorded: RecordedProcess, info: RecordInfo, plant: PlantLike, links: Links | None) -> ReplayedProcess:
     """Make the process of the plant again, around a plant at t = 0; it waits for its recorder, as in the run."""
     config = with_recorder(info.plant, waits=info.driver == LIVE)
     return ReplayedProcess(PlantNode(replace(config, epoch=recorded.epoch, record="physics"), plant, links), links)
@@ -298,6 +298,6 @@ def recorded_links(info: RecordInfo, name: str) -> Links | None:
         return links_of(name, tree)
 
 
-def start_plant_of(info: RecordInfo, make_plant: MakePlant) -> LivePlant:
+def start_plant_of(info: RecordInfo, make_plant: MakePlant) -> PlantLike:
     with made_here("the plant of the record cannot be started here", (ValueError, RuntimeError, OSError)):
         return make_plant(info.plant)
