@@ -16,7 +16,7 @@ from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_interface import PlantLike
 from gridpeers.plant.plant_node import PlantNode
 from gridpeers.wire.driver.drive import StoppedError, drive, perform, serve
-from gridpeers.wire.driver.machine import OpenFilesError, check_open_files, schedule_as_batch
+from gridpeers.wire.driver.machine import links_objection, schedule_as_batch
 from gridpeers.wire.driver.process import ConfigurationError, MakeLinks, new_epoch, no_links
 from gridpeers.wire.driver.session import Session
 from gridpeers.wire.messages import PLANT
@@ -52,10 +52,8 @@ def run_plant(
     else:
         schedule_as_batch()
     processes = len(config.agents) if config.agent_processes is msgspec.UNSET else config.agent_processes
-    try:
-        check_open_files(PLANT, processes + len(config.recorders))
-    except OpenFilesError as error:
-        raise ConfigurationError(str(error)) from None
+    if why := links_objection(PLANT, processes + len(config.recorders)):
+        raise ConfigurationError(why)
     plant: PlantLike | None = None
     listen, connect = config.listen, config.connect
     session = Session(

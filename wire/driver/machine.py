@@ -31,10 +31,6 @@ MOST_FILES = 65_536
 """Limit that suffices for any run; a much greater one makes other programs slow to start."""
 
 
-class OpenFilesError(RuntimeError):
-    """Too few files may be open; the message says how many, how many are needed, and what to do."""
-
-
 def limit() -> int:
     """Return the number of files that this process may have open; `MOST_FILES` where there is no limit."""
     soft, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
@@ -50,14 +46,15 @@ def raise_limit() -> None:
             resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
 
 
-def check_open_files(who: str, links: int) -> None:
-    """Raise OpenFilesError if a process cannot have so many links: Zenoh would refuse some of them without a word."""
+def links_objection(who: str, links: int) -> str:
+    """Return why a process cannot have so many links, "" if it can: Zenoh would refuse some of them without a word."""
     needed = links + BESIDE_LINKS
-    if limit() < needed:
-        raise OpenFilesError(
-            f"{who}: may have {limit()} files open at once, and needs {needed}: {links} links and {BESIDE_LINKS} more; "
-            f"raise the limit, e.g. with ulimit -n {max(1024, 2 * needed)}"
-        )
+    if limit() >= needed:
+        return ""
+    return (
+        f"{who}: may have {limit()} files open at once, and needs {needed}: {links} links and {BESIDE_LINKS} more; "
+        f"raise the limit, e.g. with ulimit -n {max(1024, 2 * needed)}"
+    )
 
 
 def too_few_files(error: BaseException) -> str:
