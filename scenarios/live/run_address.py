@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import socket
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -22,9 +21,6 @@ ENDPOINT = "tcp/127.0.0.1:7447"
 
 LONGEST_TIME = 1e9
 """Longest time (s) of any option, some 30 years."""
-
-PROBE = 1.0
-"""Longest wait (s) for a TCP connection, to see if anything listens."""
 
 _PROTOCOLS = ("tcp", "tls", "quic", "udp")
 
@@ -138,20 +134,6 @@ def check_endpoint(option: str, text: str) -> str:
     if not lowest <= endpoint.port <= 65535:
         raise UsageError(f"{option}: {text}: a port is a number from {lowest} to 65535, got {endpoint.port}")
     return text
-
-
-def accepting(connect: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the endpoints that accept a TCP connection; the system accepts those to a stopped process in its stead."""
-    found = []
-    for text in connect:
-        endpoint = parse_endpoint(text)
-        if endpoint is not None and endpoint.connects:
-            try:
-                socket.create_connection((endpoint.host.strip("[]"), endpoint.port), PROBE).close()
-            except OSError:
-                continue
-            found.append(text)
-    return tuple(found)
 
 
 def is_loopback_host(host: str) -> bool:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from time import monotonic
 
 from gridpeers.scenarios.drivers.free_endpoint import parse_endpoint
-from gridpeers.scenarios.live.run_address import PROBE, RunAddress, accepting
+from gridpeers.scenarios.live.run_address import RunAddress
 from gridpeers.scenarios.live.run_monitor import RunTokens
 from gridpeers.wire.codec import RejectedError, decode
 from gridpeers.wire.driver.command_line import command_line
@@ -18,6 +18,9 @@ from gridpeers.wire.wording import InputError
 
 REMINDER = 2.0
 """Time (s) after which a wait is reported again, then after twice as long, and so on."""
+
+PROBE = 1.0
+"""Longest wait (s) for each step of a TLS handshake."""
 
 FIRST_LOOK, RENEWAL = 1.0, 2.0  # Time (s) until the session is checked first, and between two checks
 
@@ -187,16 +190,10 @@ class RunClient:
             return f"{missing}; start one ({start}), or give another name by --run"
         if refused := self._refused():
             return refused
-        if mute := ", ".join(accepting(where.connect)):
-            keys = "is of a run without certificates" if where.credentials else "asks for --keys DIR and tls/..."
-            return (
-                f"something listens at {mute} but has said nothing within {wait:g} s; if it is a frozen plant, kill "
-                f"-CONT lets it go on; it may be a plant that {keys}; else say by --connect where the plant is"
-            )
         start = command_line("plant", "SCENARIO", *where.access.words)
         return (
             f"nothing answers at {', '.join(where.connect)} within {wait:g} s; start a plant there ({start}), "
-            "or say by --connect where it is"
+            "or say by --connect where it is; a frozen one goes on by kill -CONT"
         )
 
 

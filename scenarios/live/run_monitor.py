@@ -21,7 +21,7 @@ from gridpeers.wire.messages import MOST_INVERTERS, AgentStatus, Pacing, PlantEv
 
 
 class RunTokens:
-    """The tokens that are there, as far as there is room for those of each kind."""
+    """The tokens that are there; those of agents as far as there is room for them."""
 
     def __init__(self, run: str) -> None:
         self._run, self._keys = run, Keys(run)

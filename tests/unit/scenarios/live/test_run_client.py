@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import socket
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +13,6 @@ from gridpeers.scenarios.live.run_address import (
     Access,
     RunAddress,
     UsageError,
-    accepting,
     address_of,
     return_path,
 )
@@ -50,19 +48,6 @@ def test_what_is_no_endpoint_is_told_with_what_would_be(text: str, said: str) ->
 
     assert str(told.value).startswith("--connect: ")
     assert said in str(told.value)
-
-
-def test_who_accepts_connections_is_known_though_it_says_nothing() -> None:
-    """As of a frozen process; a port that is only taken is none, nor is one of a protocol without connections."""
-    with socket.socket() as mute, socket.socket() as taken:
-        mute.bind(("127.0.0.1", 0))
-        mute.listen()
-        taken.bind(("127.0.0.1", 0))
-        listening, deaf = (f"127.0.0.1:{end.getsockname()[1]}" for end in (mute, taken))
-
-        found = accepting((f"tcp/{deaf}", f"udp/{listening}", f"tcp/{listening}"))
-
-    assert found == (f"tcp/{listening}",)
 
 
 @pytest.mark.parametrize(
