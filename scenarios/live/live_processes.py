@@ -323,13 +323,13 @@ def conclude(outcome: ProcessOutcome, metrics: Request) -> ProcessOutcome:
     if outcome.broke or recorded is None:
         set_broken(folder, outcome.broke or "no whole record")
         return outcome
-    from gridpeers.scenarios.measured_run import write_measures  # it takes longer to import than a run to start
-    from gridpeers.scenarios.results.plots.run_figures import draw_all
-    from gridpeers.scenarios.results.report import show
-
     (case,) = metrics.scenario.cases
     pacing = {} if outcome.pacing is None else {case: outcome.pacing}
     try:
+        from gridpeers.scenarios.measured_run import write_measures  # a signal may come meanwhile
+        from gridpeers.scenarios.results.plots.run_figures import draw_all
+        from gridpeers.scenarios.results.report import show
+
         report, drawing = write_measures(metrics, {case: recorded}, pacing, (), place=f"{shown(folder)}/")
         draw_all(drawing, folder / "plots")
         show(report, terminal())
