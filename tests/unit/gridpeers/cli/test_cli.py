@@ -7,6 +7,7 @@ import sys
 import tomllib
 from pathlib import Path
 from typing import Any
+from unittest.mock import ANY, Mock
 
 import pytest
 import typer
@@ -104,17 +105,10 @@ def test_a_run_fills_its_folder_from_which_it_can_be_repeated(elsewhere: Path) -
     assert as_run["as_run"].keys() >= {"driver", "gridpeers", "python", "eclipse-zenoh"}
 
     found = json.loads((elsewhere / "here" / "metrics.json").read_text())
-    assert {key: found[key] for key in ("scenario", "seed", "driver")} == {
-        "scenario": "islanding",
-        "seed": 7,
-        "driver": "inprocess",
-    }
-    assert found.keys() == {"scenario", "seed", "driver", "cases"}
-    assert found["cases"].keys() == {"I"}
-    assert found["cases"]["I"].keys() == {"event1", "history_sha256"}
-    measures = found["cases"]["I"]["event1"]
+    measures = found["cases"]["I"].pop("event1")
+    only = {"I": {"history_sha256": ANY}}
+    assert found == {"scenario": "islanding", "seed": 7, "driver": "inprocess", "cases": only}
     reasons = measures.pop("reasons")  # the window is too short for all to be steady
-    assert reasons
     assert measures.keys() == {"f_error_Hz", "MPSI", "V_error", "MQSI", "t_restore_s", "t_load_s"}
     assert measures["t_restore_s"] is None
     nulls = {name for name, value in measures.items() if value is None}
@@ -195,46 +189,26 @@ def test_a_law_that_fails_is_exit_code_1_and_the_first_line(
     assert code == exit_code, text
 
 
-def test_a_run_that_breaks_is_exit_code_3_and_its_folder_says_so(
-    elsewhere: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("error", "exit_code", "said", "status"), [
+    (RuntimeError("no such luck"), 3, "no such luck", "RuntimeError: no such luck (traceback in here/log/run.log)"),
+    (KeyboardInterrupt(), 130, "interrupted; what came until then is in here/\n", "interrupted from the keyboard"),
+])  # fmt: skip
+def test_a_run_that_breaks_or_is_interrupted_says_so_on_the_screen_and_in_its_folder(
+    error: BaseException, exit_code: int, said: str, status: str, elsewhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The reason stands on the screen and in the folder; no history bears its name."""
-    import gridpeers.scenarios.drivers.inprocess
-
-    def broken(*_: object, **__: object) -> None:
-        raise RuntimeError("no such luck")
-
-    monkeypatch.setattr(gridpeers.scenarios.drivers.inprocess, "run_inprocess", broken)
+    """No history and no numbers bear its name."""
+    monkeypatch.setattr("gridpeers.scenarios.drivers.inprocess.run_inprocess", Mock(side_effect=error))
     (elsewhere / "short.toml").write_text(SHORT)
 
     code, text = invoke("run", "short.toml", "--driver", "inprocess", "--out", "here")
 
-    assert code == 3
-    assert "no such luck" in text
+    assert code == exit_code
+    assert said in text
     assert "Traceback" not in text
-    assert Path("here/status.txt").read_text() == (
-        "broken: RuntimeError: no such luck (traceback in here/log/run.log)\n"
-    )
-    assert "Traceback" in Path("here/log/run.log").read_text()
-    assert not list(Path("here").rglob("history.csv"))
-    assert not Path("here/metrics.json").exists()
-
-
-def test_an_interrupted_run_is_exit_code_130(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Ctrl-C ends with one line, and the folder tells it."""
-    import gridpeers.scenarios.drivers.inprocess
-
-    def interrupted(*_: object, **__: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(gridpeers.scenarios.drivers.inprocess, "run_inprocess", interrupted)
-    (elsewhere / "short.toml").write_text(SHORT)
-
-    code, text = invoke("run", "short.toml", "--driver", "inprocess", "--out", "here")
-
-    assert code == 130
-    assert text == "gridpeers: interrupted; what came until then is in here/\n"
-    assert Path("here/status.txt").read_text() == "broken: interrupted from the keyboard\n"
+    assert Path("here/status.txt").read_text() == f"broken: {status}\n"
+    assert not [*Path("here").rglob("history.csv"), *Path("here").rglob("metrics.json")]
+    log = Path("here/log/run.log")
+    assert exit_code == 130 or "Traceback" in log.read_text()
 
 
 def test_the_version_is_told_without_a_command() -> None:
