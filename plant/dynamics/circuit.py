@@ -138,6 +138,7 @@ class Circuit:
         """Return the voltages of all nodes to earth (V) from those to their references."""
         return V if self.reference is None else V + np.where(self.reference >= 0, V[self.reference], 0.0)
 
+    @cached_property
     def without_source(self) -> Circuit:
         return replace(self, sources=self.sources[:0], source_voltage=self.source_voltage[:0])
 

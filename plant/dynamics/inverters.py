@@ -173,9 +173,7 @@ class Inverters:
             )
 
     def limit_power(self, i: int, P_max: float) -> None:
-        """Bound a GFL's P reference (W) from the next step on; ValueError for a GFM, which has none."""
-        if self.forming[i]:
-            raise ValueError(f"{self.units[i].name} is grid-forming; only a GFL has a P reference to bound")
+        """Bound a GFL's P reference (W) from the next step on; a scenario that bounds a GFM is refused."""
         self.constants(i)["P_max"] = P_max / self.S_b[i]
 
     def readings(self, online: Flags) -> Real:

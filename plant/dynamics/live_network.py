@@ -37,7 +37,6 @@ class LiveNetwork:
         self._reduction_of = lru_cache(KEPT)(
             lambda circuit, connected: Reduction(circuit, y_f, forming, np.array(connected, bool))
         )
-        self._unsourced = lru_cache(KEPT)(Circuit.without_source)
         self.x: Real = np.zeros(0)
         self.substation_on = True  # whether the ideal sources are connected
         self.circuit = circuit
@@ -53,7 +52,7 @@ class LiveNetwork:
     def reduced(self, circuit: Circuit) -> Reduction:
         """Factor a circuit, once; called ahead of a scheduled event it saves this work in its step."""
         if not self.substation_on:
-            circuit = self._unsourced(circuit)
+            circuit = circuit.without_source
         return self._reduction_of(circuit, tuple(self._inverters.connected.tolist()))
 
     def change(self, circuit: Circuit) -> None:

@@ -63,11 +63,9 @@ class LoadBranches:
         where = np.concatenate([self.n_from, self.n_to[between]]), np.concatenate([branch, branch[between]])
         return sp.csc_array((values, where), shape=(n, m))
 
-    def nominal_admittance(self, n: int) -> sp.csc_array:
-        """Admittances (S) that the loads with limits have at nominal voltage, between the n nodes."""
-        at, rows = self.law.limited_at, self.law.law
-        y = (rows[:, 0] - 1j * rows[:, 1]) / rows[:, 2] ** 2
-        C = self.incidence(n)[:, at]
+    def admittance(self, n: int, y: Complex | Real) -> sp.csc_array:
+        """Return the matrix (S) between n nodes of branches with these admittances (S)."""
+        C = self.incidence(n)
         return sp.csc_array(C @ sp.diags_array(y) @ C.T)
 
     def voltages(self, V: Complex) -> Complex:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -47,16 +48,15 @@ def transformer_admittance(transformer: Transformer, V_from: float, V_to: float)
     return np.block([[phase, -phase / ratio], [-phase / ratio, (phase + reference) / ratio**2]])
 
 
-class Merge:
+class Merge(NamedTuple):
     """Nodes merged by closed switches and regulators, which have no impedance.
 
     Each group keeps one unknown, the voltage of its representative r: V_i = a_i V_r, and I_r = sum of a_i I_i, because
-    ideal devices take no power. `ratio`: a_i: 1 through switches, the tap's through regulators.
+    ideal devices take no power.
     """
 
-    def __init__(self, representative: Integers, ratio: Real) -> None:
-        self.representative = representative
-        self.ratio = ratio
+    representative: Integers  # r of each node
+    ratio: Real  # a_i of each node: 1 through switches, the tap's through regulators
 
     def expand(self, V: Complex) -> Complex:
         return np.asarray(self.ratio * V[self.representative], dtype=np.complex128)

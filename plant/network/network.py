@@ -204,11 +204,13 @@ class Network:
 
     def _impedance_loads(self) -> sp.csc_array:
         # A Z load comes out of _load_branches with its nominal power in S, as a constant-power load would.
-        branches = self._load_branches([load.model == "Z" for load in self.feeder.loads])
-        C = branches.incidence(len(self.nodes))
-        Y = sp.csc_array(C @ sp.diags_array(np.conj(branches.law.S) / branches.V_nom**2) @ C.T)
+        branches, n = self._load_branches([load.model == "Z" for load in self.feeder.loads]), len(self.nodes)
+        Y = branches.admittance(n, np.conj(branches.law.S) / branches.V_nom**2)
         parts = [part for part in self.feeder.load_parts if part.is_impedance]
-        return Y + self._load_part_branches(parts).nominal_admittance(len(self.nodes)) if parts else Y
+        if not parts:
+            return Y
+        of_parts, S = self._load_part_branches(parts), np.array([part.S for part in parts])
+        return Y + of_parts.admittance(n, np.conj(S) / of_parts.V_nom**2)
 
     def _load_part_branches(self, parts: list[LoadPart]) -> LoadBranches:
         first = np.array([self.index(part.bus, part.ends[0]) for part in parts], np.int64)

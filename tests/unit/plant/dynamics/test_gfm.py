@@ -341,10 +341,8 @@ def test_rest_is_that_of_the_inverter_asked_for(units: Inverters) -> None:
     assert [units.state_of(i)["V_m"] for i in (0, 2)] == [0.0, 0.98]
 
 
-def test_only_a_gfl_has_its_power_limited(units: Inverters) -> None:
-    """A limit in W bounds one GFL's reference in pu; for a GFM it is refused by name."""
+def test_the_power_of_the_inverter_asked_for_is_limited(units: Inverters) -> None:
+    """A limit in W bounds one GFL's reference in pu."""
     units.limit_power(2, 0.25 * S_B)
 
     assert [units.constants(i)["P_max"] for i in (0, 2)] == [GFL_D.P_max, 0.25]
-    with pytest.raises(ValueError, match="GFM is grid-forming; only a GFL has a P reference"):
-        units.limit_power(1, 0.25 * S_B)
