@@ -186,27 +186,22 @@ def read_certificate(path: Path) -> x509.Certificate:
 
 
 def load_pair(path: Path) -> tuple[x509.Certificate, Any]:
-    """Return a private key and the certificate beside it, which must belong together."""
-    key, beside = load_key(path), path.with_suffix(".pem")
-    certificate = read_certificate(beside)
-    if key.public_key() != certificate.public_key():
-        raise KeysError(f"{path}: is not the key of {beside.name}; copy both from the same site")
-    return certificate, key
-
-
-def load_key(path: Path) -> Any:
-    """Return the private key in a file that nobody but its owner may read or write."""
+    """Return the certificate beside a private key, and the key: they belong together, and the key is its owner's."""
     from cryptography.exceptions import UnsupportedAlgorithm
     from cryptography.hazmat.primitives.serialization import load_pem_private_key
 
-    data = _read(path)
+    data, beside = _read(path), path.with_suffix(".pem")
     mode = stat.S_IMODE(path.stat().st_mode)
     if mode & 0o077:
         raise KeysError(f"{path}: others may read or change it (mode {mode:04o}); chmod 600 {path}")
     try:
-        return load_pem_private_key(data, None)
+        key: Any = load_pem_private_key(data, None)
     except (ValueError, TypeError, UnsupportedAlgorithm) as error:
         raise KeysError(f"{path}: is no private key: {printable(str(error), 80)}; copy it anew from the site") from None
+    certificate = read_certificate(beside)
+    if key.public_key() != certificate.public_key():
+        raise KeysError(f"{path}: is not the key of {beside.name}; copy both from the same site")
+    return certificate, key
 
 
 def _read(path: Path) -> bytes:
