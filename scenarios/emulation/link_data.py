@@ -135,16 +135,19 @@ class LinkCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     for_s: float | None = None
     """Duration of the fault (s of run time); without it, it holds until it is healed."""
 
-    @property
-    def on(self) -> str:
-        return self._change.on
+    def __post_init__(self) -> None:
+        if (self.fault is None) == (self.heal is None):
+            raise ValueError("it is either a fault or a heal")
 
     @property
     def _change(self) -> Change:
         change = self.fault or self.heal
-        if change is None or (self.fault and self.heal):
-            raise ValueError("a command to links is either a fault or a heal")
+        assert change is not None
         return change
+
+    @property
+    def on(self) -> str:
+        return self._change.on
 
     def at(self, t: float) -> Change:
         to_s = None if self.for_s is None else round(t + self.for_s, 9)
@@ -192,5 +195,4 @@ class LinkCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
             raise ValueError(f"no command to links: {printable(str(error), 200)}") from None
         if command.fault is not None and command.fault.own:  # else anybody who reaches the run could import any module
             raise ValueError("no command to links: a fault of your own is written in the scenario before the run")
-        command.on  # noqa: B018  checks that it is one of the two
         return command

@@ -24,7 +24,7 @@ from gridpeers.scenarios.record.recorded_decision import RecordedDecision
 from gridpeers.scenarios.results.history import History
 from gridpeers.scenarios.results.record import canonical
 from gridpeers.wire.journal import Entry
-from gridpeers.wire.messages import LinkReport, LinkRequest, Message, PlantEvent, Telemetry
+from gridpeers.wire.messages import LinkReport, Message, PlantEvent, Telemetry
 
 __all__ = ["RecordFileError", "RunRecord"]
 
@@ -137,10 +137,6 @@ class RunRecord:
                 yield report.sender, data_of(report)
             except ValueError:  # the report of a later version, or a damaged one
                 self.index.note_damage(f"a report on the links into {report.sender} cannot be read")
-
-    def link_requests(self) -> Iterator[LinkRequest]:
-        """Yield the commands to emulated links, in their order."""
-        return self.index.of_type("link_requests", LinkRequest)
 
     def decisions(self, agent: str, *, since: float = 0.0, until: float = inf) -> Iterator[RecordedDecision]:
         """Yield the decisions of an agent between two run times (s), the limits included, in the order of time."""

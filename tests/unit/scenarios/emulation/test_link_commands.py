@@ -216,8 +216,8 @@ def test_what_links_drop_counts_as_lost() -> None:
     for k in range(1, 40):
         lab.measure(k)
         if k != 20:  # that one is lost before it comes to the link
-            lab.state("inv2", k, k * agent_side.T_C)
-        lab.go(agent_side.T_C)
+            lab.state("inv2", k, k * 0.02)
+        lab.go(0.02)
     lab.go(0.5)
     during = lab.status().lost
     lab.token("plant", gone=True)
