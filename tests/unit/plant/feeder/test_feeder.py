@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from msgspec.structs import replace
@@ -20,16 +22,10 @@ COUPLING = GfmDroop(R_f=0.0025, X_f=0.05)
 """The GFM impedance of the independent power flow: it decides how unbalanced the terminals are."""
 
 
-def plant(
-    *events: SwitchEvent,
-    load_set: str = "main",
-    gfm: GfmDroop | None = None,
-    gfl: Gfl | None = None,
-    record: float = T_C,
-) -> Plant:
+def plant(*events: SwitchEvent, load_set: str = "main", record: float = T_C, **settings: Any) -> Plant:
     """Make the microgrid feeder with these switch operations."""
-    settings = PlantSettings(load_set=load_set, events=events, gfm=gfm or GfmDroop(), gfl=gfl or Gfl())
-    return Plant(Network(read_feeder("microgrid123", load_set)), settings, T_C, record)
+    network = Network(read_feeder("microgrid123", load_set))
+    return Plant(network, PlantSettings(load_set=load_set, events=events, **settings), T_C, record)
 
 
 def opened(t: float, *switches: str) -> tuple[SwitchEvent, ...]:

@@ -15,31 +15,18 @@ from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import LoadEvent, PlantSettings, SwitchEvent
 from gridpeers.plant.tables import read_feeder
 from gridpeers.wire.messages import LoadSetting
-
-T_C = 0.02
-
-
-def plant(feeder: str = "microgrid123", *events: SwitchEvent, loads: tuple[LoadEvent, ...] = ()) -> Plant:
-    """A plant of ours."""
-    return Plant(Network(read_feeder(feeder)), PlantSettings(feeder=feeder, events=events, loads=loads), T_C, T_C)
-
-
-def run(p: Plant, seconds: float) -> None:
-    """Advance."""
-    for _ in range(round(seconds / T_C)):
-        p.advance()
-
+from tests.unit.plant.feeder.test_feeder import T_C, plant, run
 
 ISLANDED = SwitchEvent(t=0.02, switch="13-152", action="open")
 
 
 def test_a_load_that_was_set_is_the_load_of_another_table() -> None:
     """In an island the inverters come to the powers of a plant whose table has the load so from the beginning."""
-    p = plant("microgrid123", ISLANDED)
+    p = plant(ISLANDED)
     run(p, 0.1)
     words = p.set_load("48", LoadSetting(factor=1.5))
     at = p.tick * T_C
-    run(p, 6.0)
+    run(p, 6.1)
 
     table = read_feeder("microgrid123")
     S = 1.5 * named_loads(table)["48"].S
@@ -115,16 +102,15 @@ def test_a_scheduled_change_is_the_one_that_a_person_makes() -> None:
     """The same rows to the last bit, and the same event."""
     changes = {"48": LoadSetting(factor=1.5), "65": LoadSetting(P=0.0, Q=0.0)}
     scheduled = plant(
-        "microgrid123",
         ISLANDED,
         loads=tuple(LoadEvent(t=0.1, load=name, setting=setting) for name, setting in changes.items()),
     )
-    by_hand = plant("microgrid123", ISLANDED)
+    by_hand = plant(ISLANDED)
     run(scheduled, 0.3)
     run(by_hand, 0.1)
     for name, setting in changes.items():
         by_hand.set_load(name, setting)
-    run(by_hand, 0.2)
+    run(by_hand, 0.3)
 
     assert scheduled.take_rows() == by_hand.take_rows()
     events = scheduled.take_events()
@@ -137,8 +123,8 @@ def test_switches_and_loads_of_one_step_change_at_once() -> None:
     """The island takes the loads that it has then, and never those of before, which it could not feed."""
     heavy, light = every_load(0.04, 2.5), every_load(0.1, 1.0)
     opening = SwitchEvent(t=0.1, switch="13-152", action="open")
-    together = plant("microgrid123", opening, loads=(*heavy, *light))
-    late = plant("microgrid123", opening, loads=(*heavy, *every_load(0.102, 1.0)))
+    together = plant(opening, loads=(*heavy, *light))
+    late = plant(opening, loads=(*heavy, *every_load(0.102, 1.0)))
     for p in (together, late):
         run(p, 0.12)
 
@@ -155,12 +141,12 @@ def test_networks_of_scheduled_loads_are_factored_before_the_run(monkeypatch: py
         factored.append(p.tick)
         return real(*arguments)
 
-    p = plant("microgrid123", ISLANDED, loads=(*every_load(0.04, 0.9), *every_load(0.08, 1.0)))
+    p = plant(ISLANDED, loads=(*every_load(0.04, 0.9), *every_load(0.08, 1.0)))
     monkeypatch.setattr(live_network, "Reduction", counted)
     run(p, 0.1)
     assert factored == []
     p.set_load("48", LoadSetting(factor=2.0))
-    run(p, 0.02)
+    run(p, 0.12)
     assert factored == [5]
 
 

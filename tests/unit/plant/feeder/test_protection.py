@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -19,6 +19,7 @@ from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings, PowerLimit, Protection, SwitchEvent
 from gridpeers.plant.tables import read_feeder
 from gridpeers.wire.messages import OFF, PlantEvent
+from tests.unit.plant.feeder import test_feeder
 from tests.unit.plant.feeder.test_feeder import T_C, opened, run
 
 H = 0.002
@@ -186,12 +187,10 @@ CLOUDS = tuple(PowerLimit(t=1.5, inverter=f"inv{k}", P_max=0.0) for k in (2, 3, 
 """No GFL has any power from 1.5 s on."""
 
 
-def plant(
-    protection: Protection, *events: SwitchEvent, limits: tuple[PowerLimit, ...] = (), load_set: str = "event2"
-) -> Plant:
+def plant(protection: Protection, *events: SwitchEvent, limits: tuple[PowerLimit, ...] = ()) -> Plant:
     """Make the microgrid feeder with this protection."""
-    settings = PlantSettings(load_set=load_set, events=events, limits=limits, protection=protection, gfm=UNLIMITED)
-    return Plant(Network(read_feeder("microgrid123", load_set)), settings, T_C, 0.002)
+    own: dict[str, Any] = {"protection": protection, "limits": limits, "gfm": UNLIMITED}
+    return test_feeder.plant(*events, load_set="event2", record=0.002, **own)
 
 
 def trips(events: tuple[PlantEvent, ...]) -> list[PlantEvent]:
