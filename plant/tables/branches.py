@@ -31,7 +31,6 @@ class BusTable:
         self.imported = (folder / "elements.csv").is_file()
         self.floating: frozenset[str] = frozenset()
         self._by_name: dict[str, Bus] = {}
-        self.row_of: dict[str, CsvRow[columns.BusColumns]] = {}
         kind = columns.ImportedBusColumns if self.imported else columns.BusColumns
         table = self.table("buses.csv", kind, required=True)
         self._readable = table.readable and len(table) > 0
@@ -42,7 +41,6 @@ class BusTable:
             if row.is_new("bus", it.bus, self._by_name) and it.bus:
                 V_nom = it.V_nom_kV_LL * 1000.0 / sqrt(3.0)
                 self._by_name[it.bus] = Bus(name=it.bus, phases=it.phases, V_nom=V_nom, zone=it.zone, x=it.x, y=it.y)
-                self.row_of[it.bus] = row
         self.rows = tuple(self._by_name.values())
 
     def table(self, file: str, kind: type[C], *, required: bool = False) -> CsvTable[C]:

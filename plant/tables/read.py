@@ -14,7 +14,7 @@ from gridpeers.plant.tables import branches, shunts
 from gridpeers.plant.tables.feeder_columns import LOAD_SETS, TABLES, Manifest
 from gridpeers.wire.schema.table_reading import read_table
 from gridpeers.wire.text_file import TextFileError, text_of
-from gridpeers.wire.wording import InputError, first_of, suggestion
+from gridpeers.wire.wording import InputError, counted, first_of, suggestion
 
 MANIFEST = "feeder.toml"
 DATA = Path(__file__).parents[1] / "data"  # folder of the feeders that come with the package
@@ -121,7 +121,7 @@ def _read_tables(folder: Path, feeder: str, load_set: str, contents: tuple[tuple
     )
     if not problems and whole.buses:
         # After other problems this would only repeat them: a misnamed end leaves the right bus unconnected.
-        _report_unconnected(whole, buses)
+        _report_unconnected(whole, problems)
     if problems:
         raise FeederError(feeder, tuple(problems))
     return whole
@@ -141,7 +141,7 @@ def _manifest(path: Path, problems: list[str]) -> dict[str, Any]:
     return {}
 
 
-def _report_unconnected(feeder: Tables, buses: branches.BusTable) -> None:
+def _report_unconnected(feeder: Tables, problems: list[str]) -> None:
     """Note every node that is cut off even with all switches closed: a feeder is one network, in each phase."""
     inverters = (*feeder.inverters, *feeder.spares)
     of_three = [row.bus for row in inverters if len(row.phases) > 1]
@@ -155,16 +155,10 @@ def _report_unconnected(feeder: Tables, buses: branches.BusTable) -> None:
             if phases := [phase for phase in bus.phases if (bus.name, phase) in part]:
                 names.append(bus.name)
                 shown.append(bus.name + ("" if len(phases) == len(bus.phases) else f" phase {', '.join(phases)}"))
-        if len(names) == 1:
-            buses.row_of[names[0]].problem(
-                f'bus "{names[0]}" phase {", ".join(phase for _, phase in sorted(part))}: nothing connects it; end a '
-                "line, switch, regulator or transformer there, or remove it"
-            )
-            continue
         there = ", ".join(row.name for row in inverters if row.bus in names)
         rest = f"the substation at bus {whole[0]}" if feeder.source else "the rest"
-        buses.problems.append(
-            f"buses.csv: {len(names)} buses are not connected with {rest}: {first_of(shown, _SHOWN)}"
+        problems.append(
+            f"buses.csv: {counted(len(names), 'bus', 'buses')} not connected with {rest}: {first_of(shown, _SHOWN)}"
             + (f" (with {there})" if there else "")
             + "; a line, switch, regulator or transformer is missing, or lacks a phase"
         )
