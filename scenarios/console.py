@@ -6,7 +6,6 @@ printed, and returns what is a string: rich would show both, and return nothing.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable, Iterable
 from itertools import groupby
@@ -57,12 +56,3 @@ def short(names: tuple[str, ...] | list[str]) -> str:
             stem[0] + ",".join(f"{run[0]}-{run[-1]}" if len(run) > 2 else ",".join(map(str, run)) for run in runs)
         )
     return " ".join(words) or "-"
-
-
-_UNITS = ((120, 1, "s"), (7200, 60, "min"), (172_800, 3600, "h"), (math.inf, 86_400, "days"))
-
-
-def duration(seconds: float) -> str:
-    """Return a length of time (s) in words, of two digits: more would promise too much."""
-    unit, name = next((unit, name) for bound, unit, name in _UNITS if seconds < bound)
-    return f"{float(f'{seconds / unit:.2g}'):g} {name}"

@@ -18,7 +18,6 @@ import msgspec
 from gridpeers.plant.equipment import Tables
 from gridpeers.plant.tables import read_feeder
 from gridpeers.scenarios.catalogue_files import SWEEPS, names_in
-from gridpeers.scenarios.console import duration
 from gridpeers.scenarios.schema import ScenarioError, ScenarioModel, find_scenario, load_scenario
 from gridpeers.scenarios.schema.loading import check_tables, find_file, read_toml
 from gridpeers.scenarios.schema.participants import inverters_of
@@ -117,9 +116,6 @@ def _in_samples(numbers: Sequence[int], settings: Sequence[Setting]) -> str:
     return f" (sample {numbers[0]}: {listed}{more})"
 
 
-SECONDS_PER_SECOND = 0.05  # Rough cost of a second of the nine-inverter feeder (s on one core, bench/peers)
-
-
 def sweeps() -> tuple[str, ...]:
     return names_in(SWEEPS)
 
@@ -187,11 +183,10 @@ def _plan(sweep: Sweep, text: str, axes: Sequence[Axis], base: BaseScenario, pro
     settings = list(islice(samples(points), count if size <= sweep.max_runs else 1))
     runs, feeders = checked_runs(base, fixed, settings, cases, origin, problems)
     if size > sweep.max_runs > 0:
-        end_s = (runs[0].scenario if runs else scenario).time.end_s
         problems.add(
             "max_runs",
-            f"this is {size:,} runs, about {duration(size * SECONDS_PER_SECOND * end_s)} on one core, and more than "
-            f"max_runs = {sweep.max_runs:,}; thin out the axes, or raise max_runs if it is meant",
+            f"this is {size:,} runs, and more than max_runs = {sweep.max_runs:,}; thin out the axes, or raise max_runs "
+            "if it is meant",
         )
     problems.raise_if_any()
     whole = hashlib.sha256()
