@@ -51,7 +51,6 @@ class Mixed(ProcessRun):
             self.start(name)
 
     def __call__(self, **more: Any) -> Outcome:
-        """Run, and wait for the foreign agents to end."""
         try:
             outcome = super().__call__(**more)
             for process in self.foreigners:
@@ -63,6 +62,5 @@ class Mixed(ProcessRun):
                 process.wait()
 
     def dropped(self) -> list[str]:
-        """Logs of ours that tell of a message that was dropped."""
         ours = [log for log in self.log_dir.glob("*.log") if "-foreign-" not in log.name]
         return [text for log in ours if "dropped" in (text := log.read_text())]

@@ -150,18 +150,15 @@ class Town:
         return self.together(self.plant_config.agents)
 
     def together(self, names: tuple[str, ...]) -> Town:
-        """Wait until these agents use each other's values."""
         return self.until(
             lambda: all(name in self.status and set(self.status[name].used) == {*names} - {name} for name in names),
             f"{', '.join(names)} use each other",
         )
 
     def log(self, name: str) -> str:
-        """Return what the process of a name has logged so far."""
         return (self.folder / f"{name}.log").read_text()
 
     def signal(self, name: str, number: int) -> None:
-        """Send a signal to the process of a name."""
         self._signalled.add(self.children[name].pid)
         self.children[name].signal(number)
 
@@ -182,7 +179,6 @@ class Town:
         return self.answers[-1]
 
     def until(self, condition: Callable[[], bool], what: str, patience: float = PATIENCE) -> Town:
-        """Take in messages until a condition holds."""
         end = monotonic() + patience
         while not condition():
             left = end - monotonic()
@@ -201,18 +197,15 @@ class Town:
         return "" if ended else plants[-1].report(f"after t = {self.t:g} s")
 
     def was_put_off(self) -> bool:
-        """Whether the plant tells that its schedule was put off."""
         return self.telemetry is not None and self.telemetry.pacing is not None and self.telemetry.pacing.slipped > 0.0
 
     def until_event(self, subject: str, text: str, after: int = 0) -> Town:
-        """Wait for a plant's event on a subject with a text in it."""
         return self.until(
             lambda: any(event.subject == subject and text in event.text for event in self.events[after:]),
             f"event {subject}: {text}",
         )
 
     def until_ended(self, name: str) -> int:
-        """Wait for the end of a process; its exit status."""
         child = self.children[name]
         self.until(lambda: child.status is not None, f"{name} ends")
         assert child.status is not None
@@ -220,7 +213,6 @@ class Town:
 
     @property
     def t(self) -> float:
-        """Run time of the last telemetry (s)."""
         return -1.0 if self.telemetry is None else self.telemetry.t
 
     def __str__(self) -> str:

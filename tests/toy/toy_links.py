@@ -51,16 +51,13 @@ class Links:
 
     @property
     def rows(self) -> list[tuple[float, ...]]:
-        """All recorded rows."""
         return [row for message in self.telemetry for row in message.rows]
 
     @property
     def events(self) -> list[PlantEvent]:
-        """All events."""
         return [event for message in self.telemetry for event in message.events]
 
     def agent(self, name: str) -> AgentNode:
-        """The first agent of a name."""
         return next(agent for agent in self.agents if self.plant.keys.parts(agent.token)[2] == name)
 
     def kill(self, name: str) -> None:
@@ -68,7 +65,6 @@ class Links:
         self._leave(self.agent(name))
 
     def run(self, until_tick: int | None = None) -> None:
-        """Step until the plant is over, or stands at a tick."""
         while not self.plant.finished and (until_tick is None or self.plant.stepper.tick < until_tick):
             assert self.step(), (
                 f"stalled in phase {self.plant.phase} at tick {self.plant.stepper.tick}, "

@@ -36,7 +36,6 @@ class ToyPlant(RecordedPlant):
         self._loads: dict[str, complex] = {}
 
     def measure(self) -> dict[str, Reading]:
-        """Solve the droops."""
         on = [name for name in self.inverters if name not in self._off]
         mean = sum(self._P_set[name] for name in on) / max(1, len(on))
         V_mean = sum(self._V_set[name] for name in on) / max(1, len(on))
@@ -58,7 +57,6 @@ class ToyPlant(RecordedPlant):
         }
 
     def hold(self, name: str, P_set: float, V_set: float) -> None:
-        """Take set-points (W, V)."""
         self._P_set[name], self._V_set[name] = P_set / P_RATED, V_set / V_NOM
 
     def advance(self) -> None:
@@ -72,7 +70,6 @@ class ToyPlant(RecordedPlant):
 
     @property
     def switches(self) -> dict[str, bool]:
-        """Position of the only switch."""
         return {"sw1": self._stands == "close"}
 
     def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
@@ -85,7 +82,6 @@ class ToyPlant(RecordedPlant):
 
     @property
     def loads(self) -> dict[str, complex]:
-        """The only load, if it was set."""
         return self._loads
 
     def set_load(self, name: str, setting: LoadSetting) -> str:

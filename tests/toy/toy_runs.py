@@ -49,7 +49,6 @@ class ProcessRun:
         self._at.append((t, do))
 
     def child(self, name: str) -> Child:
-        """One of the processes."""
         assert self.children is not None
         return self.children[name]
 
@@ -86,7 +85,6 @@ class ProcessRun:
 
 
 def exists(pid: int) -> bool:
-    """Whether there is a process of this id."""
     try:
         os.kill(pid, 0)
     except ProcessLookupError:
@@ -105,7 +103,6 @@ def first_difference(expected: Rows, got: Rows) -> str:
 
 
 def by_link(record: LinkRecord) -> dict[tuple[str, str], LinkTrace]:
-    """Return the verdicts of each link (src, dst)."""
     found: dict[tuple[str, str], LinkTrace] = {}
     for part in record.traces:
         link = part.src, part.dst

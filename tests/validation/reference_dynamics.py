@@ -49,7 +49,6 @@ class _Kind:
 
 
 def _held(slope: Real, x: Real, low: Real | float, high: Real | float) -> Real:
-    """Return the slope of an integrator that stops at its bounds."""
     return np.where(((x >= high) & (slope > 0.0)) | ((x <= low) & (slope < 0.0)), 0.0, slope)
 
 
@@ -58,7 +57,6 @@ class GfmEquations(_Kind):
 
     @property
     def y_f(self) -> Complex:
-        """Filter admittance of a phase (S)."""
         y_f: Complex = 1.0 / ((self.R_f + 1j * self.X_f) * 3.0 * self.V_b**2 / self.S_b)
         return y_f
 

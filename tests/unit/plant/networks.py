@@ -17,7 +17,6 @@ def opened(network: Network, *switches: str) -> frozenset[str]:
 
 
 def zones(network: Network, *names: str) -> frozenset[str]:
-    """Buses of some zones of the microgrids."""
     return frozenset(bus.name for bus in network.feeder.buses if bus.zone in names)
 
 
@@ -29,7 +28,6 @@ def feeder(**tables: Any) -> Tables:
 
 
 def three_phase_bus(name: str, V_nom: float = 2400.0) -> Bus:
-    """A bus with all phases."""
     return Bus(name=name, phases="ABC", V_nom=V_nom)
 
 

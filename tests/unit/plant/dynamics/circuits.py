@@ -14,7 +14,7 @@ from gridpeers.plant.dynamics.circuit import LoadLaw
 from gridpeers.plant.dynamics.kernel.compiled import Complex
 from gridpeers.plant.inverters.gfl import Gfl
 from gridpeers.plant.inverters.gfm_droop import GfmDroop
-from gridpeers.plant.inverters.inverter_model import InverterModel
+from gridpeers.plant.inverters.inverter_model import InverterModel, Method
 
 S_B = 200e3
 V_B = 277.1363
@@ -65,9 +65,12 @@ def circuit(
     )
 
 
-def on_stiff_bus(parameters: InverterModel, *, h: float = 0.002, **droops: float) -> Dynamics:
+def on_stiff_bus(
+    parameters: InverterModel, *, h: float = 0.002, method: Method = "first-order", **droops: float
+) -> Dynamics:
     """One inverter at an infinite bus of 1 pu, at rest at p = q = 0."""
-    return at_rest(circuit(np.zeros((3, 3), complex), [[0, 1, 2]], source=V_B * BALANCED), parameters, h=h, **droops)
+    bus = circuit(np.zeros((3, 3), complex), [[0, 1, 2]], source=V_B * BALANCED)
+    return at_rest(bus, parameters, h=h, method=method, **droops)
 
 
 def lone(parameters: GfmDroop, p: float, *, h: float = 0.002) -> Dynamics:
@@ -80,9 +83,10 @@ def loaded(p: float) -> Circuit:
     return circuit(np.eye(3, dtype=complex) * p / Z_B, [[0, 1, 2]])
 
 
-def at_rest(network: Circuit, parameters: InverterModel, *, h: float, **droops: float) -> Dynamics:
-    """One inverter at rest."""
-    dynamics = Dynamics(network, (inverter(parameters, **droops),), h)
+def at_rest(
+    network: Circuit, parameters: InverterModel, *, h: float, method: Method = "first-order", **droops: float
+) -> Dynamics:
+    dynamics = Dynamics(network, (inverter(parameters, **droops),), h, method=method)
     dynamics.start(np.zeros(1), np.zeros(1))
     return dynamics
 

@@ -25,7 +25,6 @@ SOURCES = sorted(path for path in compiled.HERE.glob("*.py") if "\n@compiled\n" 
 
 
 def fill(into: NDArray[Any], value: float) -> None:
-    """Write a value everywhere."""
     into[:] = value
 
 

@@ -204,14 +204,6 @@ def unequal_load(scale: float) -> Circuit:
     return circuit(np.diag([0.9, 0.5, 0.2]) * scale * (1.0 - 0.4j) / Z_B, [[0, 1, 2]])
 
 
-def at_stiff_bus(parameters: GfmDroop, method: Method, h: float) -> Dynamics:
-    """A GFM at 1 pu, at rest without power."""
-    bus = circuit(np.zeros((3, 3), complex), [[0, 1, 2]], source=V_B * BALANCED)
-    dynamics = Dynamics(bus, (inverter(parameters),), h, method=method)
-    dynamics.start(np.zeros(1), np.zeros(1))
-    return dynamics
-
-
 def positive_sequence(dynamics: Dynamics) -> tuple[complex, float]:
     """Return power and voltage of the positive sequence (pu) at the first terminal."""
     V_1, I_1 = (complex(aligned_sum(it[0])) / 3.0 for it in (dynamics.inverters.V, dynamics.inverters.I))
@@ -271,7 +263,7 @@ def test_it_droops_by_the_positive_sequence(parameters: GfmDroop, method: Method
 @pytest.mark.parametrize(("V_set", "Q"), [(1.1, 0.44), (0.9, -0.44)])
 def test_the_reactive_limiters_hold(V_set: float, Q: float) -> None:
     """A V_set that asks for 2 pu of vars gives Q_max or Q_min at a stiff bus."""
-    dynamics = at_stiff_bus(REGFM_A1, "second-order", 0.002)
+    dynamics = on_stiff_bus(REGFM_A1)
     dynamics.inverters.set_points[0, 1] = V_set
 
     q = dynamics.run(5000)[-1, 0, 2] / S_B
@@ -289,7 +281,9 @@ def test_a_step_follows_the_poles_of_the_linearised_model() -> None:
         "V_set, VFlag 0": ([[-1.0 / T - m_q / (X * T)]], [1.0 / (X * T)]),
     }
     for name, (A, B) in models.items():
-        dynamics = at_stiff_bus(DIRECT if "VFlag" in name else replace(REGFM_A1, P_min=-1.0), "second-order", h)
+        dynamics = on_stiff_bus(
+            DIRECT if "VFlag" in name else replace(REGFM_A1, P_min=-1.0), h=h, method="second-order"
+        )
         dynamics.inverters.set_points[0, 0 if name == "P_set" else 1] += step
         state = "p" if name == "P_set" else "q"
         got = []
@@ -306,7 +300,7 @@ def test_a_step_follows_the_poles_of_the_linearised_model() -> None:
 @pytest.mark.parametrize("method", METHODS)
 def test_a_sag_draws_no_more_than_the_largest_current(method: Method) -> None:
     """At 0.3 pu it would give 4.7 pu; each phase gives ImaxF = 2 pu at most."""
-    dynamics = at_stiff_bus(REGFM_A1, method, 0.002)
+    dynamics = on_stiff_bus(REGFM_A1, method=method)
     move_source(dynamics, 0.3 * V_B * BALANCED)
 
     dynamics.run(5)
@@ -317,7 +311,6 @@ def test_a_sag_draws_no_more_than_the_largest_current(method: Method) -> None:
 
 @pytest.fixture
 def units() -> Inverters:
-    """A GFL, a GFM and another GFL."""
     return Inverters((inverter(GFL_D), inverter(GFM_D), inverter(GFL_D)), connected=(True, True, False))
 
 

@@ -168,7 +168,6 @@ def test_a_limit_that_does_not_act_changes_no_number() -> None:
 
 
 def islanded(I_max: float) -> Plant:
-    """Microgrid123 0.1 s after islanding."""
     settings = PlantSettings(
         gfm=GfmDroop(I_max=I_max),
         protection=Protection(category="off"),

@@ -22,7 +22,6 @@ from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, S_B, V_B, Z_B, c
 
 
 def start() -> Plant:
-    """Return the microgrid feeder at rest."""
     return Plant(Network(read_feeder("microgrid123")), PlantSettings(), 0.02, 0.02)
 
 

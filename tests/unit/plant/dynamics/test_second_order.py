@@ -28,8 +28,8 @@ from tests.unit.plant.dynamics.circuits import (
     V_B,
     at_terminal,
     by_name,
-    circuit,
     inverter,
+    on_stiff_bus,
 )
 
 WATT_VAR = replace(GFL_D, F_current=0.6, frequency_watt=True, volt_var=True)
@@ -111,9 +111,7 @@ def test_limits_hold_a_gfm_as_in_the_default_method() -> None:
 def test_feed_forward_that_diverges_pass_by_pass_is_solved() -> None:
     """F_current = 1 decouples the axes exactly; only a delay of a pass makes it diverge, and here there is none."""
     par = replace(GFL_D, F_current=1.0)
-    bus = circuit(np.zeros((3, 3), complex), [[0, 1, 2]], source=V_B * BALANCED)
-    system = Dynamics(bus, (inverter(par),), 0.002, method="second-order")
-    system.start(np.zeros(1), np.zeros(1))
+    system = on_stiff_bus(par, method="second-order")
     system.inverters.set_points[0, 0] = 0.3
 
     P = system.run(1000)[:, 0, 1] / S_B

@@ -15,14 +15,13 @@ from scipy.integrate import solve_ivp
 
 import gridpeers as gp
 from gridpeers.lab.predict.prediction import predict
-from gridpeers.plant.dynamics import Dynamics
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.inverters.inverter_model import Method
 from gridpeers.plant.inverters.vsm import Vsm
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings
 from gridpeers.plant.tables import read_feeder
-from tests.unit.plant.dynamics.circuits import BALANCED, S_B, V_B, circuit, inverter
+from tests.unit.plant.dynamics.circuits import S_B, on_stiff_bus
 
 W_NOM = 2.0 * np.pi * 60.0
 M_P, M_Q = 0.02, 0.05
@@ -52,11 +51,7 @@ def test_it_swings_as_its_equations_say(method: Method, gain: float) -> None:
     """A step of both set-points gives scipy's trajectory, and half the step divides the error by its order."""
     errors = []
     for h in (0.002, 0.001):
-        unit = inverter(MACHINE, m_p=M_P, m_q=M_Q)
-        dynamics = Dynamics(
-            circuit(np.zeros((3, 3), complex), [[0, 1, 2]], source=V_B * BALANCED), (unit,), h, None, method
-        )
-        dynamics.start(np.zeros(1), np.zeros(1))
+        dynamics = on_stiff_bus(MACHINE, h=h, method=method, m_p=M_P, m_q=M_Q)
         dynamics.inverters.set_points[0, :2] = 0.5, 1.03
         stride = round(0.01 / h)
         got = dynamics.run(100 * stride)[stride - 1 :: stride, 0, :3] / [1.0, S_B, S_B]

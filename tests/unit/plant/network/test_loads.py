@@ -26,7 +26,6 @@ A = np.exp(2j * np.pi / 3.0)
 
 
 def one_bus(*loads: Load) -> Network:
-    """A lone three-phase bus with loads."""
     return Network(
         Tables(
             name="one bus",

@@ -18,22 +18,6 @@ def test_nodes_are_in_the_order_of_the_tables(network: Network) -> None:
     assert [network.index(*node) for node in network.nodes] == list(range(286))
 
 
-def test_nominal_phasors(network: Network) -> None:
-    """Nominal phasors are V_nom at 0, -120, +120 degrees, behind the delta-delta transformer too."""
-    a, b, c = (network.nominal[network.index("610", phase)] for phase in "ABC")
-
-    assert abs(a) == pytest.approx(480 / 3**0.5)
-    np.testing.assert_allclose(np.degrees(np.angle([a, b, c])), [0.0, -120.0, 120.0], atol=1e-12)
-
-
-def test_source_is_bus_150_at_nominal_voltage(network: Network) -> None:
-    """The substation is bus 150 at 1.0 pu, and its nodes represent themselves."""
-    assert [network.nodes[i] for i in network.source_nodes] == [("150", "A"), ("150", "B"), ("150", "C")]
-    np.testing.assert_allclose(network.source_voltage, network.nominal[network.source_nodes])
-    merge = network.merge(network.closed0)
-    assert list(merge.representative[network.source_nodes]) == list(network.source_nodes)
-
-
 @pytest.mark.parametrize("text", ["67s-67", "67-67s", "sw1_2"])
 def test_switch_is_found_by_every_name(network: Network, text: str) -> None:
     """A switch answers to its buses in both orders and to its alias."""
@@ -131,13 +115,6 @@ def test_delta_transformer_passes_no_zero_sequence() -> None:
     current = network.Y_branches @ np.array([1000.0, 1000.0, 1000.0, 0.0, 0.0, 0.0])
 
     np.testing.assert_allclose(current, 0.0, atol=1e-9)
-
-
-def test_capacitors_give_their_reactive_power_at_rated_voltage(network: Network) -> None:
-    """The banks of the feeder give 750 kvar together at their rated voltage."""
-    V = network.nominal * 2401.8 / (4160 / 3**0.5)
-
-    assert V @ np.conj(network.Y_capacitors @ V) == pytest.approx(-750e3j)
 
 
 def test_closing_again_restores_exactly(network: Network) -> None:
