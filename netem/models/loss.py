@@ -14,7 +14,7 @@ from typing import Annotated
 import msgspec
 
 from gridpeers.netem.draws import Chain, Stream
-from gridpeers.wire.schema.table_schema import Below, Probability, Problem
+from gridpeers.wire.schema.table_schema import Below, Problem, probability
 
 Lost = Callable[[int], bool]
 
@@ -71,7 +71,7 @@ def _chosen(cumulated: tuple[float, ...], u: float) -> int:
 class Bernoulli(LossModel, frozen=True, kw_only=True, tag="bernoulli"):
     """Loss with probability p; in a file `loss = 0.02` says the same."""
 
-    p: Annotated[float, Probability("of a loss")]
+    p: Annotated[float, probability("of a loss")]
     """Probability of loss."""
 
     @property
@@ -104,13 +104,13 @@ class GilbertElliott(LossModel, frozen=True, kw_only=True, tag="gilbert-elliott"
     Elliott, Bell System Technical Journal 42 (1963) 1977-1997. https://doi.org/10.1002/j.1538-7305.1963.tb00955.x
     """
 
-    p: Annotated[float, Probability("p (good to bad)")]
+    p: Annotated[float, probability("p (good to bad)")]
     """Probability of going from good to bad, from one message to the next."""
-    r: Annotated[float, Probability("r (bad to good)", above_zero=True)]
+    r: Annotated[float, probability("r (bad to good)", above_zero=True)]
     """Probability of going from bad to good; a bad time lasts 1/r messages on average."""
-    loss_good: Annotated[float, Probability("loss_good"), Below("loss_bad", or_equal=True)] = 0.0
+    loss_good: Annotated[float, probability("loss_good"), Below("loss_bad", or_equal=True)] = 0.0
     """Probability of loss in the good state (`tc netem`: 1 - k)."""
-    loss_bad: Annotated[float, Probability("loss_bad")] = 1.0
+    loss_bad: Annotated[float, probability("loss_bad")] = 1.0
     """Probability of loss in the bad state (`tc netem`: 1 - h)."""
 
     @property
@@ -143,15 +143,15 @@ class Markov(LossModel, frozen=True, kw_only=True, tag="markov"):
     implementation in the Netem module in the Linux kernel", University of Rome Tor Vergata, v3.1, 2012.
     """
 
-    p13: Annotated[float, Probability("p13")]
+    p13: Annotated[float, probability("p13")]
     """Probability that a burst begins."""
-    p31: Annotated[float, Probability("p31", above_zero=True)]
+    p31: Annotated[float, probability("p31", above_zero=True)]
     """Probability that a burst ends."""
-    p32: Annotated[float, Probability("p32")] = 0.0
+    p32: Annotated[float, probability("p32")] = 0.0
     """Probability that, within a burst, messages come through for a while."""
-    p23: Annotated[float, Probability("p23", above_zero=True)] = 1.0
+    p23: Annotated[float, probability("p23", above_zero=True)] = 1.0
     """Probability that the burst then goes on."""
-    p14: Annotated[float, Probability("p14")] = 0.0
+    p14: Annotated[float, probability("p14")] = 0.0
     """Probability of a single loss between bursts."""
 
     @property

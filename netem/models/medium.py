@@ -12,7 +12,7 @@ import msgspec
 from gridpeers.netem.draws import Stream
 from gridpeers.netem.models import INSTANT
 from gridpeers.netem.models.delay import DELAY
-from gridpeers.wire.schema.table_schema import Below, Plausible, Probability, Unit
+from gridpeers.wire.schema.table_schema import Below, Plausible, Unit, probability
 
 LONGEST_FLAP = 600.0
 """Longest plausible up or down time (s)."""
@@ -123,7 +123,7 @@ _WHETHER, _WHICH, _PER_COPY = 0, 1, 2
 class Duplicate(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """With probability p a copy follows, a fixed time later; in a file `duplicate = 0.01` says: at once."""
 
-    p: Annotated[float, Probability("of a duplicate")]
+    p: Annotated[float, probability("of a duplicate")]
     """Probability that a delivered message has a copy."""
     extra_delay_s: Annotated[float, Unit("s"), DELAY] = 0.0
     """How much later the copy arrives (s)."""
@@ -135,7 +135,7 @@ class Duplicate(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 class Corrupt(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """With probability p a bit of a copy is flipped, each bit alike; in a file `corrupt = 0.001` says the same."""
 
-    p: Annotated[float, Probability("of a corruption")]
+    p: Annotated[float, probability("of a corruption")]
     """Probability that an arriving copy of a message is corrupted."""
     checksum: bool = False
     """True: the link notices it by its checksum (CRC-32 finds every single bit) and drops the copy, reason "checksum".

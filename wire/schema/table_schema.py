@@ -118,7 +118,7 @@ def in_percent(value: float) -> str:
     return f"; did you mean {value / 100.0:g} ({value:g} %)?" if 1.0 < value <= 100.0 else ""
 
 
-def Probability(what: str, above_zero: bool = False) -> Plausible:
+def probability(what: str, above_zero: bool = False) -> Plausible:
     """Return the range of a probability; with `above_zero` it divides another number, so that all below 1e-12 is wrong.
 
     `what` follows the word, such as "of a loss".
