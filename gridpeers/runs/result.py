@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 import shutil
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 import pandas as pd
@@ -20,7 +20,7 @@ from gridpeers.runs.run_folder import RunFolder, new_home
 from gridpeers.scenarios.checks import check_verdict
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict, judge_case
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.record.record_info import FILE, LIVE
+from gridpeers.scenarios.record.record_info import LIVE
 from gridpeers.scenarios.results.claims import Verdict, benchmark_of, claim_of, judge
 from gridpeers.scenarios.results.findings import Findings, find
 from gridpeers.scenarios.results.history import UNITS, History, windows
@@ -39,8 +39,6 @@ if TYPE_CHECKING:
 
     from gridpeers.lab.explanation.explanation import Explanation
     from gridpeers.scenarios.record.record_reader import RunRecord
-
-T = TypeVar("T")
 
 
 class _FromFolder:
@@ -172,7 +170,7 @@ class Result(_FromFolder):
     @cached_property
     def record(self) -> History:
         """The recorded rows as numpy arrays, by quantity."""
-        return self._recorded(lambda record: record.physics())
+        return self._folder.recorded(self.case, lambda record: record.physics())
 
     @cached_property
     def history(self) -> pd.DataFrame:
@@ -216,30 +214,17 @@ class Result(_FromFolder):
     @cached_property
     def links(self) -> pd.DataFrame:
         """Fate of every message on emulated links: src, dst, seq, t (s), delay (s; nan: dropped), fate."""
-        return frames.links_frame(self._recorded(lambda record: list(record.links())))
+        return frames.links_frame(self._folder.recorded(self.case, lambda record: list(record.links())))
 
-    @cached_property
+    @property
     def run_record(self) -> RunRecord:
         """The record of the case: messages, decisions with their inputs, process events (docs/recorder.md)."""
-        from gridpeers.scenarios.record.record_reader import RunRecord  # mcap, which `import gridpeers` does without
-
-        return RunRecord.open(self.folder / self.case)
-
-    def _recorded(self, read: Callable[[RunRecord], T]) -> T:
-        """Read something from the record, which a run that came to its end has whole."""
-
-        def whole(_: Path) -> T:
-            found = read(self.run_record)
-            if self.run_record.damage:
-                raise ValueError(self.run_record.damage[0])
-            return found
-
-        return self._folder.read(f"{self.case}/{FILE}", whole)
+        return self._folder.record(self.case)
 
     @cached_property
     def plant_events(self) -> tuple[PlantEvent, ...]:
         """Events of the plant and the agents, as they were sent."""
-        return self._recorded(lambda record: record.events())
+        return self._folder.recorded(self.case, lambda record: record.events())
 
     def decision(self, agent: str, t: float) -> Explanation:
         """Explain the decision of an agent that was in force at a run time (s), as `gridpeers why` does.

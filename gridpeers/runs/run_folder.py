@@ -10,10 +10,14 @@ from collections.abc import Callable
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
+from gridpeers.scenarios.record.record_info import FILE
 from gridpeers.scenarios.results.run_files import FolderError, empty_folder
 from gridpeers.wire.wording import is_no_path, printable
+
+if TYPE_CHECKING:
+    from gridpeers.scenarios.record.record_reader import RunRecord
 
 T = TypeVar("T")
 
@@ -23,6 +27,7 @@ class RunFolder:
 
     def __init__(self, path: Path, *, temporary: bool = False) -> None:
         self.path = path
+        self._records: dict[str, RunRecord] = {}
         self._removal = weakref.finalize(self, shutil.rmtree, path, ignore_errors=True) if temporary else None
 
     def keep(self) -> None:
@@ -38,6 +43,25 @@ class RunFolder:
         except (OSError, ValueError) as error:
             why = getattr(error, "strerror", None) or str(error)
             raise FolderError(f"{file}: cannot be read: {printable(why, 200)}; run the scenario again") from error
+
+    def record(self, case: str) -> RunRecord:
+        """Return the record of a case, opened once."""
+        from gridpeers.scenarios.record.record_reader import RunRecord  # mcap, which `import gridpeers` does without
+
+        if case not in self._records:
+            self._records[case] = RunRecord.open(self.path / case)
+        return self._records[case]
+
+    def recorded(self, case: str, read: Callable[[RunRecord], T]) -> T:
+        """Read something from the record of a case, which a run that came to its end has whole."""
+
+        def whole(_: Path) -> T:
+            found = read(record := self.record(case))
+            if record.damage:
+                raise ValueError(record.damage[0])
+            return found
+
+        return self.read(f"{case}/{FILE}", whole)
 
     def numbers_of(self, case: str) -> dict[str, Any]:
         """Return the content of metrics.json on a case."""
