@@ -7,6 +7,7 @@ between. A full or broken disk ends the record: it is read up to its last whole 
 from __future__ import annotations
 
 import contextlib
+import os
 import threading
 from collections import deque
 from math import inf
@@ -27,6 +28,10 @@ PERIOD = 0.25
 CHUNK = 150_000
 """Bytes of messages from which on a chunk is written at once: in one process a run pays less for small ones, which the
 processor's cache holds, and a reader takes one at a time."""
+
+
+SYNC = 0.9
+"""Time (s) from which on the thread has the disk keep what is written, against a loss of power."""
 
 
 class RecordWriter:
@@ -53,7 +58,7 @@ class RecordWriter:
         """Run time of the last telemetry (s)."""
         self._waiting: list[tuple[Topic, int, int, bytes]] = []
         self._bytes = 0
-        self._written_at = -inf
+        self._written_at, self._synced_at = -inf, monotonic()
         self._lock, self._wake, self._closing = threading.Lock(), threading.Event(), False
         self._thread: threading.Thread | None = None
         if info.driver != "inprocess":  # there the run would take turns with it, 5 ms each, and wait for longer
@@ -112,6 +117,9 @@ class RecordWriter:
             if waiting or last:
                 self._flush()
             self._written_at = monotonic()
+            if self._thread is not None and self._written_at - self._synced_at > SYNC:
+                os.fsync(self._file.fileno())
+                self._synced_at = monotonic()
         except OSError as error:
             self.error = OSError(error.errno, error.strerror or str(error), str(self.path))
 
