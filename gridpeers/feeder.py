@@ -80,6 +80,8 @@ class Feeder(Tables, frozen=True, kw_only=True):
             tables = read_feeder(str(name), load_set or "main")
         return cls(**{name: getattr(tables, name) for name in tables.__struct_fields__})
 
+    from_opendss = from_glm = read  # names of scripts written before `read` took such files
+
     def add_inverter(
         self,
         name: str,
