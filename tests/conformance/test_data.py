@@ -28,7 +28,6 @@ ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8").replace('
 
 
 def recorded(path: Path, case: str) -> Recorded:
-    """Run one case of a file in one process."""
     scenario, feeder = load_scenario(path)
     recorder = Recorder()
     outcome = run_inprocess(*configs(scenario, feeder, case), recorder)
@@ -150,7 +149,6 @@ SAID = "load 48 set to 630 kW and 450 kvar at nominal voltage, 3 times its table
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Result:
-    """Nine agents in an island, one load of which is tripled."""
     folder = tmp_path_factory.mktemp("loads")
     (folder / "loads.toml").write_text(TEXT, encoding="utf-8")
     return gp.load(folder / "loads.toml").run("IV", folder=folder / "out")

@@ -20,7 +20,6 @@ Told = tuple[list[Telemetry], str, bool, tuple[PlantEvent, ...], tuple[str, ...]
 
 
 def told(plant: PlantConfig, agents: tuple[AgentConfig, ...], *, messages: bool, toy: bool = True) -> Told:
-    """Return all that a run tells."""
     telemetry: list[Telemetry] = []
     given = ToyPlant(plant) if toy else None
     outcome = run_inprocess(plant, agents, telemetry.append, plant=given, messages=messages)
@@ -38,7 +37,6 @@ def both(control: Control, **changes: Any) -> Told:
 
 @pytest.fixture
 def no_bus(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Make the bus unusable."""
     monkeypatch.delattr(InprocessBus, "run")
 
 

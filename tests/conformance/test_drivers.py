@@ -50,8 +50,6 @@ def in_one_process(plant: PlantConfig, agents: tuple[AgentConfig, ...]) -> Ran:
 
 @pytest.fixture(params=["inprocess", "processes"])
 def driver(request: pytest.FixtureRequest, tmp_path: Path) -> Driver:
-    """Each of the two drivers."""
-
     def with_processes(plant: PlantConfig, agents: tuple[AgentConfig, ...]) -> Ran:
         run = ProcessRun(plant, agents, tmp_path)
         return Ran(run(), run.rows)

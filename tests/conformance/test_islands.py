@@ -18,7 +18,6 @@ from tests.golden.catalogue.pins import ran
 
 @pytest.fixture(scope="module")
 def blackout() -> tuple[History, Outcome]:
-    """Case IV of the catalogue's scenario."""
     recorded, outcome = ran("blackout", "IV")
     return recorded.history, outcome
 
@@ -80,23 +79,19 @@ Row = tuple[float, ...]
 
 
 def rows(case: str) -> Sequence[Row]:
-    """Records of a case of unheard-switches."""
     return [tuple(row) for row in ran("unheard-switches", case)[0].history.table.tolist()]
 
 
 def row_at(case: str, t: float) -> Row:
-    """The row at t (s)."""
     return next(row for row in rows(case) if row[0] >= t - 1e-9)
 
 
 def agents() -> tuple[AgentConfig, ...]:
-    """The nine."""
     scenario, feeder = load_scenario("unheard-switches")
     return configs(scenario, feeder, "switches")[1]
 
 
 def shares(row: Row) -> list[float]:
-    """P of each inverter over its rating."""
     return [P / agent.P_rated for P, agent in zip(row[2::6], agents(), strict=True)]
 
 

@@ -58,7 +58,6 @@ lies = { model = "extreme", side = "alternate" }
 
 @pytest.fixture
 def scenario(tmp_path: Path) -> Path:
-    """The scenario with every lie at once."""
     path = tmp_path / "liars.toml"
     path.write_text(LIARS, encoding="utf-8")
     return path

@@ -82,7 +82,6 @@ class Ran(NamedTuple):
 
 
 def run(path: Path, *, processes: bool) -> Ran:
-    """Run the one case of a scenario."""
     scenario, feeder = load_scenario(path)
     case = next(iter(scenario.cases))
     rows: list[tuple[float, ...]] = []
@@ -99,7 +98,6 @@ def run(path: Path, *, processes: bool) -> Ran:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where the scenario is."""
     made = tmp_path_factory.mktemp("storm")
     (made / "storm.toml").write_text(STORM)
     (made / "calm.toml").write_text(CALM)
@@ -108,7 +106,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def storm(folder: Path) -> Ran:
-    """The run with all faults, in one process."""
     return run(folder / "storm.toml", processes=False)
 
 

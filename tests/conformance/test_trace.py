@@ -35,7 +35,6 @@ CALM = '[time]\nend_s = 0.4\n[case.calm]\nsecondary = "all"\ngraph = "ring"\n'
 
 
 def record_of(folder: Path, text: str, case: str) -> RunRecord:
-    """Run a scenario."""
     (folder / f"{case}.toml").write_text(text, encoding="utf-8")
     return recorded_run(folder / f"{case}.toml", case, folder / case)
 

@@ -33,7 +33,6 @@ def run(tmp_path: Path, more: str = "", end: float = 0.8) -> RunRecord:
 
 
 def account(explanation: Explanation, name: str) -> NeighbourAccount:
-    """A neighbour of an explanation."""
     return next(each for each in explanation.neighbours if each.name == name)
 
 
@@ -173,7 +172,6 @@ def test_published_laws(law: str, tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def islanded(tmp_path_factory: pytest.TempPathFactory) -> RunRecord:
-    """A record without faults."""
     return run(tmp_path_factory.mktemp("why"))
 
 

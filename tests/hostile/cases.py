@@ -83,7 +83,6 @@ def sound(kind: type[Message], **header: Any) -> dict[str, Any]:
 
 
 def packed(body: dict[str, Any]) -> bytes:
-    """Bytes of a message that was put together by hand."""
     return sealed(msgspec.msgpack.encode(body))
 
 
@@ -99,7 +98,6 @@ def cases(kind: type[Message], **header: Any) -> Iterator[Case]:
 
 
 def all_cases(**header: Any) -> Iterator[Case]:
-    """Those of all messages there are."""
     for kind in MESSAGES:
         yield from cases(kind, **header)
 

@@ -26,18 +26,15 @@ INSTANCES = {"inv1": "a", "inv2": "b", "inv3": "c"}
 
 
 def plate(name: str) -> Nameplate:
-    """Valid nameplate of an agent."""
     return Agent(replace(agent_config(name), epoch=EPOCH)).nameplate
 
 
 def state(name: str, k: int) -> State:
-    """Valid state of a neighbour at tick k."""
     share = 60e3 + 5e3 * NAMES.index(name)
     return State(sender=name, epoch=EPOCH, seq=k, t=round(k * T_C, 9), P_set=share, V_set=277.0, Q=1e3, island="inv1")
 
 
 def measurement(k: int) -> Measurement:
-    """Valid measurement of inv1 at tick k."""
     return Measurement(
         sender="plant", epoch=EPOCH, seq=k, t=round(k * T_C, 9), to="inv1", P=5e4, Q=0.0, V=277.0, f=59.95,
         P_set=5e4, V_set=277.0, grid_connected=False, island="inv1", roster=NAMES,
@@ -67,7 +64,6 @@ class Scene:
         self.take()
 
     def hear(self, key: str, *messages: Message) -> None:
-        """Bring messages on a key."""
         for message in messages:
             self.side.received(key, encode(message), self.now)
 

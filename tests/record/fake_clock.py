@@ -49,7 +49,6 @@ READY = 0.26
 
 
 def at_once(src: str, dst: str, key: str, number: int) -> float:
-    """Return a millisecond for every message."""
     return 0.001
 
 
@@ -85,7 +84,6 @@ class FakeClockRun:
         self._on(START + READY + t, do)
 
     def start(self, name: str) -> None:
-        """Start the process of an agent."""
         self._lives[name] = self._lives.get(name, 0) + 1
         config = replace(self._configs[name], epoch=int(self.now * 1000.0))
         links, law = links_of(name, config.links), make_law(config.control)
@@ -104,7 +102,6 @@ class FakeClockRun:
         self._gone(name)
 
     def freeze(self, name: str, seconds: float) -> None:
-        """Let a process stand still for some time (s)."""
         self._frozen[name] = self.now + seconds
 
     def lose(self, name: str, key: str, number: int, kind: str = "excess") -> None:
@@ -119,12 +116,10 @@ class FakeClockRun:
         self._later(seconds, lambda: self._tell(token, name, appeared=True))
 
     def command(self, verb: Any, **further: Any) -> None:
-        """Send the plant a command."""
         command = Command(sender="cli", epoch=1, seq=7, t=0.0, verb=verb, reply_to="z1", **further)
         self._send("cli", self.keys.command, encode(command))
 
     def run(self) -> None:
-        """Run until the plant is over."""
         while not self.plant.finished:
             due, _, do = heappop(self._events)
             self.now = max(self.now, due)
@@ -156,8 +151,6 @@ class FakeClockRun:
             self._tell(node.token, other, appeared=False)
 
     def _tell(self, token: str, to: str, *, appeared: bool) -> None:
-        """Tell a process that a token appeared, or vanished."""
-
         def tell() -> None:
             if (node := self._nodes.get(to)) is not None:
                 (node.appeared if appeared else node.vanished)(token, self.now)

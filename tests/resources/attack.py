@@ -68,7 +68,6 @@ KINDS = {"foreign": foreign, "commands": commands}
 
 
 def main() -> None:
-    """Attack until standard input ends."""
     attack = msgspec.json.decode(sys.stdin.readline(), type=Attack)
     keys, names = Keys(attack.run), attack.names
     ending = threading.Event()

@@ -56,7 +56,6 @@ class Watch:
         return set(DROP.findall(self._said().decode(errors="replace")))
 
     def kinds(self) -> set[str]:
-        """Return the kinds of these drops."""
         return {kind for _, kind in self.drops()}
 
     def assert_bounded(self) -> None:
@@ -72,7 +71,6 @@ class Watch:
 
 @contextmanager
 def attacking(town: Town, kind: str) -> Iterator[Watch]:
-    """Attack while in the context."""
     watch, attack = Watch(town), Attack(endpoint=town.endpoint, run=town.plant_config.run, names=TWO, kind=kind)
     words = [sys.executable, "-m", "tests.resources.attack"]
     with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:

@@ -25,7 +25,6 @@ HOUR = 3600.0
 
 
 def drawn(seed: int, count: int) -> list[SoakAction]:
-    """The first actions of a seed."""
     return list(islice(soak_actions(seed, AGENTS[2:], AGENTS, "inv10", ("MG1", "MG2", "MG3")), count))
 
 
@@ -41,7 +40,6 @@ def looks(growth: float) -> list[ProcessSize]:
 
 
 def config(name: str, kind: Literal["GFM", "GFL"]) -> AgentConfig:
-    """The configuration of an agent."""
     return AgentConfig(
         run="soak", name=name, kind=kind, microgrid="MG1", P_rated=6e5, V_nom=277.0, f_nom=60.0, m_p=0.01, m_q=0.05,
         T_c=0.02, control=Control(secondary="all", graph="full"), deadline=10.0, connect=(),

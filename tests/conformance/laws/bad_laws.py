@@ -16,11 +16,9 @@ class Failing(gp.Law):
     gain: Annotated[float, gp.Unit("1/s"), gp.Range(0, 100), "Does nothing."] = 5.0
 
     def start(self, own: gp.Own) -> None:
-        """Count from zero."""
         self.steps = 0
 
     def step(self, own: gp.Own, neighbours: Any, T: float) -> Any:
-        """Hold, or fail."""
         self.steps += 1
         if self.steps < 10:
             return gp.SetPoints(own.P_set, own.V_set)
@@ -43,7 +41,6 @@ class WrongStep(gp.Law):
     """Takes no neighbours."""
 
     def step(self, own: gp.Own) -> gp.SetPoints:  # type: ignore[override]
-        """Hold."""
         return gp.SetPoints(own.P_set, own.V_set)
 
 
@@ -54,7 +51,6 @@ class Unmakeable(gp.Law):
         raise RuntimeError("no licence")
 
     def step(self, own: gp.Own, neighbours: Any, T: float) -> gp.SetPoints:
-        """Hold."""
         return gp.SetPoints(own.P_set, own.V_set)
 
 
@@ -66,7 +62,6 @@ class Held(gp.Law):
     """Holds its set-points."""
 
     def step(self, own: gp.Own, neighbours: Any, T: float) -> gp.SetPoints:
-        """Hold."""
         return gp.SetPoints(own.P_set, own.V_set)
 
 

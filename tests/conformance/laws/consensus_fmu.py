@@ -27,7 +27,6 @@ class ConsensusFmu(Fmi2Slave):
         self.register_variable(Real(name, causality=causality, variability=variability))
 
     def do_step(self, current_time, step_size):
-        """Decide the set-points."""
         y = z = d = 0.0
         for i in range(1, int(self.neighbours) + 1):
             weight, P_set, Q, m_p, m_q = (getattr(self, f"neighbour_{i}_{name}") for name in OTHER)

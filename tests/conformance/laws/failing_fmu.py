@@ -18,7 +18,6 @@ class FailingFmu(Fmi2Slave):
         )
 
     def do_step(self, current_time, step_size):
-        """Fail."""
         while self.how == 1.0:
             pass
         if self.how == 2.0:

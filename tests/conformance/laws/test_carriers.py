@@ -24,7 +24,6 @@ PROGRAM = {"command": [sys.executable, str(HERE / "consensus_program.py")]}
 
 @pytest.fixture(scope="module")
 def fmu(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """The paper's law, exported as an FMU."""
     folder = tmp_path_factory.mktemp("fmu")
     source = str(HERE / "consensus_fmu.py")
     subprocess.run([sys.executable, "-m", "pythonfmu", "build", "-f", source, "-d", str(folder)], check=True)
@@ -33,7 +32,6 @@ def fmu(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 
 @pytest.fixture(scope="module")
 def fmi3(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """The paper's law in C, as an FMU of FMI 3."""
     cc = shutil.which("cc")
     if cc is None:
         pytest.skip("no C compiler is here")

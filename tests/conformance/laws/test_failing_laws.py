@@ -219,7 +219,6 @@ class Wanders(gp.Law):
     """Holds its set-points, somewhere else."""
 
     def step(self, own: gp.Own, neighbours: Sequence[gp.Neighbour], T: float) -> gp.SetPoints:
-        """Hold."""
         os.chdir("/")
         return gp.SetPoints(own.P_set, own.V_set)
 

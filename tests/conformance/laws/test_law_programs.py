@@ -40,12 +40,10 @@ def in_c(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, ...]:
 
 @pytest.fixture(params=["C", "Python"])
 def command(request: pytest.FixtureRequest) -> tuple[str, ...]:
-    """Each of the two programs."""
     return PYTHON if request.param == "Python" else request.getfixturevalue("in_c")
 
 
 def answers(command: tuple[str, ...], *lines: str) -> list[dict[str, object]]:
-    """Answers of a program to some lines."""
     done = subprocess.run(command, input="".join(f"{line}\n" for line in lines), capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
     return [json.loads(line) for line in done.stdout.splitlines()]

@@ -92,12 +92,10 @@ def own(i: int, P_set: float, t: float) -> Own:
 
 
 def neighbour(j: int, P_set: float) -> Neighbour:
-    """Nameplate and state of a neighbour."""
     return Neighbour(f"inv{j}", False, 0.0, 1.0, P_set, 1.0, 0.0, M_P, 0.05, 1e5)
 
 
 def ring(n: int) -> NDArray[np.bool_]:
-    """Links of a ring."""
     links = np.zeros((n, n), dtype=bool)
     for i in range(n):
         links[i, (i + 1) % n] = links[(i + 1) % n, i] = True
@@ -105,7 +103,6 @@ def ring(n: int) -> NDArray[np.bool_]:
 
 
 def laplacian(links: NDArray[np.bool_]) -> Floats:
-    """Laplacian of unit weights."""
     return np.diag(links.sum(axis=1).astype(float)) - links.astype(float)
 
 

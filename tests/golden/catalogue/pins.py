@@ -36,7 +36,6 @@ class Pin(NamedTuple):
 
 
 def cases() -> list[tuple[str, str]]:
-    """Every scenario of the catalogue with each of its cases."""
     return [(name, case) for name in names_in(CATALOGUE) for case in load_scenario(name)[0].cases]
 
 
@@ -51,7 +50,6 @@ def ran(name: str, case: str) -> tuple[Recorded, Outcome]:
 
 
 def run_case(name: str, case: str) -> Pin:
-    """Run one case in this process."""
     recorded, _ = ran(name, case)
     return Pin(recorded.sha256, tuple(recorded.history.table[-1, 1 : 1 + len(QUANTITIES)].tolist()))
 
@@ -91,7 +89,6 @@ class Pinned(NamedTuple):
 
 
 def read() -> Pinned:
-    """Read the file of the pins."""
     whole = tomllib.loads(FILE.read_text(encoding="utf-8"))
     otherwise = {level: _pins(tables) for level, tables in whole.get("otherwise", {}).items()}
     return Pinned(_pins(whole["pin"]), otherwise, whole["environment"], whole["moved"])

@@ -19,14 +19,12 @@ Z_GFM = 0.0025 + 0.05j
 
 
 def rows(file: str) -> list[dict[str, str]]:
-    """Rows of one of the case's tables."""
     with (HERE / file).open(newline="") as stream:
         return list(csv.DictReader(stream))
 
 
 @pytest.fixture(scope="module")
 def network() -> Network:
-    """The networked microgrids."""
     return Network(read_feeder("microgrid123", "main"))
 
 

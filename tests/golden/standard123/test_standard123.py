@@ -13,13 +13,11 @@ EXPECTED = Path(__file__).with_name("expected.csv")
 
 @pytest.fixture(scope="module")
 def network() -> Network:
-    """The standard feeder."""
     return Network(read_feeder("standard123"))
 
 
 @pytest.fixture(scope="module")
 def V(network: Network) -> NDArray[np.complex128]:
-    """Its voltages (V)."""
     return solve_power_flow(network, network.closed0)
 
 

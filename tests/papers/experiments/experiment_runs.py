@@ -40,7 +40,6 @@ def measured(scenario: str, case: str, end_s: float, *links: Fault, **of: Any) -
 
 
 def told(scenario: str, end_s: float, *cases: str) -> CaseData:
-    """Some cases of a scenario with their histories."""
     spec, feeder = load_scenario(scenario)
     spec = msgspec.structs.replace(spec, time=msgspec.structs.replace(spec.time, end_s=end_s))
     return CaseData(scenario=spec, feeder=feeder, histories={case: _history(spec, feeder, case) for case in cases})

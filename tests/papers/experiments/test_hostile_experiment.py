@@ -28,7 +28,6 @@ def written(run: Any, *keys: str) -> list[str]:
 
 
 def graph(case: str) -> np.ndarray:
-    """Adjacency of a case of the scenario."""
     return (theory("graphs").inverters[case].A > 0.0).astype(float)
 
 

@@ -45,7 +45,6 @@ def result(folder: Path, f_error: float = 0.136) -> PartResult:
 
 
 def whole(*results: PartResult) -> Reproduction:
-    """A report of some parts."""
     return Reproduction(results=results, driver="inprocess", seed=1, started="2026-01-01 12:00")
 
 

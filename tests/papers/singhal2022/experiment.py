@@ -22,7 +22,6 @@ class Experiment:
 
     @property
     def steady(self) -> SteadyValues:
-        """Steady values by case and event."""
         return self.found.results
 
     def statuses(self, experiment: str) -> dict[str, str]:
@@ -37,7 +36,6 @@ def expected(experiment: str) -> dict[str, str]:
 
 @cache
 def experiment(name: str) -> Experiment:
-    """Run all cases of a scenario."""
     scenario, feeder = load_scenario(name)
     nameplates = Nameplates.of(feeder.inverters)
     cases = {}

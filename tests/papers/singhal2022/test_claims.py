@@ -16,7 +16,6 @@ Table = dict[str, dict[str, Steady]]
 
 
 def judged(results: Table) -> tuple[Verdict, ...]:
-    """Verdicts on the islanding experiment."""
     return judge(Findings(results=results, P_set0=0.65, GFL=("inv2",)), ISLANDING)
 
 
@@ -37,14 +36,12 @@ def paper() -> Table:
 
 
 def changed(case: str, event: str, **values: object) -> Table:
-    """The paper's tables with one cell changed."""
     table = paper()
     table[case][event] = replace(table[case][event], **values)  # type: ignore[arg-type]
     return table
 
 
 def verdict(name: str, results: Table) -> Verdict:
-    """The verdict on one claim."""
     return next(verdict for verdict in judged(results) if verdict.claim.name == name)
 
 

@@ -6,7 +6,6 @@ from gridpeers.papers.singhal2022.figures import topologies
 
 
 def graph_run(links: int, t: float | None, *, connected: bool) -> GraphRun:
-    """One run over a graph."""
     return GraphRun(
         links=links,
         connected=connected,

@@ -14,7 +14,6 @@ SCENARIOS = {
 
 
 def ours(cell: Cell) -> float:
-    """Our number in a cell's place."""
     return experiment(SCENARIOS[cell.table]).found.value(cell)
 
 

@@ -39,7 +39,6 @@ def changed(case: CheckedCase, edit: Callable[[dict[str, np.ndarray[Any, Any]]],
 
 
 def altered(content: RecordContent, **parts: Any) -> RecordContent:
-    """The content of a record with other parts."""
     other = copy(content)
     vars(other).update(parts)
     return other
@@ -77,7 +76,6 @@ def with_content(case: CheckedCase, content: RecordContent, *, late: float = 0.0
 
 
 def verdict(case: CheckedCase, check: str, **limits: Any) -> CheckVerdict:
-    """The verdict of one check on a case."""
     entries: Sequence[dict[str, Any]] = [{"use": check, **limits}]
     (found,) = judge_by({check: chosen_checks(entries)[check]}, case)
     return found

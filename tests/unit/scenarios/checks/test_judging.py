@@ -35,7 +35,6 @@ class Nadir:
     least_Hz: Annotated[float, gp.Unit("Hz"), gp.Range(40, 70)] = 59.3
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
-        """Yield every row of every inverter below it."""
         f = case.history.f[:, case.nameplates.GFM]
         for row, column in zip(*(f < self.least_Hz).nonzero(), strict=True):
             yield Violation(text="low", t=case.history.t[row], agent="inv1", value=f[row, column], limit=self.least_Hz)
@@ -49,8 +48,6 @@ def judged(check: Callable[[Any], Any], monkeypatch: pytest.MonkeyPatch) -> Chec
 
 
 def raising(error: BaseException) -> Callable[[Any], Any]:
-    """A check that raises an error."""
-
     def check(case: CheckedCase) -> Any:
         raise error
 

@@ -27,7 +27,6 @@ SCHEDULES = st.sampled_from([(), AWAY])
 def configured(
     schedule: Schedule = (), n: int = 4, graph: GraphRule = "full", end: float = 0.4
 ) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
-    """Plant and agents of a small toy."""
     return toy_configs(n, Control(secondary="all", graph=graph), end=end, schedule=schedule)
 
 

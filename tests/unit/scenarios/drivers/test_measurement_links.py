@@ -24,13 +24,11 @@ Rows = list[tuple[float, ...]]
 
 
 def emulated(*faults: Fault) -> dict[str, Any]:
-    """The configuration of links between three inverters with these faults."""
     microgrids = {f"inv{i}": "mg1" for i in range(1, 4)}
     return EmulationConfig(netem=Netem(links=faults), microgrids=microgrids).to_tree()
 
 
 def rows_of(*faults: Fault, schedule: Schedule = ()) -> Rows:
-    """Rows of a run of three agents with faults of links."""
     plant, agents = toy_configs(3, end=2.0, schedule=schedule)
     agents = tuple(replace(agent, links=emulated(*faults)) for agent in agents)
     rows: Rows = []
@@ -87,7 +85,6 @@ class Holding(ToyPlant):
     held: list[tuple[float, str, float]]
 
     def hold(self, name: str, P_set: float, V_set: float) -> None:
-        """Note it."""
         self.held = [*getattr(self, "held", []), (self._t, name, P_set)]
         super().hold(name, P_set, V_set)
 

@@ -67,7 +67,6 @@ class Process:
 
 
 def all_of(*processes: Process) -> Children:
-    """The processes of a run."""
     children = Children()
     for process in processes:
         children.add(cast(Child, process))

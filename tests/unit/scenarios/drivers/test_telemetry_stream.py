@@ -13,7 +13,6 @@ KEYS = Keys("demo")
 
 
 def telemetry(seq: int, epoch: int = 7, sender: str = "plant") -> Telemetry:
-    """One without rows."""
     return Telemetry(
         sender=sender, epoch=epoch, seq=seq, t=0.0, inverters=(), rows=(), events=(), final=False, outcome="",
         reproducible=True,
@@ -28,13 +27,11 @@ class Recorder:
     taken: list[object] = field(default_factory=list)
 
     def hear(self, message: Telemetry | LinkReport | LinkRequest | Answer, key: str = KEYS.telemetry) -> None:
-        """Bring a message on a key."""
         self.core.received(key, encode(message), 0.0)
         self.taken += self.core.take()
 
 
 def recorder(stream: TelemetryStream | None = None) -> Recorder:
-    """One that has just opened its session."""
     return Recorder(TelemetryEndpoint("fleet", "demo", stream or TelemetryStream(acknowledges=True)))
 
 

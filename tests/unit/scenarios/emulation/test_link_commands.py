@@ -45,13 +45,11 @@ def agent_lab() -> agent_side.Lab:
 
 
 def link_command(lab: agent_side.Lab, number: int, t: float, tree: dict[str, Any] = CUT, life: int = 1) -> None:
-    """A link command of the plant comes in."""
     message = LinkRequest(sender="plant", epoch=life, seq=number, t=t, link_command=tree, reply_to="z1")
     lab.hear(agent_side.KEYS.link_request("inv1"), message)
 
 
 def answers(lab: agent_side.Lab) -> list[tuple[int, bool, str]]:
-    """Answers of the agent so far."""
     return [(m.seq, m.ok, m.text) for m in lab.published if isinstance(m, LinkAcknowledgement)]
 
 

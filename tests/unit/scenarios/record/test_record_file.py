@@ -133,7 +133,6 @@ def test_a_record_with_changed_bytes_is_read_up_to_them(whole: Path, tmp_path: P
 
 
 def mcap(profile: str, **metadata: str) -> bytes:
-    """The bytes of an MCAP file without messages."""
     writer = Writer(file := BytesIO())
     writer.start(profile=profile)
     writer.add_metadata(METADATA, metadata)

@@ -13,7 +13,6 @@ from gridpeers.scenarios.results.plots.feeder_diagram import feeder_diagram
 
 
 def legend(feeder: Tables, V: dict[str, float] | None = None) -> list[str]:
-    """The words of a diagram's legend."""
     return [text.get_text() for text in feeder_diagram(feeder, V).legends[0].get_texts()]
 
 

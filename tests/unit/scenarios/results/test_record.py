@@ -24,7 +24,6 @@ Rows = tuple[tuple[float, ...], ...]
 
 
 def telemetry(rows: Rows, events: tuple[PlantEvent, ...] = (), *, reproducible: bool = True) -> Telemetry:
-    """A message of one inverter's rows."""
     return Telemetry(
         sender="plant",
         epoch=1,
@@ -40,7 +39,6 @@ def telemetry(rows: Rows, events: tuple[PlantEvent, ...] = (), *, reproducible: 
 
 
 def row(t: float, x: float = 0.1) -> tuple[float, ...]:
-    """A row of one inverter."""
     return (t, 60.0, 388200.0, x, 2401.7771198288433, 388200.0, 2401.7771198288433)
 
 
@@ -114,7 +112,6 @@ def test_a_disk_that_takes_no_more_is_an_error_at_once_and_again_at_the_end(
 
 
 def no_room(*_: object) -> int:
-    """Stand for a full disk."""
     raise OSError(errno.ENOSPC, "No space left on device")
 
 
