@@ -41,8 +41,12 @@ def unpacked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 def steps(path: Path, how: float, time_limit: float = 10.0) -> float:
-    """P_set (pu) after two steps of an FMU; the first has ten times the time, as it is loaded before."""
-    law = FmuLaw(LawChoice(fmu=path.name, folder=str(path.parent), parameters={"how": how}, time_limit=time_limit))
+    choice = LawChoice(fmu=path.name, folder=str(path.parent), parameters={"how": how}, time_limit=time_limit)
+    return two_steps(FmuLaw(choice))
+
+
+def two_steps(law: FmuLaw | ProgramLaw) -> float:
+    """P_set (pu) after two steps; the start has ten times the time, and of an FMU the first, as it is loaded before."""
     try:
         start_law(law, OWN)
         decide(law, OWN, (), 0.02)
@@ -117,21 +121,25 @@ def test_programs_that_ignore_the_end_of_their_input_are_waited_for_together() -
 SHORT, ENDS, LONG = 0.05, 0.3, 6.0
 """Limits (s) of a program that never answers, of one that ends meanwhile, and of one that answers sooner or later."""
 
+READY = 'echo \'{"type": "ready"}\'; read -r _'
+"""Answers the start, and takes the step."""
+
 
 @pytest.mark.parametrize(("script", "limit", "said"), [
     ("printf '{\"type\":'; sleep 600", SHORT, r"did not answer the start at t = 0 s within 0.5 s"),
     ("while :; do echo too much >&2; done", SHORT, r"did not answer the start at t = 0 s within 0.5 s"),
     ("sleep 600 & exit 3", ENDS, r"ended at the start at t = 0 s with exit code 3"),
     ("head -c 200000 /dev/zero | tr '\\0' x; sleep 600", LONG, r"answered the start at .* with more than 100000 bytes"),
+    (f"{READY}; echo hello; read -r _", LONG, r"answered the step at t = 0 s with 'hello', which is none; e.g. "),
+    (f"{READY}; echo '{{\"error\": \"no idea\"}}'; read -r _", LONG, r"says: no idea \(step at t = 0 s\)"),
+    ("printf '{}\n{}\n'; read -r _", LONG, r"printed '.*' before the step at t = 0 s; print one line for each that c"),
+    (f"{READY}; exit 7", LONG, r"ended at the step at t = 0 s with exit code 7"),
 ])  # fmt: skip
-def test_a_program_that_says_too_little_or_too_much_is_told_in_one_line(script: str, limit: float, said: str) -> None:
-    """Half a line, endless complaints, an end that leaves another program, a line without end."""
-    law = ProgramLaw(LawChoice(command=("sh", "-c", f"exec 2>/dev/null; read -r _; {script}"), time_limit=limit))
-    try:
-        with pytest.raises(LawError, match=said):
-            law.start(OWN)
-    finally:
-        law.close()
+def test_a_program_that_does_not_answer_as_it_should_is_told_in_one_line(script: str, limit: float, said: str) -> None:
+    """Half a line, endless complaints, an end that leaves another program, a line without end; rubbish, an error."""
+    choice = LawChoice(command=("sh", "-c", f"exec 2>/dev/null; read -r _; {script}"), time_limit=limit)
+    with pytest.raises(LawError, match=said):
+        two_steps(ProgramLaw(choice))
 
 
 def test_a_law_that_was_closed_says_so(tmp_path: Path) -> None:
