@@ -13,30 +13,22 @@ from gridpeers.lab.communication.communication_checks import CommunicationSummar
 from gridpeers.netem.ledger import LinkTrace
 from gridpeers.scenarios.emulation.link_data import report_data
 from gridpeers.scenarios.record.record_file import RecordFile, RecordMessage
-from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.wire.codec import CRC, encode
 from gridpeers.wire.messages import LATEST, MOST_COUNT, PLANT, Journal, LinkReport, State
 from tests.fuzz.mutation import NUMBERS, TEXTS
+from tests.record.recorded_runs import toy_info
 from tests.toy.toy_configs import toy_configs
 
 T_END = 1.0
 """End of the run (s)."""
 
 
-def info(*, clock: str) -> RecordInfo:
-    plant, agents = toy_configs(3, end=T_END)
-    names = tuple(agent.name for agent in agents)
-    return RecordInfo(
-        level="all", scenario="toy", case="case", toml="", seed=1, driver="inprocess", versions={},
-        inverters=names, plant=replace(plant, clock=clock), agents=agents,
-    )  # fmt: skip
-
-
 class JournalFile:
     """A record with these parts of journals and link reports and nothing else; a `RecordFile` for a pass."""
 
     def __init__(self, parts: Iterable[tuple[str, bytes]], reports: Iterable[LinkReport], *, clock: str) -> None:
-        self.info, self.t_end = info(clock=clock), T_END
+        plant, agents = toy_configs(3, end=T_END)
+        self.info, self.t_end = toy_info(replace(plant, clock=clock), agents), T_END
         self.damage = ()
         self._parts, self._reports = parts, reports
 

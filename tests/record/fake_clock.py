@@ -25,7 +25,6 @@ from gridpeers.plant.plant_node import PlantNode
 from gridpeers.scenarios.drivers.telemetry_client import RECORDER
 from gridpeers.scenarios.emulation.emulated_links import links_of
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
-from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.results.record import Recorder
 from gridpeers.wire.codec import decode, encode
@@ -33,6 +32,7 @@ from gridpeers.wire.journal import RecordLevel
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import PLANT, Command, Journal, LinkReport, LinkRequest, Telemetry
 from gridpeers.wire.node import Fetch, Listen, Log, Loss, Publish
+from tests.record.recorded_runs import toy_info
 from tests.toy.toy_configs import ALL_FULL, toy_configs
 from tests.toy.toy_plant import ToyPlant
 
@@ -249,18 +249,7 @@ def fake_clock_record(
         links = EmulationConfig(netem=netem, microgrids=microgrids, real_nodes=True).to_tree()
     plant = replace(plant, clock="wall", links=links, record=record, wait_for_agents=5.0)
     agents = tuple(replace(agent, clock="wall", links=links, record=record, deadline=0.0) for agent in agents)
-    info = RecordInfo(
-        level=record,
-        scenario="toy",
-        case="case",
-        toml="",
-        seed=1,
-        driver="inprocess",  # so its file is written between the calls, and has the same parts every time
-        versions={},
-        inverters=tuple(agent.name for agent in agents),
-        plant=plant,
-        agents=agents,
-    )
+    info = toy_info(plant, agents, level=record)  # in one process: it is written between the calls, in the same parts
     with pytest.MonkeyPatch.context() as patch, Recorder(folder, gaps=True, record=info) as recorder:
         patch.setattr("gridpeers.scenarios.record.record_writer.CHUNK", 20_000)
         run = FakeClockRun(plant, agents, recorder, delay)

@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.drivers.process_driver import run_processes
 from gridpeers.scenarios.record.record_info import RecordInfo
@@ -17,6 +19,14 @@ from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.schema.configs import configs
 from gridpeers.scenarios.schema.participants import inverters_of
 from gridpeers.wire.journal import RecordLevel
+
+
+def toy_info(plant: PlantConfig, agents: tuple[AgentConfig, ...], *, level: RecordLevel = "all") -> RecordInfo:
+    """What a record says of a run of the toy plant in one process."""
+    return RecordInfo(
+        level=level, scenario="toy", case="case", toml="", seed=1, driver="inprocess", versions={},
+        inverters=tuple(agent.name for agent in agents), plant=plant, agents=agents,
+    )  # fmt: skip
 
 
 def recorded_run(

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import sys
 from itertools import islice
-from math import isinf
+from math import inf, isinf
 from pathlib import Path
-from typing import Literal
 
+import msgspec
 import pytest
+from msgspec.structs import replace
 
 import gridpeers as gp
-from bench.soak.judging import ProcessSize, growths, judge_checks, judge_growth, judge_late, judge_times
+from bench.soak.judging import Finding, ProcessSize, growths, judge_checks, judge_growth, judge_late, judge_times
 from bench.soak.soak_actions import DECK, SoakAction, soak_actions
 from bench.soak.soak_monitor import SoakMonitor
 from bench.soak.soak_run import SoakRun
-from gridpeers.agents.agent_config import AgentConfig, Control
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict, Violation
 from gridpeers.wire.messages import AgentStatus, Telemetry
+from tests.hostile.cases import sound
+from tests.toy.toy_configs import agent_config
 
 AGENTS = tuple(f"inv{i}" for i in range(1, 10))
 
@@ -39,20 +41,10 @@ def looks(growth: float) -> list[ProcessSize]:
     return found
 
 
-def config(name: str, kind: Literal["GFM", "GFL"]) -> AgentConfig:
-    return AgentConfig(
-        run="soak", name=name, kind=kind, microgrid="MG1", P_rated=6e5, V_nom=277.0, f_nom=60.0, m_p=0.01, m_q=0.05,
-        T_c=0.02, control=Control(secondary="all", graph="full"), deadline=10.0, connect=(),
-    )  # fmt: skip
-
-
 def status(name: str, *used: str) -> AgentStatus:
     """A status with these neighbours in the agent's sums."""
-    counts = dict.fromkeys(("received", "sent", "rejected", "lost", "ticks", "missed"), 0)
-    return AgentStatus(
-        sender=name, epoch=1, seq=1, t=1.0, phase="running", waits_for="", island="inv1", neighbours=used,
-        ages=(0.0,) * len(used), used=used, lateness=0.0, **counts,
-    )  # fmt: skip
+    told = sound(AgentStatus, sender=name, neighbours=used, ages=(0.0,) * len(used), used=used)
+    return msgspec.convert(told, AgentStatus)
 
 
 def test_a_seed_decides_all_actions_and_a_deal_has_every_kind() -> None:
@@ -78,23 +70,20 @@ def test_memory_that_grows_by_more_than_a_twentieth_fails(growth: float, verdict
     assert judge_growth("files", growths(looks(growth), "files", ["plant"]), HOUR).verdict == "PASS"
 
 
-@pytest.mark.parametrize(("late", "others", "verdict"), [(1, 0.0, "PASS"), (2, 0.0, "FAIL"), (2, 0.3, "-")])
-def test_more_than_one_late_step_in_a_thousand_fails_unless_others_had_the_machine(
-    late: int, others: float, verdict: str
-) -> None:
-    """On a busy machine the row tells the number, and judges nothing."""
-    assert judge_late(late, 1000, others).verdict == verdict
-
-
-def test_a_heal_that_never_comes_or_is_slow_fails() -> None:
-    """Those in which this program heard nothing itself are told, and not counted."""
-    assert judge_times("heal", [0.1, 5.9], 6.0).verdict == "PASS"
-    assert judge_times("heal", [0.1, 6.1], 6.0).verdict == "FAIL"
-    never = judge_times("heal", [0.1, float("inf")], 6.0)
-    assert never.verdict == "FAIL"
-    assert "worst never (1)" in never.found
-    assert "; 2 not counted" in judge_times("heal", [0.1], 6.0, deaf=2).found
-    assert judge_times("heal", [], 6.0).verdict == "-"
+@pytest.mark.parametrize(("row", "verdict", "found"), [
+    (judge_late(1, 1000, 0.0), "PASS", ""),
+    (judge_late(2, 1000, 0.0), "FAIL", ""),
+    (judge_late(2, 1000, 0.3), "-", ""),
+    (judge_times("heal", [0.1, 5.9], 6.0), "PASS", ""),
+    (judge_times("heal", [0.1, 6.1], 6.0), "FAIL", ""),
+    (judge_times("heal", [0.1, inf], 6.0), "FAIL", "worst never (1)"),
+    (judge_times("heal", [0.1], 6.0, deaf=2), "PASS", "; 2 not counted"),
+    (judge_times("heal", [], 6.0), "-", ""),
+])  # fmt: skip
+def test_a_thousandth_of_late_steps_fails_and_a_heal_that_is_slow(row: Finding, verdict: str, found: str) -> None:
+    """If others had the machine, late steps are told and not judged; heals that this program did not hear neither."""
+    assert row.verdict == verdict
+    assert found in row.found
 
 
 def test_two_agents_use_each_other_once_both_say_so() -> None:
@@ -145,22 +134,15 @@ def test_a_frequency_that_moves_as_agents_find_each_other_again_is_told_and_no_f
 def test_a_frequency_is_restored_once_it_holds() -> None:
     """Out of its band at 1 s, in at 2 s for 0.2 s, and for good at 3 s: restored after 2 s; others do not count."""
     monitor = SoakMonitor()
-    monitor.config(config("inv1", "GFM"))
-    monitor.config(config("inv2", "GFL"))
+    monitor.config(replace(agent_config("inv1"), kind="GFM"))
+    monitor.config(replace(agent_config("inv2"), kind="GFL"))
 
     def f(t: float) -> float:
         return 60.02 if 1.0 <= t < 2.0 or 2.2 <= t < 3.0 else 60.0
 
-    values = ((0.0,) * 5,) * 2
-    times = [round(0.1 * k, 9) for k in range(36)]
-    rows = tuple((t, f(t), *values[0], 50.0, *values[1]) for t in times)
-    monitor.telemetry(
-        Telemetry(
-            sender="plant", epoch=1, seq=1, t=3.5, inverters=("inv1", "inv2"), rows=rows, events=(), final=False,
-            outcome="", reproducible=False,
-        ),
-        9.0,
-    )  # fmt: skip
+    rows = [(t, f(t), *(0.0,) * 5, 50.0, *(0.0,) * 5) for t in (round(0.1 * k, 9) for k in range(36))]
+    told = sound(Telemetry, t=3.5, inverters=("inv1", "inv2"), rows=rows)
+    monitor.telemetry(msgspec.convert(told, Telemetry), 9.0)
 
     assert monitor.restorations == pytest.approx([2.0])
     assert monitor.seconds_in_band == pytest.approx(0.5)

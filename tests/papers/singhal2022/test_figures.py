@@ -1,17 +1,8 @@
 """Figures of the paper that are of no single run."""
 
-from gridpeers.measures import Settling, Steady
-from gridpeers.papers.singhal2022.communication_claims import GraphRun
 from gridpeers.papers.singhal2022.figures import topologies
 
-
-def graph_run(links: int, t: float | None, *, connected: bool) -> GraphRun:
-    return GraphRun(
-        links=links,
-        connected=connected,
-        settled=Settling(t_f_s=t, t_share_s=t, f_swing_Hz=0.0, V_swing_pu=0.0),
-        steady=Steady(f_error_Hz=0.0, MPSI=1e-5 if connected else 0.1, V_error=0.0, MQSI=0.0, t_restore_s=t, p={}),
-    )
+from .test_claims import graph_run
 
 
 def test_graphs_in_parts_are_not_drawn_as_connected_ones() -> None:

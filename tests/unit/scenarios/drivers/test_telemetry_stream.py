@@ -2,21 +2,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import msgspec
 from msgspec.structs import replace
 
 from gridpeers.scenarios.drivers.telemetry_stream import QUIET, TelemetryEndpoint, TelemetryStream
 from gridpeers.wire.codec import encode
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import Answer, LinkReport, LinkRequest, Telemetry
+from tests.hostile.cases import sound
 
 KEYS = Keys("demo")
 
 
 def telemetry(seq: int, epoch: int = 7, sender: str = "plant") -> Telemetry:
-    return Telemetry(
-        sender=sender, epoch=epoch, seq=seq, t=0.0, inverters=(), rows=(), events=(), final=False, outcome="",
-        reproducible=True,
-    )  # fmt: skip
+    return msgspec.convert(sound(Telemetry, sender=sender, epoch=epoch, seq=seq, t=0.0), Telemetry)
 
 
 @dataclass

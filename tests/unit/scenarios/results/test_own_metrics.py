@@ -134,13 +134,19 @@ def fails(found: Findings) -> bool:
     return found.results["V"]["event1"].MPSI < 0.1
 
 
+def ends(found: Findings) -> bool:
+    """Is not true."""
+    sys.exit(3)
+
+
 STEADY = Claim(name="steady", text="is steady", source="here", judge=lambda _: (True, "1"), measures=(), cases=("IV",))
 
 
 def test_a_function_or_a_claim_object_is_judged_and_one_that_raises_fails_in_one_line() -> None:
-    """The docstring's first line is the claim; a case that was not run is told."""
-    plugins = [Plugin(use=f"{__name__}:{name}") for name in ("holds", "fails", "STEADY", "nothing")]
+    """The docstring's first line is the claim; one that was not run is told; leaving Python ends no run."""
+    plugins = [Plugin(use=f"{__name__}:{name}") for name in ("holds", "fails", "STEADY", "nothing", "ends")]
     verdicts = judge(Findings(results={}), [*map(claim_of, plugins)])
+    (known,) = judge(FOUND, [claim_of(plugins[1])])
 
     assert [(one.status, one.claim.text) for one in verdicts[:3]] == [
         ("PASS", "Holds always. And this is not part of the claim"),
@@ -149,21 +155,8 @@ def test_a_function_or_a_claim_object_is_judged_and_one_that_raises_fails_in_one
     ]
     assert verdicts[1].found == "cannot be judged: KeyError: 'V'"
     assert 'has no "nothing"' in verdicts[3].found
-
-
-def ends(found: Findings) -> bool:
-    """Is not true."""
-    sys.exit(3)
-
-
-def test_a_claim_ends_no_run() -> None:
-    """It may leave Python; an unknown case is told with those that there are."""
-    claims = [claim_of(Plugin(use=f"{__name__}:{name}")) for name in ("ends", "fails")]
-
-    assert [(it.status, it.found) for it in judge(FOUND, claims)] == [
-        ("FAIL", "cannot be judged: SystemExit: 3"),
-        ("FAIL", "cannot be judged: KeyError: 'V'; cases and events are IV, event1"),
-    ]
+    assert (verdicts[4].status, verdicts[4].found) == ("FAIL", "cannot be judged: SystemExit: 3")
+    assert known.found == "cannot be judged: KeyError: 'V'; cases and events are IV, event1"
 
 
 MODULE = """

@@ -12,12 +12,10 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from gridpeers.scenarios.record import record_writer
-from gridpeers.scenarios.record.record_file import RecordFile
-from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.scenarios.record.record_writer import RecordWriter
 from gridpeers.scenarios.results.record import Recorder, RecordError
 from gridpeers.wire.messages import PlantEvent, Telemetry
+from tests.record.recorded_runs import toy_info
 from tests.toy.toy_configs import toy_configs
 
 Rows = tuple[tuple[float, ...], ...]
@@ -42,13 +40,7 @@ def row(t: float, x: float = 0.1) -> tuple[float, ...]:
     return (t, 60.0, 388200.0, x, 2401.7771198288433, 388200.0, 2401.7771198288433)
 
 
-def info_of(*inverters: str) -> RecordInfo:
-    """What a record says about a run of the toy plant, in one process."""
-    plant, agents = toy_configs(1)
-    return RecordInfo(
-        level="physics", scenario="toy", case="I", toml="", seed=1, driver="inprocess", versions={},
-        inverters=inverters, plant=plant, agents=agents,
-    )  # fmt: skip
+ONE = toy_info(*toy_configs(1), level="physics")
 
 
 def test_the_hash_is_that_of_the_numbers_however_they_came(tmp_path: Path) -> None:
@@ -56,7 +48,7 @@ def test_the_hash_is_that_of_the_numbers_however_they_came(tmp_path: Path) -> No
     with Recorder(tmp_path / "a") as one:
         one(telemetry((row(0.0), row(0.5), row(1.0))))
         at_once = one.finish(1.0, 0.5)
-    with Recorder(tmp_path / "b", record=info_of("inv1")) as other:
+    with Recorder(tmp_path / "b", record=ONE) as other:
         for t in (0.0, 0.5, 1.0):
             other(telemetry((row(t),)))
         in_pieces = other.finish(1.0, 0.5)
@@ -74,7 +66,7 @@ def test_every_number_reads_back_to_the_same_bits(
 ) -> None:
     """The shortest text that reads back to a float is what is written."""
     folder = tmp_path_factory.mktemp("record") / "case"
-    with Recorder(folder, record=info_of("inv1")) as recorder:
+    with Recorder(folder, record=ONE) as recorder:
         recorder(telemetry(((0.0, *numbers),)))
         recorded = recorder.finish(0.0, 1.0)
 
@@ -87,7 +79,7 @@ def test_every_number_reads_back_to_the_same_bits(
 def test_a_case_that_was_not_finished_has_its_record_alone(tmp_path: Path) -> None:
     """What came of a broken case can be read, and cannot be taken for the whole."""
     event = PlantEvent(t=0.0, kind="roster", subject="inv3", text="inv3 died, says the plant")
-    with Recorder(tmp_path / "I", record=info_of("inv1")) as recorder:
+    with Recorder(tmp_path / "I", record=ONE) as recorder:
         recorder(telemetry((row(0.0),), (event,)))
 
     assert [path.name for path in (tmp_path / "I").iterdir()] == ["run.mcap"]
@@ -99,7 +91,7 @@ def test_a_disk_that_takes_no_more_is_an_error_at_once_and_again_at_the_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """There is no other account, so no case ends well without its record."""
-    with Recorder(tmp_path / "I", record=info_of("inv1")) as recorder:
+    with Recorder(tmp_path / "I", record=ONE) as recorder:
         recorder(telemetry((row(0.0),)))
         monkeypatch.setattr(record_writer, "PERIOD", -1.0)
         monkeypatch.setattr(record_writer.Writer, "flush", no_room)
@@ -132,7 +124,7 @@ def test_a_history_with_a_gap_is_no_history_unless_the_recorder_may_be_out_of_re
 def test_a_recorder_keeps_no_rows_and_has_them_once_at_its_end(tmp_path: Path) -> None:
     """A run of hours takes no more memory than a short one; its rows are read from the file, into one table."""
     inverters, values = tuple(f"inv{i}" for i in range(10)), tuple(float(k) for k in range(60))
-    with Recorder(tmp_path / "I", record=info_of(*inverters)) as recorder:
+    with Recorder(tmp_path / "I", record=toy_info(*toy_configs(10))) as recorder:
 
         def record(numbers: range) -> None:
             for first in numbers[::100]:
@@ -153,24 +145,3 @@ def test_a_recorder_keeps_no_rows_and_has_them_once_at_its_end(tmp_path: Path) -
     assert (len(history.t), history.V_set[-1, -1]) == (16_000, 59.0)
     assert grown < 300_000  # a chunk that waits
     assert peak < 8 * 16_000 * 61 + 10_000_000  # the table, and some chunks with their messages
-
-
-def test_a_long_run_takes_no_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of chunks nothing is kept."""
-    monkeypatch.setattr(record_writer, "CHUNK", 100)
-    one = RecordWriter(tmp_path, info_of("inv1"))
-
-    def write(numbers: range) -> int:
-        for number in numbers:
-            one.add("telemetry", number, number, bytes(200))
-        return tracemalloc.get_traced_memory()[0]
-
-    tracemalloc.start()
-    try:
-        grown = -write(range(100)) + write(range(100, 500))
-    finally:
-        tracemalloc.stop()
-    one.close()
-
-    assert grown < 400 * 10
-    assert len(RecordFile(tmp_path / "run.mcap").ends) == 500
