@@ -12,16 +12,13 @@ import pytest
 from gridpeers.scenarios.emulation.link_data import LinkCommand, decode_statuses
 from gridpeers.scenarios.live.feeder_map import read_feeder_map
 from gridpeers.scenarios.live.run_requests import read_config
-from gridpeers.scenarios.record.journal_reader import entries_of, values_of
 from gridpeers.scenarios.results.run_files import JOURNAL, FolderError, rows_in
 from gridpeers.scenarios.sweep.sweep_case import SweepRow
 from gridpeers.wire.codec import KINDS
-from gridpeers.wire.messages import LONGEST_MESSAGE
 from gridpeers.wire.trust.key_folder import KeysError, read_list
 from gridpeers.wire.trust.site_authority import make_site
 from tests.fuzz.__main__ import fuzz
 from tests.fuzz.receivers import receivers
-from tests.hostile.cases import sealed
 
 
 def test_no_bytes_raise_an_error_that_nobody_expects(tmp_path: Path) -> None:
@@ -35,17 +32,6 @@ def test_no_bytes_raise_an_error_that_nobody_expects(tmp_path: Path) -> None:
     for name in {name for name, _ in outcomes}:
         assert sum(count for (to, kind), count in outcomes.items() if to == name and kind) > 30, name
     assert {kind for name, kind in outcomes if "agent" in name or "plant" in name} <= {"", *KINDS} - {"failed"}
-
-
-LIST_AS_KEY = b"\x81\x91\x01\x01"
-
-
-def test_what_is_no_journal_is_refused_as_such() -> None:
-    """Python has no map with a list as key, and the buffer of msgpack would overflow: each an error of its own."""
-    assert values_of(sealed(LIST_AS_KEY)) == {}
-    for data, said in ((LIST_AS_KEY, "an entry is none of ours"), (bytes(LONGEST_MESSAGE + 1), "bytes")):
-        with pytest.raises(ValueError, match=said):
-            list(entries_of(data))
 
 
 def test_no_name_from_outside_can_write_on_a_terminal(tmp_path: Path) -> None:

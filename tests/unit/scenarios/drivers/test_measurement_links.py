@@ -7,18 +7,15 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from gridpeers.agents.agent import Agent
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.plant.plant_node import PlantNode
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.emulation.emulated_links import links_of
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
-from gridpeers.wire.codec import encode
-from gridpeers.wire.keys import Keys
-from gridpeers.wire.messages import State
-from tests.toy.toy_configs import Schedule, agent_config, toy_configs
+from tests.toy.toy_configs import Schedule, toy_configs
 from tests.toy.toy_plant import ToyPlant
+from tests.unit.plant.realtime.realtime_lab import Lab
 
 Rows = list[tuple[float, ...]]
 
@@ -76,8 +73,6 @@ def test_the_neighbours_of_a_standing_agent_do_not_use_what_it_says_for_the_lock
 LATE = emulated(Fault(on="inv2 -> plant", delay=0.3))
 """States of inv2 take 0.3 s to the plant."""
 
-KEYS = Keys("toy")
-
 
 class Holding(ToyPlant):
     """A plant that remembers whose set-points it was told to hold, and when."""
@@ -105,40 +100,22 @@ def test_in_simulated_time_a_newcomer_is_not_given_its_predecessors_set_points()
 
 def test_in_wall_clock_time_a_ghost_is_not_held_and_does_not_block_the_newcomer() -> None:
     """The new process counts from 0, in an epoch that is even lower; only what it says is held, once it is there."""
-    config, _ = toy_configs(3, end=9.0)
-    config = replace(config, clock="wall", links=LATE)
-    toy, now = Holding(config), 50.0
-    plant = PlantNode(config, toy, links_of("plant", LATE))
-    plant.start(now)
+    lab = Lab(3, end=9.0, links=LATE)
+    config = lab.node.config
+    toy = lab.toy = Holding(config)
+    lab.node = PlantNode(config, toy, links_of("plant", LATE))
+    lab.node.start(lab.now)
 
-    def join(name: str, instance: str, epoch: int) -> None:
-        plant.appeared(KEYS.alive_agent(name, instance), now)
-        plate = replace(Agent(agent_config(name)).nameplate, epoch=epoch)
-        plant.received(KEYS.nameplate(name, instance), encode(plate), now)
-
-    def step(said: State) -> None:
-        nonlocal now
-        plant.received(KEYS.state("inv2"), encode(said), now)
-        while plant.work(now):
-            pass
-        now = plant.deadline
-        plant.expire(now)
-        plant.take_actions()
-
-    def said(epoch: int, seq: int) -> State:
-        P_set = 11e3 if epoch == 9 else 22e3
-        return State(sender="inv2", epoch=epoch, seq=seq, t=0.0, P_set=P_set, V_set=277.0, Q=0.0)
-
-    for name in ("inv1", "inv2", "inv3"):
-        join(name, "a", 9)
+    lab.join("inv1", "inv2", "inv3", epoch=9)
     for k in range(30):
-        step(said(9, 1000 + k))
-    plant.vanished(KEYS.alive_agent("inv2", "a"), now)
-    plant.take_actions()
-    join("inv2", "b", 4)
-    t = plant.stepper.t
+        lab.state("inv2", 1000 + k, 11e3, epoch=9)
+        lab.step()
+    lab.token("inv2", gone=True)
+    lab.join("inv2", instance="b", epoch=4)
+    t = lab.node.stepper.t
     for k in range(40):
-        step(said(4, k))
+        lab.state("inv2", k, 22e3, epoch=4)
+        lab.step()
     after = [(at, P_set) for at, _, P_set in toy.held if at >= t]
 
     assert {P_set for _, P_set in after} == {22e3}

@@ -23,8 +23,7 @@ from gridpeers.wire.links import CommandEffect
 from gridpeers.wire.messages import PLANT, LinkAcknowledgement, LinkRequest, Measurement, State
 from gridpeers.wire.node import Publish
 from gridpeers.wire.post import Post
-from tests.toy.toy_configs import agent_config, toy_configs
-from tests.toy.toy_plant import ToyPlant
+from tests.toy.toy_configs import agent_config
 from tests.unit.agents import realtime_lab as agent_side
 from tests.unit.plant.plant_lab import KEYS
 from tests.unit.plant.realtime import realtime_lab as plant_side
@@ -41,6 +40,15 @@ def agent_lab() -> agent_side.Lab:
     lab.side.start(lab.now)
     lab.token("plant")
     lab.meet("inv2")
+    return lab
+
+
+def plant_lab(setup: EmulationConfig = SETUP) -> plant_side.Lab:
+    """The plant with the agents of two inverters, behind links."""
+    lab = plant_side.Lab(2)
+    lab.node = PlantNode(lab.node.config, lab.toy, EmulatedLinks("plant", setup))
+    lab.node.start(lab.now)
+    lab.join("inv1", "inv2")
     return lab
 
 
@@ -99,12 +107,7 @@ def test_every_agent_takes_every_command_once_and_in_turn(seed: int) -> None:
 
 def test_a_command_holds_from_one_control_period_later_on_and_is_sent_before_the_measurement() -> None:
     """The plant tells everybody in the wake in which it hears of it; who joins later hears all before he measures."""
-    lab = plant_side.Lab(2)
-    config, _ = toy_configs(2, end=2.0)
-    lab.node = PlantNode(replace(config, clock="wall"), lab.toy, EmulatedLinks("plant", SETUP))
-    lab.node.start(lab.now)
-    lab.join("inv1")
-    lab.join("inv2")
+    lab = plant_lab()
     lab.step(3)
     lab.sent.clear()
     assert lab.node.deadline is not None
@@ -131,13 +134,7 @@ def test_a_command_holds_from_one_control_period_later_on_and_is_sent_before_the
 def test_a_heal_counts_the_links_that_have_a_fault_and_says_so_if_there_is_none() -> None:
     """Of all links the cut one is healed, once; a fault that the scenario has for later is none, and still comes."""
     later = Fault(on="inv1 -> plant", delay=0.1, from_s=5.0)
-    setup = replace(SETUP, netem=Netem(links=(later,)))
-    lab = plant_side.Lab(2)
-    config, _ = toy_configs(2, end=9.0)
-    links = EmulatedLinks("plant", setup)
-    lab.node = PlantNode(replace(config, clock="wall"), ToyPlant(config), links)
-    lab.node.start(lab.now)
-    lab.join("inv1", "inv2")
+    lab = plant_lab(replace(SETUP, netem=Netem(links=(later,))))
     lab.ask("link", CUT)
     lab.step()
     heal = LinkCommand(heal=Heal(on=EVERYTHING, from_s=0.0)).to_tree()
@@ -152,6 +149,8 @@ def test_a_heal_counts_the_links_that_have_a_fault_and_says_so_if_there_is_none(
         "link command 2: all links: 1 link healed",
         "link command 3: all links: no link has a fault",
     ]
+    links = lab.node.links
+    assert links is not None
     assert (links.impaired(4.9), links.impaired(5.0)) == ((), ("inv1",))
 
 

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from gridpeers.scenarios.record.journal_reader import entries_of
+from gridpeers.scenarios.record.journal_reader import entries_of, values_of
 from gridpeers.wire.journal import Entry, Exchange, MessageReference, RejectedCount, SentMessage, Token
 from gridpeers.wire.messages import LONGEST_MESSAGE
+from tests.hostile.cases import sealed
 
 ENTRIES: list[Entry] = [
     Exchange(3, [b"measured", [1, 2.5, None]], [b"state", ["inv1", True]]),
@@ -23,6 +24,8 @@ PARTS = [msgspec.msgpack.encode(entry) for entry in ENTRIES]
 
 
 LATER = msgspec.msgpack.encode(["later", 1])
+LIST_AS_KEY = b"\x81\x91\x01\x01"
+"""A map that Python cannot have."""
 
 
 def read(data: bytes) -> tuple[list[Entry], list[str]]:
@@ -61,9 +64,10 @@ def test_a_value_that_a_later_version_added_is_left_out(added: bytes) -> None:
     [
         (PARTS[1] + PARTS[3][:-1], "within the entry"),
         (PARTS[1] + msgspec.msgpack.encode(["token", "no time"]), "an entry is none of ours"),
+        (PARTS[1] + LIST_AS_KEY, "an entry is none of ours"),
         (bytes(LONGEST_MESSAGE + 1), "a part of a journal has at most"),
     ],
-    ids=["cut off", "another form", "too long"],
+    ids=["cut off", "another form", "no map of Python", "too long"],
 )
 def test_damage_is_told_and_raised_where_nobody_takes_it(data: bytes, said: str) -> None:
     """The entries before it are there."""
@@ -74,3 +78,4 @@ def test_damage_is_told_and_raised_where_nobody_takes_it(data: bytes, said: str)
     assert said in damage[0]
     with pytest.raises(ValueError, match=said):
         list(entries_of(data))
+    assert values_of(sealed(LIST_AS_KEY)) == {}

@@ -163,13 +163,7 @@ def test_another_file_is_told_in_one_line(content: bytes, complaint: str, tmp_pa
 
 
 def test_what_was_not_there_is_told(whole: Path, tmp_path: Path) -> None:
-    """A time outside, an agent that was not there, a folder without a record: one line each, with what there is."""
-    record = RunRecord.open(whole)
-
-    with pytest.raises(RecordFileError, match=r"t = 7 s is outside of the record, which has 0 to 2.00 s"):
-        record.decision("inv1", 7.0)
-    with pytest.raises(RecordFileError, match="there was no agent inv77; agents are inv1-9"):
-        record.decision("inv77", 0.5)
+    """A folder without a record, a file that is not there; of an agent or a time, `why` says it (test_why.py)."""
     with pytest.raises(RecordFileError, match=r"there is no run\.mcap"):
         RunRecord.open(tmp_path)
     with pytest.raises(RecordFileError, match="cannot be read: No such file"):

@@ -152,6 +152,20 @@ def test_the_load_is_carried_once_the_total_stays_at_its_steady_value() -> None:
     assert measured(case, 1.0, 1.4).t_load_s == pytest.approx(0.2)
 
 
+def test_frequency_and_sharing_are_timed_apart_and_a_swing_is_seen_where_it_is() -> None:
+    """The frequency is back after 1.5 s, sharing after 2.5 s; then V of one swings by 0.02 pu, f by 0.004 Hz."""
+    t = np.arange(0.0, 10.005, 0.01)
+    f = np.where(t < 2.49 + 1e-9, 59.9, 60.0) + 0.002 * np.cos(2.0 * np.pi * t)
+    case = history(t, f, np.where(t[:, None] < 3.49 + 1e-9, [0.7, 0.5, 0.5], 0.5))
+    case.V[:, 1] *= 1.0 + 0.01 * np.sin(2.0 * np.pi * t)
+    window = Window(label="event", start=1.0, end=10.0)
+
+    found = metrics.settling(window.cut(case), PLATES, window, 60.0)
+
+    assert (found.t_f_s, found.t_share_s) == pytest.approx((1.5, 2.5), abs=0.011)
+    assert (found.f_swing_Hz, found.V_swing_pu) == pytest.approx((0.004, 0.02), rel=0.01)
+
+
 @pytest.mark.parametrize(
     ("f", "said"),
     [
