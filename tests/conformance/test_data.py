@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import gridpeers as gp
+from gridpeers.plant.tables.read import DATA
 from gridpeers.plant.tables.write import write_feeder
 from gridpeers.runs.result import Result
 from gridpeers.scenarios.catalogue_files import CATALOGUE
@@ -51,17 +53,13 @@ def test_islanding_at_50_hz_settles_at_50_hz(tmp_path: Path) -> None:
 
 def test_a_feeder_says_its_own_nominal_frequency(tmp_path: Path) -> None:
     """`feeder.toml` of the feeder's folder; the scenario need not repeat it, and may override it."""
-    import shutil
-
-    from gridpeers.plant.tables.read import DATA
-
     folder = tmp_path / "european"
     shutil.copytree(DATA / "microgrid123", folder)
     (folder / "feeder.toml").write_text("f_nom_Hz = 50.0\n", encoding="utf-8")
     text = ISLANDING.replace('feeder = "microgrid123"', 'feeder = "european"')
     scenario, feeder = load_scenario(written(tmp_path, text))
     _, (agent, *_) = configs(scenario, feeder, "IV")
-    override, _ = written(tmp_path, text.replace("V_set0_pu = 1.0", "V_set0_pu = 1.0\nf_nom_Hz = 60.0")), None
+    override = written(tmp_path, text.replace("V_set0_pu = 1.0", "V_set0_pu = 1.0\nf_nom_Hz = 60.0"))
 
     assert (feeder.f_nom, agent.f_nom) == (50.0, 50.0)
     assert feeder.line_configs == load_scenario("islanding")[1].line_configs  # given at its own frequency

@@ -163,7 +163,9 @@ def test_another_file_is_told_in_one_line(content: bytes, complaint: str, tmp_pa
 
 
 def test_what_was_not_there_is_told(whole: Path, tmp_path: Path) -> None:
-    """A folder without a record, a file that is not there; of an agent or a time, `why` says it (test_why.py)."""
+    """An agent, a folder without a record, a file; of a time outside `why` says it (test_why.py)."""
+    with pytest.raises(RecordFileError, match="there was no agent inv77; agents are inv1-9"):
+        RunRecord.open(whole).decision("inv77", 0.5)
     with pytest.raises(RecordFileError, match=r"there is no run\.mcap"):
         RunRecord.open(tmp_path)
     with pytest.raises(RecordFileError, match="cannot be read: No such file"):
