@@ -6,50 +6,27 @@ import math
 import random
 import re
 from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 from zlib import crc32
 
 import msgspec
-from msgspec import inspect
+from msgspec import inspect, to_builtins
 
 from gridpeers.wire.codec import CRC, RejectedError, decode
 from gridpeers.wire.messages import MESSAGES, Message, Nameplate
+from tests.golden.messages.message_values import WHOLE
 
-BODIES: dict[str, dict[str, Any]] = {
-    "Nameplate": dict(kind="GFM", microgrid="mg 1", P_rated=1e5, V_nom=277.0, f_nom=60.0, m_p=0.01, m_q=0.05),
-    "Measurement": dict(
-        to="inv1", P=5e4, Q=0.0, V=277.0, f=60.0, P_set=5e4, V_set=277.0, grid_connected=False, island="inv1",
-        roster=("inv1", "inv2"),
-    ),
-    "State": dict(
-        P_set=9e4, V_set=277.0, Q=0.0, island="inv1", angle=[0.5, 1.0], idle=False, shared={"omega": 0.1}, quiet=False,
-        skipped=0, fault="",
-    ),
-    "Prepare": dict(roster=("inv1", "inv2"), instances=("a", "b")),
-    "Waiting": dict(waits_for=("inv3",)),
-    "Ready": {},
-    "Stop": dict(reason="enough", refused=False),
-    "Leave": {},
-    "LinkReport": dict(data=b"book", instance="a", final=False),
-    "Journal": dict(data=b"entries"),
-    "LinkRequest": dict(link_command={"heal": {"on": "*"}}, reply_to="z1"),
-    "LinkAcknowledgement": dict(ok=True, text="done", reply_to="z1", data=b""),
-    "Command": dict(
-        verb="status", argument="", link_command={"x": 1.0}, load=dict(factor=None, P=1e3, Q=None), reply_to="z1",
-    ),
-    "Answer": dict(ok=True, text="done", data={"t": 1.0}),
-    "AgentStatus": dict(
-        phase="running", waits_for="", island="inv1", neighbours=("inv2",), ages=(0.02,), used=("inv2",), received=9,
-        sent=9, rejected=0, lost=0, ticks=9, missed=0, lateness=0.001, impaired=(),
-    ),
-    "Telemetry": dict(
-        inverters=("inv1",), rows=((0.0, 60.0, 5e4, 0.0, 277.0, 5e4, 277.0),),
-        events=(dict(t=0.0, kind="switch", subject="13-152", text="opened"),), final=False, outcome="",
-        reproducible=True, awaited=(), impaired=(), quiet=((0.0, 3),),
-        pacing=dict(steps=9, late=0, p50=0.0, p95=0.0, p99=0.0, worst=0.0, slipped=0.0),
-    ),
-}  # fmt: skip
-"""Of each type of message the fields that no other has, in one that is sound."""
+_ORDINARY: dict[str, dict[str, Any]] = {
+    "LinkReport": dict(final=False),
+    "Measurement": dict(to="inv1", roster=("inv1", "inv2")),
+    "State": dict(idle=False, quiet=False, fault=""),
+    "Stop": dict(refused=False),
+    "Telemetry": dict(rows=((0.0, 60.0, 5e4, 0.0, 277.0, 5e4, 277.0),), final=False, others=0),
+}
+BODIES = {
+    type(of).__name__: to_builtins(of, builtin_types=(bytes,)) | _ORDINARY.get(type(of).__name__, {}) for of in WHOLE
+}
+"""A sound message of each type in the middle of a run, with all its fields."""
 
 TEXTS = (
     "", "x", "inv1", "plant", "x" * 64, "x" * 65, "x" * 200, "x" * 201, "x" * 4000, "x" * 4001, "a b", "a,b", "a/b",
@@ -57,6 +34,9 @@ TEXTS = (
     "ä", "\ud7ff\U0001f600",
 )  # fmt: skip
 """Texts on both sides of any bound; which side, the annotation says."""
+
+
+M = TypeVar("M", bound=Message)
 
 
 class Case(NamedTuple):
@@ -78,8 +58,11 @@ def sealed(body: bytes) -> bytes:
 
 def sound(kind: type[Message], **header: Any) -> dict[str, Any]:
     """A message that can be decoded, as a dictionary."""
-    head = dict(type=kind.__name__, sender="inv2", epoch=1, seq=3, t=0.06)
-    return {**head, **BODIES[kind.__name__], **header}
+    return BODIES[kind.__name__] | dict(sender="inv2", epoch=1, seq=3, t=0.06) | header
+
+
+def sound_message(kind: type[M], **fields: Any) -> M:
+    return msgspec.convert(sound(kind, **fields), kind)
 
 
 def packed(body: dict[str, Any]) -> bytes:

@@ -7,7 +7,6 @@ from itertools import islice
 from math import inf, isinf
 from pathlib import Path
 
-import msgspec
 import pytest
 from msgspec.structs import replace
 
@@ -18,7 +17,7 @@ from bench.soak.soak_monitor import SoakMonitor
 from bench.soak.soak_run import SoakRun
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict, Violation
 from gridpeers.wire.messages import AgentStatus, Telemetry
-from tests.hostile.cases import sound
+from tests.hostile.cases import sound_message
 from tests.toy.toy_configs import agent_config
 
 AGENTS = tuple(f"inv{i}" for i in range(1, 10))
@@ -43,8 +42,7 @@ def looks(growth: float) -> list[ProcessSize]:
 
 def status(name: str, *used: str) -> AgentStatus:
     """A status with these neighbours in the agent's sums."""
-    told = sound(AgentStatus, sender=name, neighbours=used, ages=(0.0,) * len(used), used=used)
-    return msgspec.convert(told, AgentStatus)
+    return sound_message(AgentStatus, sender=name, neighbours=used, ages=(0.0,) * len(used), used=used)
 
 
 def test_a_seed_decides_all_actions_and_a_deal_has_every_kind() -> None:
@@ -141,8 +139,7 @@ def test_a_frequency_is_restored_once_it_holds() -> None:
         return 60.02 if 1.0 <= t < 2.0 or 2.2 <= t < 3.0 else 60.0
 
     rows = [(t, f(t), *(0.0,) * 5, 50.0, *(0.0,) * 5) for t in (round(0.1 * k, 9) for k in range(36))]
-    told = sound(Telemetry, t=3.5, inverters=("inv1", "inv2"), rows=rows)
-    monitor.telemetry(msgspec.convert(told, Telemetry), 9.0)
+    monitor.telemetry(sound_message(Telemetry, t=3.5, inverters=("inv1", "inv2"), rows=rows), 9.0)
 
     assert monitor.restorations == pytest.approx([2.0])
     assert monitor.seconds_in_band == pytest.approx(0.5)

@@ -80,7 +80,7 @@ def test_no_field_is_without_bounds() -> None:
         (Prepare, {"instances": ["a"]}),
         (Prepare, {"roster": ["inv1", "inv1"]}),
         (LinkReport, {"final": True, "instance": ""}),
-        (AgentStatus, {"ages": [0.1, 0.2]}),
+        (AgentStatus, {"ages": [0.1]}),
         (AgentStatus, {"neighbours": ["inv2", "inv2"], "ages": [0.1, 0.2]}),
         (Telemetry, {"inverters": ["inv1", "inv2"]}),
         (Telemetry, {"rows": [[0.0, *[1.0] * 6], [0.0, *[1.0] * 6]]}),

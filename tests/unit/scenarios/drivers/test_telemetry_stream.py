@@ -2,20 +2,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-import msgspec
 from msgspec.structs import replace
 
 from gridpeers.scenarios.drivers.telemetry_stream import QUIET, TelemetryEndpoint, TelemetryStream
 from gridpeers.wire.codec import encode
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import Answer, LinkReport, LinkRequest, Telemetry
-from tests.hostile.cases import sound
+from tests.hostile.cases import sound_message
 
 KEYS = Keys("demo")
 
 
 def telemetry(seq: int, epoch: int = 7, sender: str = "plant") -> Telemetry:
-    return msgspec.convert(sound(Telemetry, sender=sender, epoch=epoch, seq=seq, t=0.0), Telemetry)
+    return sound_message(Telemetry, sender=sender, epoch=epoch, seq=seq, t=0.0)
 
 
 @dataclass

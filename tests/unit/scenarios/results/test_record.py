@@ -15,25 +15,16 @@ from gridpeers.scenarios.record import record_writer
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.results.record import Recorder, RecordError
 from gridpeers.wire.messages import PlantEvent, Telemetry
+from tests.hostile.cases import sound_message
 from tests.record.recorded_runs import toy_info
 from tests.toy.toy_configs import toy_configs
 
 Rows = tuple[tuple[float, ...], ...]
 
 
-def telemetry(rows: Rows, events: tuple[PlantEvent, ...] = (), *, reproducible: bool = True) -> Telemetry:
-    return Telemetry(
-        sender="plant",
-        epoch=1,
-        seq=0,
-        t=rows[-1][0] if rows else 0.0,
-        inverters=("inv1",),
-        rows=rows,
-        events=events,
-        final=False,
-        outcome="",
-        reproducible=reproducible,
-    )
+def telemetry(rows: Rows, events: tuple[PlantEvent, ...] = ()) -> Telemetry:
+    message = sound_message(Telemetry, sender="plant", t=rows[-1][0], inverters=("inv1",), rows=rows)
+    return replace(message, events=events)
 
 
 def row(t: float, x: float = 0.1) -> tuple[float, ...]:
@@ -129,7 +120,7 @@ def test_a_recorder_keeps_no_rows_and_has_them_once_at_its_end(tmp_path: Path) -
         def record(numbers: range) -> None:
             for first in numbers[::100]:
                 rows = tuple((0.01 * k, *values) for k in range(first, first + 100))
-                recorder(replace(telemetry(()), t=rows[-1][0], inverters=inverters, rows=rows))
+                recorder(sound_message(Telemetry, t=rows[-1][0], inverters=inverters, rows=rows))
 
         record(range(1_000))
         tracemalloc.start()
