@@ -42,7 +42,7 @@ class StalenessWeights:
 
     def __init__(self, options: DegradedCommunication) -> None:
         self._stale, self._T_age = options.stale, options.T_age
-        self._max_age = options.max_age or inf
+        self._max_age = options.max_age + 1e-9 if options.max_age else inf  # 2.0 - 1.9 counts as 0.1
         self.ages_count = self._stale != "hold"
         self.all_count = not self.ages_count and self._max_age == inf
         self._fresh: set[str] = set()

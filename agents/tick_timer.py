@@ -236,7 +236,7 @@ class AgentTimer:
         if measurement is None or agent.fault:
             return None
         heard, neighbours, upkeep, at = self._heard, self.meeting.neighbours, self.upkeep, self.at
-        limit = self._config.control.degraded_communication.max_age or self._config.max_age
+        limit = (self._config.control.degraded_communication.max_age or self._config.max_age) + 1e-9
         ages = {name: age for name in neighbours if (age := heard.age(name, at)) <= limit}
         before = agent.set_points
         state = replace(agent.tick(measurement, tuple(ages), ages), seq=upkeep.sent)

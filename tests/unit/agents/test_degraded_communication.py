@@ -91,7 +91,7 @@ def test_a_neighbour_older_than_max_age_is_none() -> None:
     ):
         it = agent(**degraded_communication)
         it.hear(state("inv2", 94, P_set=80e3))
-        it.hear(state("inv3", 96, P_set=60e3))
+        it.hear(state("inv3", 95, P_set=60e3))  # 0.1 s old
 
         assert it.tick(measured(100), ROSTER[1:]).P_set / 1e5 == pytest.approx(moved(0.5, P_bar, rate), rel=1e-12)
 
