@@ -206,6 +206,8 @@ class Dynamics:
             self._trip(sorted(islands), step)
             self.connect(network.circuit, step)
             begin, renewed = 2 * step, -1
+        if not np.isfinite(units.state.sum()):  # also where no current shows it
+            units.require_finite()
         network.refresh(status, 2 * steps - begin)
         if self._single.size:
             out[:, self._single, 1:3] /= 3.0  # the kernel's powers are those of three equal phases

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from cmath import isfinite
 from collections.abc import Mapping
 from copy import copy
 from dis import get_instructions
@@ -14,7 +15,7 @@ import msgspec
 
 from gridpeers.plant.inverters.gfl import Gfl
 from gridpeers.plant.inverters.gfm_droop import GfmDroop
-from gridpeers.plant.inverters.inverter_model import InverterModel, Kind, UnitRating
+from gridpeers.plant.inverters.inverter_model import DroopLag, FollowerLag, InverterModel, Kind, UnitRating
 from gridpeers.plant.inverters.regfm_a1 import REGFM_A1, REGFM_A1_VFLAG0
 from gridpeers.plant.inverters.vsm import Vsm
 from gridpeers.wire.plugins.plugin import parameter_objection
@@ -28,17 +29,26 @@ OURS: dict[Kind, tuple[type[InverterModel], ...]] = {"GFM": (GfmDroop, type(REGF
 
 @cache
 def _trial(model: type[InverterModel]) -> str:
-    """Return why a pass fails as a function of Python, "" if it does not: the compiler would say less."""
+    """Return why a model fails as functions of Python, "" if it does not: the compiler would say less."""
     names = ("theta", "w", "f", *model.STATES)
     x = SimpleNamespace(**dict.fromkeys(names, 0.0))
     numbers = {"P_set": 0.5, "V_set": 1.0, "Q_set": 0.0, "P": 0.5, "Q": 0.1, "V": 1.0}
     t = SimpleNamespace(**numbers, **{f"{quantity}_{phase}": 200.0 + 0j for quantity in "VIJ" for phase in "ABC"})
+    it, rating, failing = model(), UnitRating(1e5, 277.0, 0.01, 0.05, 60.0), "admittance"
     try:
-        g = SimpleNamespace(**model().values(UnitRating(1e5, 277.0, 0.01, 0.05, 60.0), 0.1 - 1j))
+        if not isfinite(y_f := it.admittance(rating)):
+            return f"its admittance is {y_f}; it must be a finite number (S)"
+        failing = "response"
+        found, usable = it.response(), {"GFM": DroopLag, "GFL": FollowerLag}[it.kind]
+        if found is not None and not (isinstance(found, usable) and all(value >= 0.0 for value in found)):
+            return f"its response is {found!r:.80}; it must be None, or a {usable.__name__} without negative values"
+        failing = "constants"
+        g = SimpleNamespace(**it.values(rating, y_f))
+        failing = "advance"
         for second in (False, True):
             model.advance(g, t, copy(x), x, copy(x), 0.002, second)
     except ANYTHING as error:
-        return f"its pass fails{line_of(model.advance, error)}: {named(error)}"
+        return f"its method {failing} fails{line_of(getattr(model, failing), error)}: {named(error)}"
     unknown = ", ".join(sorted(set(vars(x)) - set(names)))
     return f"its pass sets {unknown}, which its STATES do not name" if unknown else ""
 

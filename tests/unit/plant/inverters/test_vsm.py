@@ -174,11 +174,14 @@ def test_what_is_wrong_with_a_model_is_said_at_its_key(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("right", "wrong", "words"),
     [
-        ("/ g.T_q", "/ g.T_x", "its pass fails (machine.py:23): AttributeError"),
+        ("/ g.T_q", "/ g.T_x", "its method advance fails (machine.py:23): AttributeError"),
         ("x.q = gp", "x.z = gp", "its pass sets z, which its STATES do not name"),
         ('("q",)', '("w", "q")', "its STATES must be a tuple of names, each one once and beside theta, w and f"),
         ('("q",)', '"q"', "its STATES must be a tuple of names"),
         ("x.q = gp", "if x.q > 9.0:\n            raise ValueError\n        x.q = gp", "its pass raises an error"),
+        ("holds_terminal = False", "admittance = lambda self, rating: 1j * float('nan')", "its admittance is (nan"),
+        ("holds_terminal = False", "response = lambda self: -0.1", "its response is -0.1; it must be None, or a"),
+        ("holds_terminal = False", "response = None", "its method response fails: TypeError"),
         ("def rest(", "def begin(", "it has no static method rest"),
         ("    @staticmethod\n    def rest(", "    def rest(", "it has no static method rest"),
     ],
@@ -201,11 +204,12 @@ def test_a_start_with_a_mistake_names_the_inverter_and_the_line(tmp_path: Path) 
         gp.load(path).check()
 
 
-def test_a_model_that_gives_no_number_breaks_the_run(tmp_path: Path) -> None:
-    """Its island is not to be blamed: the run says which inverter and model failed."""
+@pytest.mark.parametrize("state", ["q", "z"])
+def test_a_model_that_gives_no_number_breaks_the_run(tmp_path: Path, state: str) -> None:
+    """Its island is not to be blamed: the run says which inverter and model failed, though no current depends on z."""
     path = scenario(tmp_path / "own", "machine:Machine", "machine:Machine")
-    wrong = "if x.q > 0.2:\n            x.q = (x.q - 1e3) ** 0.5\n        x.f ="
-    (path.parent / "machine.py").write_text(OF_A_USER.replace("x.f =", wrong))
+    wrong = f"if x.q > 0.2:\n            x.{state} = (x.q - 1e3) ** 0.5\n        x.f ="
+    (path.parent / "machine.py").write_text(OF_A_USER.replace("x.f =", wrong).replace('("q",)', '("q", "z")'))
 
     with pytest.raises(RuntimeError, match="inv1: the inverter model Machine gives a current or a state that is no"):
         gp.load(path).run("A")
