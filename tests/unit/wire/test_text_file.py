@@ -47,10 +47,7 @@ def test_decimal_commas_of_one_column_are_no_separators() -> None:
 @pytest.mark.parametrize(
     ("rows", "said"),
     [
-        (
-            "a;1,500\nb;20",
-            r'^"1,500" \(row 2\) has a comma for decimals or thousands; write it with a point',
-        ),
+        ("a;1,500\nb;20", r'^"1,500" \(row 2\) has a comma for decimals or thousands; write it with a point'),
         ("a;1,5\nb;1.5", r'^has decimal commas, "1,5" \(row 2\), and points, "1.5" \(row 3\); write all numbers'),
         ("a;1,5\nb;1.500,5", r'^has decimal commas, "1,5" \(row 2\), and points, "1.500,5" \(row 3\)'),
         ('a;"1', "^not a CSV file"),
