@@ -111,7 +111,7 @@ class _Reader:
                     key: self.table(tables[key], rest.pop(key), _join(path, key)) for key in [*rest] if key in tables
                 }
         for key in rest:
-            self._add(_join(path, key), self._unknown(key, cls))
+            self._add(_join(path, key), self._unknown(key, cls, path))
         for field in plain:
             place, start = _join(path, field.key), self._top.get(field.name) if INHERITED in field.marks else None
             if field.key in data:
@@ -188,13 +188,13 @@ class _Reader:
             return tags[str(tag)]
         return None
 
-    def _unknown(self, key: str, cls: type) -> str:
+    def _unknown(self, key: str, cls: type, path: str) -> str:
         """Say what to write instead of an unknown key."""
         known = [*_names(cls)]
         if f"{key}s" not in known:
             places = [("at the top of the file, before any table", self._root)]
             for where, table in [*places, *((f"into {title}", table) for title, table in tables_in(self._root))]:
-                if table is not cls and key in keys_of(table):
+                if table is not cls and where != f"into [{path}]" and key in keys_of(table):
                     return f"unknown key here; it belongs {where}"
         return f"unknown {self._noun}; {suggestion(key, known, f'{self._noun}s')}"
 

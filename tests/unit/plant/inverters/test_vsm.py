@@ -166,7 +166,7 @@ def test_what_is_wrong_with_a_model_is_said_at_its_key(tmp_path: Path) -> None:
     with pytest.raises(gp.ScenarioError) as error:
         gp.load(scenario(tmp_path / "keys", "vsm", "gridlabd", "H_s = 200\nT_p_s = 0.1"))
     text = str(error.value)
-    assert "plant.gfm.T_p_s: unknown key" in text
+    assert 'plant.gfm.T_p_s: unknown key; did you mean "T_q_s"?' in text
     assert "plant.gfm.H_s: 200 s is not plausible for an inertia constant" in text
     assert "plant.inverter.inv4" in text
 
