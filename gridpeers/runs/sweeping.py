@@ -132,7 +132,7 @@ def _chosen(columns: list[str], metrics: list[str], plan: Plan) -> list[str]:
     head += [name for name in columns if name == "metric_warnings"]
     known = dict.fromkeys(name.partition(".")[2] or name for name in columns if name not in (*head, *FATE))
     several = {name.partition(".")[0] for name in known}
-    if unknown := [name for name in metrics if name not in known and name not in several]:
+    if known and (unknown := [name for name in metrics if name not in known and name not in several]):
         raise ScenarioError(f'metrics: no metric "{name}"; {suggestion(name, known, "metrics")}' for name in unknown)
     asked = {name for name in known if name in metrics or name.partition(".")[0] in metrics}
     return head + [name for name in columns if (name.partition(".")[2] or name) in asked and name not in head]

@@ -94,6 +94,8 @@ def test_a_sweep_whose_law_fails_has_no_numbers(mine: str) -> None:
     assert list(table["status"]) == ["ran", "ran", "law failed", "law failed"]
     named = table["why"].str.contains("early_laws.py:8", regex=False).fillna(value=False)
     assert list(named) == list(table["event1.f_error_Hz"].isna()) == [False, False, True, True]
+    with pytest.warns(RuntimeWarning, match="a law failed, run 0"):
+        assert gp.sweep(base, {"seed": [1]}, cases="IV", jobs=1, metrics="MPSI")["status"].tolist() == ["law failed"]
 
 
 def test_a_graph_that_fails_in_a_run_is_a_failure_like_a_law(mine: str) -> None:
