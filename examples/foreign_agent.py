@@ -134,7 +134,7 @@ class ForeignAgent:
                 self.measurement, self.due, self.status = None, 0.0, -1 if self.wall else 3
         elif key[0] == "nameplate" and who in self.alive:
             self.alive[who] = message
-        elif key != ["leave"] and any(message[same] != speaker[same] for same in ("sender", "epoch")):
+        elif key != ["leave"] and any(message[same] != (speaker or {}).get(same) for same in ("sender", "epoch")):
             raise ValueError("not of the process that holds this name")
         elif message["type"] == "State" and linked(self.config["control"], self.own, speaker):
             old = [heard for heard in self.states.get(key[1], []) if heard[0] == speaker][-1:]
