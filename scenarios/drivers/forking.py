@@ -92,7 +92,8 @@ class ForkServer:
     def close(self) -> None:
         self._control.close()
         self._server.kill()  # it may still import; it has nothing to put in order
-        self._server.wait()
+        with contextlib.suppress(KeyboardInterrupt):  # another Ctrl-C, while the command ends
+            self._server.wait()
 
 
 class ForkedProcess:

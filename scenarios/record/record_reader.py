@@ -167,8 +167,12 @@ class RunRecord:
             )
         if found is None:
             first = next(self.decisions(agent), None)
-            more = ", nor later" if first is None else f"; its first decision is of t = {first.t:.2f} s"
-            raise RecordFileError(f"{self.path}: {agent} had not decided anything by t = {t:g} s{more}")
+            if first is None:
+                raise RecordFileError(f"{self.path}: it has no decision of {agent}")
+            raise RecordFileError(
+                f"{self.path}: {agent} had not decided anything by t = {t:g} s; "
+                f"its first decision is of t = {first.t:.2f} s"
+            )
         return found
 
     def _require_time(self, t: float) -> None:

@@ -65,7 +65,7 @@ def make_site(folder: Path, *, days: float = LIFE_DAYS, now: datetime | None = N
         for name, role in FIRST:
             issue(folder, name, role, days=days, now=now)
     except OSError as error:
-        raise KeysError(f"{folder}: cannot be made: {error.strerror}") from None
+        raise KeysError(f"{folder}: cannot be made: {error.strerror}; remove what there is of it") from None
     return read_list(folder)
 
 
