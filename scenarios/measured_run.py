@@ -17,7 +17,6 @@ from gridpeers.scenarios.results.findings import Findings, find
 from gridpeers.scenarios.results.history import late_moves
 from gridpeers.scenarios.results.metric import UNITS
 from gridpeers.scenarios.results.metrics import SHARING_OF_ISLANDS, Steady
-from gridpeers.scenarios.results.plots.drawing import Drawing, drawing_of
 from gridpeers.scenarios.results.record import Recorded
 from gridpeers.scenarios.results.recorded_events import law_failures
 from gridpeers.scenarios.results.report import RunReport, plain
@@ -36,8 +35,8 @@ def write_measures(
     *,
     place: str,
     claims: bool = False,
-) -> tuple[RunReport, Drawing]:
-    """Measure and judge the cases, and write the files; return the report, and the data of the figures.
+) -> tuple[RunReport, dict[str, CheckedCase]]:
+    """Measure and judge the cases, and write the files; return the report, and the cases, as figures take them.
 
     `place` is the folder as the report names it. Where people changed the run, or rows are missing, no published
     numbers stand beside the own; of other runs `claims` says whether they are judged.
@@ -71,7 +70,7 @@ def write_measures(
         folder=place,
     )
     write_whole(run.folder / "report.txt", plain(report))
-    return report, drawing_of(scenario, cases)
+    return report, cases
 
 
 def _facts(case: CheckedCase, recorded: Recorded) -> dict[str, Any]:

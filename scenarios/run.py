@@ -107,11 +107,12 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
             if not record.reproducible
         ]
     where = place + "/" if request.lasting else ""
-    report, drawing = write_measures(request, recorded, pacing, notes, place=where, claims=True)
+    report, cases = write_measures(request, recorded, pacing, notes, place=where, claims=True)
     if request.lasting:
+        from gridpeers.scenarios.results.plots.drawing import drawing_of
         from gridpeers.scenarios.results.plots.run_figures import draw_all
 
-        draw_all(drawing, folder / "plots")
+        draw_all(drawing_of(scenario, cases), folder / "plots")
     set_complete(folder)
     return report
 

@@ -25,6 +25,7 @@ from gridpeers.scenario import plain
 from gridpeers.scenarios.measured_run import write_measures
 from gridpeers.scenarios.record.record_info import LIVE, RecordInfo
 from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.results.plots.drawing import drawing_of
 from gridpeers.scenarios.results.record import Recorded, Recorder, RecordError
 from gridpeers.scenarios.results.run_files import broken_if_ended, set_status, shown, write_whole
 from gridpeers.scenarios.run_request import Other, Progress, Request
@@ -218,9 +219,9 @@ def _write(
         clock=record.info.clock,
         speed=record.info.plant.speed,
     )
-    _, drawing = write_measures(metrics, {rule.case: recorded}, {}, (), place=f"{shown(folder)}/")
+    _, cases = write_measures(metrics, {rule.case: recorded}, {}, (), place=f"{shown(folder)}/")
     if figures:
         from gridpeers.scenarios.results.plots.run_figures import draw_all  # imports matplotlib
 
-        draw_all(drawing, folder / "plots")
+        draw_all(drawing_of(scenario, cases), folder / "plots")
     set_status(folder, "complete")

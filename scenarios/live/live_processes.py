@@ -327,11 +327,12 @@ def conclude(outcome: ProcessOutcome, metrics: Request) -> ProcessOutcome:
     pacing = {} if outcome.pacing is None else {case: outcome.pacing}
     try:
         from gridpeers.scenarios.measured_run import write_measures  # a signal may come meanwhile
+        from gridpeers.scenarios.results.plots.drawing import drawing_of
         from gridpeers.scenarios.results.plots.run_figures import draw_all
         from gridpeers.scenarios.results.report import show
 
-        report, drawing = write_measures(metrics, {case: recorded}, pacing, (), place=f"{shown(folder)}/")
-        draw_all(drawing, folder / "plots")
+        report, cases = write_measures(metrics, {case: recorded}, pacing, (), place=f"{shown(folder)}/")
+        draw_all(drawing_of(metrics.scenario, cases), folder / "plots")
         show(report, terminal())
         set_complete(folder)
     except (StoppedError, KeyboardInterrupt) as stop:

@@ -27,7 +27,7 @@ from gridpeers.scenarios.live.live_processes import UNHEARD, LiveRecorder, Proce
 from gridpeers.scenarios.live.run_address import RunAddress, UsageError
 from gridpeers.scenarios.live.run_requests import own_code
 from gridpeers.scenarios.measured_run import write_measures
-from gridpeers.scenarios.results.plots.drawing import Drawing
+from gridpeers.scenarios.results.plots.drawing import Drawing, drawing_of
 from gridpeers.scenarios.results.record import Recorded, Recorder, canonical
 from gridpeers.scenarios.results.report import plain
 from gridpeers.scenarios.run_request import Request
@@ -162,8 +162,8 @@ def measured(
     rows = [row for row in recorded.history.table.tolist() if row[0] <= until]
     events = [event for event in recorded.events if event.t <= until]
     whole = dataclasses.replace(recorded, table=canonical(rows), ended=rows[-1][0], events=events)
-    report, drawing = write_measures(ran, {"IV": whole}, {}, (), place="")
-    return json.loads((folder / "metrics.json").read_text())["cases"]["IV"], plain(report), drawing
+    report, cases = write_measures(ran, {"IV": whole}, {}, (), place="")
+    return json.loads((folder / "metrics.json").read_text())["cases"]["IV"], plain(report), drawing_of(scenario, cases)
 
 
 def test_a_live_run_that_was_left_alone_has_the_numbers_of_its_case(tmp_path: Path, recorded: Recorded) -> None:
