@@ -42,7 +42,7 @@ AGENT_PHASES: PhaseTable = {
 
 
 class AgentTickPolicy(TickPolicy, Protocol):
-    """What an agent's node asks beside; each kind of time does in its own way what follows."""
+    """Tick policy of an agent, with the further questions of its node; each kind of time has its own answers."""
 
     at: float
     """Time of the last measurement or tick (s of run time)."""
@@ -54,7 +54,7 @@ class AgentTickPolicy(TickPolicy, Protocol):
 
     @property
     def awaits_states(self) -> bool:
-        """Whether the next state may make the tick due."""
+        """True if the next state may make the tick due."""
 
     @property
     def meeting(self) -> RosterMeeting | OpenMeeting: ...

@@ -1,4 +1,4 @@
-"""What an agent sends the plant for the record: its journal, and the accounts of the emulated links into it. Pure."""
+"""An agent sends the plant its journal, and the accounts of the emulated links into it, for the record. Pure."""
 
 from __future__ import annotations
 

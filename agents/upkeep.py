@@ -62,7 +62,7 @@ class LinkCommandReceiver:
 
 
 class Upkeep:
-    """What the status of an agent in real time shows, and the health of its session."""
+    """Counts for the status of an agent in real time, the health of its session, and commands to its links."""
 
     def __init__(
         self, run: str, post: Post, phases: Phases, heard: Hearing, meeting: OpenMeeting, reports: AgentReports

@@ -182,7 +182,7 @@ class Feeder(Tables, frozen=True, kw_only=True):
 
 
 def is_foreign(name: str | Path) -> bool:
-    """Whether a file is written for another program, by the end of its name."""
+    """Return True for a file of another program; the end of its name decides."""
     return _ending(name) in READERS.names
 
 

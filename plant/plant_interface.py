@@ -59,7 +59,7 @@ class LivePlant(PlantLike, Protocol):
 
     @property
     def switches(self) -> Mapping[str, bool]:
-        """Whether each switch is closed, by its name."""
+        """Map the name of each switch to True if it is closed."""
 
     def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
         """Operate a switch ("open" or "close") at the next step; return whether it was in that state already.

@@ -60,7 +60,7 @@ CLOSING = 2.0  # longest wait (s) for the other nodes to close
 
 
 class PlantTickPolicy(TickPolicy, Protocol):
-    """What the node asks beside."""
+    """Tick policy of a plant, with the further questions of its node."""
 
     again_at: float  # when open questions are asked again (s on the driver's clock)
 

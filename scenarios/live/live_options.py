@@ -1,4 +1,4 @@
-"""What `plant` and `up` settle before a live run: options, configurations, its folder, what its record says of it."""
+"""Before a live run, `plant` and `up` check its options, and make its configurations, its folder and its record."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ MOST_KNOWN = 100_000  # States that are known as noted: by their sender, and by 
 
 @dataclass
 class RecordPart:
-    """What the journals in one part of the file have."""
+    """Entries and messages of the journals in one part of the file."""
 
     entries: list[tuple[Journal, Entry]] = field(default_factory=list)
     """All entries, each with the part of the journal that it came in."""

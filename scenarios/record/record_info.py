@@ -1,4 +1,4 @@
-"""What a record says about its run: version of the format, scenario, configurations, versions; and its topics."""
+"""The head of a record: version of the format, scenario, configurations and versions; and the topics of records."""
 
 from __future__ import annotations
 

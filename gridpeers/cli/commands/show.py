@@ -1,4 +1,4 @@
-"""Commands that show what there is: `list`, `check`, `doc`, `compare`, `export`; each imports what it needs on use."""
+"""The commands `list`, `check`, `doc`, `compare` and `export`; each imports its modules when it runs."""
 
 from __future__ import annotations
 
