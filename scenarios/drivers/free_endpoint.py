@@ -1,4 +1,8 @@
-"""Endpoints where a process of this host can listen: their form, and a check before anything is started or written."""
+"""Endpoints where a process of this host can listen: their form, and a check before anything is started or written.
+
+Zenoh itself listens, some time after this module has chosen a free port. Until then the choosing process claims the
+port: it binds the UDP port of the same number, which no other process can bind. TCP, where Zenoh listens, stays free.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +10,7 @@ import errno
 import random
 import re
 import socket
+from collections import deque
 from typing import NamedTuple
 
 from gridpeers.wire.driver.command_line import command_line
@@ -15,9 +20,14 @@ _FORM = re.compile(
     r"(?P<protocol>[a-z]+)/(?P<host>\[[0-9A-Fa-f:.%a-z]+\]|[^\s:/\[\]]+):(?P<port>[0-9]{1,5})(?P<rest>[?#]\S*)?"
 )
 
-_OWN = range(20_000, 32_000)
-"""Ports that no system gives to a process that asks for any (Linux begins at 32768). One of those would now and then go
-to the agents, which start with the plant: for listening, or as the near end of a call to the plant."""
+_PORTS = range(25_000, 32_768, 2)
+"""Ports to choose from. The kernel gives higher ones to processes that ask for any (Linux from 32768). HELICS numbers
+its federates from 23404, and its broker uses the next port too."""
+
+_CLAIMS: deque[int] = deque()
+"""File descriptors of the latest `_MOST_CLAIMS` claims: Zenoh listens on the ports of older ones, or has ended."""
+
+_MOST_CLAIMS = 32
 
 
 class ListenError(InputError):
@@ -50,13 +60,16 @@ def local_endpoint(port: int) -> str:
 
 
 def free_endpoint(text: str = "tcp/127.0.0.1:0", *, option: str = "listen") -> str:
-    """Return an endpoint where a process of this host will be able to listen, else ListenError; port 0 becomes free."""
+    """Return an endpoint where a process of this host will be able to listen, else ListenError.
+
+    Port 0 becomes a free one, which this process claims.
+    """
     endpoint = parse_endpoint(text)
     if endpoint is None:
         raise ListenError(f'{option}: "{text}" is no endpoint; use e.g. tcp/127.0.0.1:7447, or port 0 for a free one')
     if not endpoint.connects:
         return text
-    ports = [endpoint.port] if endpoint.port else random.SystemRandom().sample(_OWN, 100)
+    ports = [endpoint.port] if endpoint.port else random.SystemRandom().sample(_PORTS, min(100, len(_PORTS)))
     family = socket.AF_INET6 if endpoint.host.startswith("[") else socket.AF_INET
     for port in ports:
         try:
@@ -65,6 +78,8 @@ def free_endpoint(text: str = "tcp/127.0.0.1:0", *, option: str = "listen") -> s
                 trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
                 trial.bind((endpoint.host.strip("[]"), port))
                 trial.listen()
+                if not endpoint.port:
+                    _claim(port)
         except OSError as error:
             reason = error
             continue
@@ -73,6 +88,15 @@ def free_endpoint(text: str = "tcp/127.0.0.1:0", *, option: str = "listen") -> s
         f"{option}: {text} cannot be listened on: {(reason.strerror or str(reason)).lower()}; "
         f"{_way_out(endpoint.host, reason)}"
     )
+
+
+def _claim(port: int) -> None:
+    """Raise OSError if another choice has claimed the port."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as claim:
+        claim.bind(("127.0.0.1", port))
+        _CLAIMS.append(claim.detach())
+    if len(_CLAIMS) > _MOST_CLAIMS:
+        socket.close(_CLAIMS.popleft())
 
 
 def _way_out(host: str, error: OSError) -> str:

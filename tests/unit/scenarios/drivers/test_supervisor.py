@@ -10,6 +10,7 @@ import pytest
 from msgspec.structs import replace
 
 from gridpeers.netem.schema.netem import Netem, NodeFault
+from gridpeers.scenarios.drivers import free_endpoint as free_endpoint_file
 from gridpeers.scenarios.drivers import supervisor
 from gridpeers.scenarios.drivers.children import Child, Children
 from gridpeers.scenarios.drivers.free_endpoint import ListenError, free_endpoint
@@ -30,6 +31,15 @@ def test_a_port_in_use_is_told_before_anything_starts() -> None:
             match=f"--listen: {text} cannot be listened on: address already in use; end what.* kill -CONT",
         ):
             free_endpoint(text, option="--listen")
+
+
+def test_no_two_choices_of_a_free_port_are_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A choice claims its port before anything listens there."""
+    monkeypatch.setattr(free_endpoint_file, "_PORTS", range(24_000, 24_006, 2))
+
+    assert {free_endpoint() for _ in range(3)} == {f"tcp/127.0.0.1:{port}" for port in (24_000, 24_002, 24_004)}
+    with pytest.raises(ListenError, match="address already in use"):
+        free_endpoint()
 
 
 def test_an_address_of_another_machine_cannot_be_listened_on() -> None:
