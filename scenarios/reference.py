@@ -103,7 +103,7 @@ def _default(field: Field) -> str:
 
 
 _LAW = "A class derived from gridpeers.Law; `docs/laws.md` has the contract and examples."
-_INVERTER = "A class derived from gridpeers.InverterModel; `docs/inverter-models.md` has the contract and an example."
+_INVERTER = "A class derived from gridpeers.InverterModel; `docs/how-to/plug-ins.md` has the contract and an example."
 
 _REGISTRIES: dict[str, tuple[Registry[Any], str, str]] = {
     "laws": (LAWS, _LAW, 'law = "mine:Mine", or law = { use = "mine:Mine", gain = 2.0 }, for all cases or in one'),

@@ -160,7 +160,7 @@ class Response:
     .. math:: w_F e = \sum_F w_i y_i - u, \qquad T_p \dot u = l - \sum_{GFL} w_j \pi_j - u
 
     where u is what the GFM's filtered powers add up to. A GFL sees e through its PLL and its frequency filter, and its
-    power lags (inverter-models.md sections 3 and 4):
+    power lags (plant/inverters/gfl.py):
 
     .. math:: \dot\delta = e - f, \quad f = k_p \delta + \zeta, \quad \dot\zeta = k_i \delta, \quad
               T_{ff} \dot\phi = f - \phi, \quad T_{pf} \dot\pi_j = y_j - \phi - \pi_j

@@ -1,4 +1,4 @@
-"""Inverters on a network, stepped in time (`inverter-models.md` sections 2 to 7): the plant's numbers."""
+"""Inverters on a network, stepped in time."""
 
 from gridpeers.plant.dynamics.circuit import Circuit, PlantError
 from gridpeers.plant.dynamics.inverters import Inverter

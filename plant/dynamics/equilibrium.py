@@ -1,4 +1,4 @@
-"""The initial operating point of a run: an exact equilibrium of network and inverters (section 7).
+"""The initial operating point of a run: an exact equilibrium of network and inverters.
 
 In an island without a source the first GFM with three phases (its swing) first holds its terminal, and is then
 released; where all its GFM are single-phase, the first on each phase.
@@ -31,7 +31,7 @@ class OperatingPoint:
 def equilibrium(
     circuit: Circuit, units: Inverters, P: Real, Q: Real, V_set: Real | None, *, swing_voltage: Complex = PHASES
 ) -> OperatingPoint:
-    """Return the operating point of section 7; PlantError if there is none.
+    """Return the operating point; PlantError if there is none.
 
     `P`: real power of each inverter (pu), ignored for a swing; `Q`: reactive power (pu), or the first guess where
     `V_set` (pu) is given, from which Q follows by droop (4), (8) and dead band; `swing_voltage`: phasors that a swing

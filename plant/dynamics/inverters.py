@@ -49,7 +49,7 @@ class Inverters:
     It has the tables of `kernel.controller_pass.Units`, of which `constants` and `state_of` show a row as a record;
     `single`: single-phase inverters: to the models they have three equal phases (`Circuit.copies`), of base `S_3`;
     `phase`: phase of the first terminal: 0, 1, 2 for A, B, C; `positive_sequence`, `direct`: inverters that measure the
-    positive sequence, and those whose internal voltage the droop gives (3.8); `volt_var`: rows of `VoltVar`; `y_f`:
+    positive sequence, and those whose internal voltage the droop gives; `volt_var`: rows of `VoltVar`; `y_f`:
     filter admittances in the network (S per phase); 0 for a current source, as which the method "second-order" solves
     those of `feed_forward`; `I_limit`: limits of their phase currents (A); `set_points`: P_set, V_set, Q_set (pu), n x
     3, may be written between steps; `J`, `V`, `I`: Norton injections (A), terminal voltages (V), currents out of the
@@ -116,7 +116,7 @@ class Inverters:
         return np.where(self.forming, self.state[:, THETA], 0.0)
 
     def measured(self, V: Complex, I: Complex) -> tuple[Complex, Real]:  # noqa: E741  # the paper's symbol
-        """Return the powers and voltages (pu) that controllers measure (sections 3.2, 3.8), from V (V) and I (A)."""
+        """Return the powers and voltages (pu) that controllers measure, from V (V) and I (A)."""
         V_1, I_1 = aligned_sum(V) / 3.0, aligned_sum(I) / 3.0
         S = np.where(self.positive_sequence, 3.0 * V_1 * np.conj(I_1), np.sum(V * np.conj(I), axis=1)) / self.S_3
         v = np.where(self.positive_sequence, np.abs(V_1), np.mean(np.abs(V), axis=1)) / self.V_b
@@ -154,7 +154,7 @@ class Inverters:
     def hold(self, i: int, P_set: float, V_set: float) -> tuple[float, float]:
         """Take set-points (pu) from the next step on, within the inverter's bounds; return the held ones.
 
-        A GFL's P_set is clipped before the droop (7) is added, as in GridLAB-D (4.4): so a set-point beyond the rating
+        A GFL's P_set is clipped before the droop (7) is added, as in GridLAB-D: so a set-point beyond the rating
         does not cancel the droop of a later over-frequency.
         """
         limit = self.P_set_lim.item(i)

@@ -1,8 +1,8 @@
 """The network between inverters of constant power, and the reactive powers that their characteristics give at rest.
 
-A volt-var characteristic may jump at the edge of its dead band, from 0 to db / m_q (section 4.4). An inverter that
-rests on neither side holds its voltage on the edge by a Q in between. With that Q the characteristic has no gap and
-never rises with the voltage; so where vars raise voltages, there is one operating point, and only one.
+A volt-var characteristic may jump at the edge of its dead band, from 0 to db / m_q. An inverter that rests on neither
+side holds its voltage on the edge by a Q in between. With that Q the characteristic has no gap and never rises with the
+voltage; so where vars raise voltages, there is one operating point, and only one.
 """
 
 from __future__ import annotations

@@ -1,8 +1,28 @@
-"""Grid-following inverter: PLL, freq-watt, volt-var, current control (`inverter-models.md` section 4).
+"""Grid-following inverter: PLL, freq-watt, volt-var and current control, as GridLAB-D's `inverter_dyn`.
 
-In the mode "positive_sequence" there are one PLL, one current reference, and three phase currents driven to it; in the
-mode "balanced_power" each phase has its own, so that the powers are equal. Per unit of the own rating; dq in the frame
-of the phase's PLL.
+All is per unit of the own rating; x_dq = x exp(-j theta) in the frame of the PLL; speeds in rad/s relative to nominal.
+In the mode "positive_sequence" (GridLAB-D's POSITIVE_SEQUENCE) one PLL follows V_1, and three phase currents follow one
+reference. In the mode "balanced_power" each phase has its own PLL and reference, so that powers are equal.
+
+    PLL            dw_i/dt = k_iPLL u_q,  w = w_i + k_pPLL u_q,  d theta/dt = w,  f = f_nom + w / (2 pi)
+    freq-watt      T_ff df_m/dt = f - f_m                           f: mean of the PLLs
+                   P_d = sat(P_set + (f_nom - f_m) / (f_nom R_p), P_min, P_max),  T_pf dP_f/dt = P_d - P_f
+    volt-var       T_vf dV_m/dt = V - V_m                           V: mean of the three magnitudes
+                   Q_d = Q_set + (V_set - V_m) / R_q within Q_min, Q_max and +-sqrt(S_max^2 - P_d^2)
+                   T_qf dQ_f/dt = Q_d - Q_f
+    references     i_d* = sat(P_f / u_d, -i_max, i_max),  i_q* = sat(-Q_f / u_d, -i_max, i_max)
+    voltage source dc/dt = k_ic (i* - i),  e = c + k_pc (i* - i) + u + j X_f F_current i,  J = e V_b exp(j theta) y_f
+    current source T_if dc/dt = i* - c,  J = c I_b exp(j theta)     no filter, no current controller
+
+R_p and R_q are the droops m_p and m_q of the inverter, in pu. P_set is clipped at P_set_lim before the droop is added.
+Within a dead band the reference is the set-point. Beyond it the full deviation acts, as in GridLAB-D, so the reference
+jumps at the edge by db / (f_nom R_p) or db / R_q. With dead_band "ieee1547" the deviation from the edge acts, as in
+IEEE 1547-2018; V2 = V_set - db_UV, V1 = V2 - R_q Q_max, V3 = V_set + db_OV, V4 = V3 - R_q Q_min are its points.
+Without `frequency_watt` or `volt_var` the reference is P_d or Q_d itself, without its lag and droop.
+
+The feed-forward of u and the gains k_pc and F_current act one pass late in the first-order method. On a stiff bus that
+converges if abs(j X_f F_current - k_pc) < abs(R_f + j X_f); with network impedance z_g the factor of a pass is
+abs(z_g + j X_f F_current - k_pc) / abs(z_g + R_f + j X_f).
 """
 
 from __future__ import annotations
@@ -39,10 +59,7 @@ FrequencyBand = Annotated[float, Unit("Hz"), Plausible("a dead band", 0.0, 5.0)]
 
 @compiled
 def power_reference(g: Any, P_set: float, f_m: float) -> float:
-    """Freq-watt characteristic (7), section 4.3 (pu).
-
-    Outside the dead band the full deviation acts, or `from_edge` that from the edge.
-    """
+    """Return the reference of the freq-watt characteristic (7), per unit."""
     P_d = P_set
     if g.frequency_watt and not (g.f_nom - g.db_UF < f_m < g.f_nom + g.db_OF):
         edge = 0.0
@@ -54,7 +71,7 @@ def power_reference(g: Any, P_set: float, f_m: float) -> float:
 
 @compiled
 def var_reference(g: Any, V_set: float, Q_set: float, V_m: float, P_d: float) -> float:
-    """Volt-var characteristic (8) with dead band, within its limits and what P leaves of S_max, section 4.4 (pu)."""
+    """Return the reference of the volt-var characteristic (8), within its limits and what P leaves of S_max (pu)."""
     Q_d = Q_set
     if g.volt_var and not (V_set - g.db_UV < V_m < V_set + g.db_OV):
         edge = 0.0
@@ -87,7 +104,7 @@ def lock(
 def current_pass(
     g: Any, c0: complex, c: complex, d1: complex, i_ref: complex, i: complex, u: complex, h: float, second: bool
 ) -> tuple[complex, complex, complex]:
-    """One phase's current controller: new integrator, output (e, or i of a current source), slope (4.6, 4.7; pu)."""
+    """Advance a phase's current controller; return its integrator, its output (e, or a current) and its slope (pu)."""
     slope = (i_ref - c) * (1.0 / g.T_if) if g.current_source else g.k_ic * (i_ref - i)
     c_new = c0 + 0.5 * h * (d1 + slope) if second else c0 + h * slope
     if g.current_source:
@@ -96,20 +113,20 @@ def current_pass(
 
 
 class Gfl(InverterModel, frozen=True, kw_only=True):
-    """Grid-following inverter, `inverter-models.md` section 4. Per unit of own rating."""
+    """Grid-following inverter, per unit of its own rating; its equations are in `plant/inverters/gfl.py`."""
 
     model: str = "voltage_source"
-    """Which model: "voltage_source" or "current_source", by its representation towards the network (sections 4.6, 4.7);
-    or one of your own, `module:Class`."""
+    """Which model: "voltage_source" or "current_source", by its representation towards the network; or one of your own,
+    `module:Class`."""
     mode: Literal["positive_sequence", "balanced_power"] = "positive_sequence"
-    """Control of its phases: one PLL for all and equal currents, or a PLL for each and equal powers (section 4)."""
+    """Control of its phases: one PLL for all and equal currents, or a PLL for each and equal powers."""
     R_f: Annotated[Resistance, "Filter resistance (pu)."] = 0.01
     k_pPLL: Annotated[Gain, Unit("rad/s per pu"), "PLL proportional gain (rad/s per pu)."] = 50.0
     k_iPLL: Annotated[Gain, Unit("rad/s^2 per pu"), "PLL integral gain (rad/s^2 per pu)."] = 900.0
     k_pc: Annotated[Gain, Unit("pu", in_key=False), "Current controller, proportional (pu)."] = 0.05
     k_ic: Annotated[Gain, Unit("1/s"), "Current controller, integral (1/s)."] = 5.0
     F_current: Annotated[float, Plausible("the cross-coupling gain F_current", 0.0, 1.0)] = 0.6
-    """Cross-coupling gain: 0 oscillates on this feeder, 1 diverges (row 23)."""
+    """Cross-coupling gain: 0 oscillates on this feeder; 1 diverges in the first-order method."""
     T_if: Annotated[TimeConstant, "Current lag of the current-source form (s)."] = 0.005
     frequency_watt: Annotated[bool, "Frequency-watt droop on."] = True
     volt_var: Annotated[bool, "Volt-var droop on."] = True
@@ -126,7 +143,7 @@ class Gfl(InverterModel, frozen=True, kw_only=True):
     db_OV: Annotated[VoltageBand, "Dead band above V_set (pu)."] = 0.0
     dead_band: Literal["gridlabd", "ieee1547"] = "gridlabd"
     """Droop outside of a dead band, of freq-watt and volt-var: by the full deviation, so that it jumps at the edge, as
-    GridLAB-D, or by the deviation from the edge, as IEEE 1547-2018 (sections 4.3, 4.4)."""
+    GridLAB-D, or by the deviation from the edge, as IEEE 1547-2018."""
     P_max: Annotated[LimitOfP, "Upper bound of the P reference (pu)."] = 1.0
     P_min: Annotated[LimitOfP, Below("P_max"), "Lower bound of the P reference (pu)."] = -1.0
     S_max: Annotated[Capacity, "Apparent-power limit (pu of the rating): bounds Q at sqrt(S_max^2 - P^2)."] = 1.2
@@ -149,7 +166,7 @@ class Gfl(InverterModel, frozen=True, kw_only=True):
 
     @staticmethod
     def advance(g: Any, t: Any, x0: Any, x: Any, d: Any, h: float, second: bool) -> None:
-        """Take the blocks in the order of section 5."""
+        """Take the blocks in GridLAB-D's order: each lag uses the value that this pass has just found."""
         V_A, V_B, V_C, J_A, J_B, J_C = t.V_A, t.V_B, t.V_C, t.J_A, t.J_B, t.J_C
         # 1: measure in the frame the pass starts with
         to_dq = unit_phasor(-x.theta)
@@ -264,7 +281,7 @@ class Gfl(InverterModel, frozen=True, kw_only=True):
         return 0.0j if self.model == "current_source" else self._filter(rating)
 
     def feedback(self) -> complex | None:
-        """Return the slope of section 4.6."""
+        """Return the slope of a voltage source's current controller."""
         if self.model == "current_source":
             return None
         return (1j * self.X_f * self.F_current - self.k_pc) / complex(self.R_f, self.X_f)
@@ -278,7 +295,7 @@ class Gfl(InverterModel, frozen=True, kw_only=True):
         return self.mode == "balanced_power"
 
     def objection(self, method: Method) -> str:
-        """Refuse a current controller whose one-pass feedback cannot be stable (checklist row 23)."""
+        """Refuse a current controller that diverges on a stiff bus in the first-order method."""
         slope = self.feedback()
         if method == "second-order" or slope is None or abs(slope) < 1.0:
             return ""

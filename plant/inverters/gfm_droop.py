@@ -1,7 +1,23 @@
-"""Grid-forming inverter with droop, limiters and voltage controller, as in GridLAB-D (`inverter-models.md` section 3).
+"""Grid-forming inverter with droop, limiters and voltage controller, as GridLAB-D's `inverter_dyn` (GRID_FORMING).
 
-One controller for three phases, of internal voltage E and angle theta. Per unit of the own rating, speeds in rad/s
-relative to nominal.
+One controller serves three phases: a balanced internal voltage E at the angle theta, behind the filter. All is per unit
+of the own rating; speeds are in rad/s relative to nominal, w_nom = 2 pi f_nom; sat(x, a, b) bounds x.
+
+    filters        T_p dp/dt = P - p,  T_q dq/dt = Q - q,  T_v dv/dt = V - v    V: mean of the three magnitudes
+    P limiters     dx+/dt = k_ip (P_max - p) in [-w_lim, 0],  O+ = sat(x+ + k_pp (P_max - p), -w_lim, 0)
+                   dx-/dt = k_ip (P_min - p) in [0, w_lim],   O- = sat(x- + k_pp (P_min - p), 0, w_lim)
+    P-f droop      w = m_p (P_set - p) + O+ + O-,  d theta/dt = w,  f = (w_nom + w) / (2 pi)
+    Q limiters     dy+/dt = k_iq (Q_max - q) in [-V_lim, 0],  U+ = sat(y+ + k_pq (Q_max - q), -V_lim, 0)
+                   dy-/dt = k_iq (Q_min - q) in [0, V_lim],   U- = sat(y- + k_pq (Q_min - q), 0, V_lim)
+    Q-V droop      V_ref = V_set - m_q q + U+ + U-
+    voltage        de/dt = k_iv (V_ref - v) in [E_min, E_max],  E = sat(e + k_pv (V_ref - v), E_min, E_max);
+                   without `voltage_control` E = sat(V_ref, E_min, E_max)
+    injection      J = E V_b exp(j theta) y_f in phase A, -120 and 120 degrees from it in B and C
+
+m_p is in rad/s per pu: 1 % of 60 Hz is 3.77. O+ only lowers the frequency, and O- only raises it: a limiter caps no
+power, it slows the unit until other sources take the excess. The controller holds the terminal's mean magnitude, not E.
+A phase whose current exceeds I_max keeps its angle and loses the surplus (`plant/dynamics/kernel/step.py`), and the
+controller's states go on. At rest every derivative is zero: E and theta are those of the power flow, and p = P_set.
 """
 
 from __future__ import annotations
@@ -33,10 +49,10 @@ def advance_droop(
 ) -> None:
     """Take one pass with the measured power and voltage P, Q, v (pu).
 
-    Integrator slopes are taken from the filters' values at the end of the pass, in both passes (section 5), as in
-    GridLAB-D: the first 20 ms depend on it.
+    Integrator slopes come from the filters' values at the end of the pass, in both passes, as in GridLAB-D. The first
+    20 ms depend on it.
     """
-    # measurement filters, 3.2
+    # measurement filters
     dp = (P - x.p) / g.T_p
     dq = (Q - x.q) / g.T_q
     dv = (v - x.v) / g.T_v
@@ -44,13 +60,13 @@ def advance_droop(
     x.q = heun(x0.q, d.q, dq, h, second)
     x.v = heun(x0.v, d.v, dv, h, second)
 
-    # overload and under-load limiters, 3.3: they only ever slow down or speed up
+    # overload and under-load limiters
     over, under = g.P_max - x.p, g.P_min - x.p
     x.x_over = sat(heun(x0.x_over, d.x_over, g.k_ip * over, h, second), -g.w_lim, 0.0)
     x.x_under = sat(heun(x0.x_under, d.x_under, g.k_ip * under, h, second), 0.0, g.w_lim)
     limit = sat(x.x_over + g.k_pp * over, -g.w_lim, 0.0) + sat(x.x_under + g.k_pp * under, 0.0, g.w_lim)
 
-    # reactive limiters and voltage controller, 3.4
+    # reactive limiters, Q-V droop and voltage controller
     q_over, q_under = g.Q_max - x.q, g.Q_min - x.q
     x.y_over = sat(heun(x0.y_over, d.y_over, g.k_iq * q_over, h, second), -g.V_lim, 0.0)
     x.y_under = sat(heun(x0.y_under, d.y_under, g.k_iq * q_under, h, second), 0.0, g.V_lim)
@@ -61,7 +77,7 @@ def advance_droop(
     x.e = sat(heun(x0.e, d.e, de, h, second), g.E_min, g.E_max)
     x.E = sat(x.e + g.k_pv * error if g.voltage_control else V_ref, g.E_min, g.E_max)
 
-    # droop, 3.3 and equation (3)
+    # P-f droop, equation (3)
     x.w = g.m_p * (t.P_set - x.p) + limit
     x.theta = heun(x0.theta, d.theta, x.w, h, second)
     x.f = g.f_nom + x.w / (2.0 * pi)
@@ -75,14 +91,14 @@ def advance_droop(
 
 
 class GfmDroop(InverterModel, frozen=True, kw_only=True):
-    """Grid-forming inverter, `inverter-models.md` section 3. Per unit of own rating."""
+    """Grid-forming inverter, per unit of its own rating; its equations are in `plant/inverters/gfm_droop.py`."""
 
     model: str = "gridlabd"
     """Which model: "gridlabd", GridLAB-D's droop with limiters; "regfm_a1", the same, with power and voltage of the
-    positive sequence (section 3.8); "vsm", a virtual synchronous machine; or one of your own, `module:Class`."""
+    positive sequence; "vsm", a virtual synchronous machine; or one of your own, `module:Class`."""
     voltage_control: bool = True
     """true: the Q-V droop gives the terminal voltage, and a controller holds it; false: the droop gives the internal
-    voltage (VFlag of REGFM_A1, section 3.8)."""
+    voltage (VFlag = 0 of REGFM_A1)."""
     T_p: Annotated[TimeConstant, "Filter of measured P (s)."] = 0.01
     T_q: Annotated[TimeConstant, "Filter of measured Q (s)."] = 0.01
     T_v: Annotated[TimeConstant, "Filter of measured V (s)."] = 0.01

@@ -62,7 +62,7 @@ def _objection(it: Any) -> str:
         for name, found in own.items()
         if not isinstance(found, staticmethod) or found is getattr_static(InverterModel, name)
     ]:
-        return f"it has no static method {missing[0]}; docs/inverter-models.md has the contract"
+        return f"it has no static method {missing[0]}; docs/how-to/plug-ins.md has the contract"
     if it.kind not in OURS:
         return f'its kind must be "GFM" or "GFL", got {it.kind!r}'
     if not isinstance(it.STATES, tuple) or len({*it.STATES, "theta", "w", "f"}) < len(it.STATES) + 3:

@@ -1,7 +1,7 @@
 """The plant's equations written a second time and integrated by scipy, with the network solved at every evaluation.
 
-This is the limit of small steps. The inverters' equations are those of `inverter-models.md` sections 3 and 4, without
-the kernel: arrays over all GFM or all GFL, whose states are rows; what depends at once on the network (terminal
+This is the limit of small steps. The inverters' equations are those of `plant/inverters/gfm_droop.py` and `gfl.py`,
+without the kernel: arrays over all GFM or all GFL, whose states are rows; what depends at once on the network (terminal
 voltages) is an argument. The network is solved by Newton's method at the nodes that carry a load or an inverter: it
 uses the admittances of `gridpeers.plant.network` (beside OpenDSS in the part "power-flow"), and none of
 `gridpeers.plant.dynamics`' reductions.

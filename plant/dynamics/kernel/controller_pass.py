@@ -58,7 +58,7 @@ def read_terminal(
     I: Complex,  # noqa: E741  # the paper's symbol
     readings: Real,
 ) -> None:
-    """Write an inverter's phase currents (A), and P (W), Q (var) and V (V) into its reading (section 2).
+    """Write an inverter's phase currents (A), and P (W), Q (var) and V (V) into its reading.
 
     The compiled functions take whole tables and a row: each view of a row would count references to its table.
     """

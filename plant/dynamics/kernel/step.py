@@ -1,9 +1,14 @@
-"""The plant's inner loop, compiled: two network solutions and two controller passes a step (section 5).
+"""The plant's inner loop of first order, compiled, as in GridLAB-D: two network solutions and two passes a step.
 
-**Current limit** (`inverter-models.md` 3.7). A phase beyond the limit keeps its angle and loses the surplus: its
-injection becomes the one that gives the limit at the voltage found. That moves the voltages, so limiting and solving
-alternate until both rest. As in GridLAB-D this begins at the voltages of the last solution, and injections only ever
-shrink; beginning at the unlimited solution differs a hundred times more. The controller knows nothing of this.
+1. The events and set-points of t act.  2. Network solution N1 with the last injections.  3. Predictor of each inverter
+from N1.  4. Network solution N2 with its injections.  5. Corrector from N2: states and injections of t + h. P, Q and V
+of a reading are those of N2, f is that of the corrector. A lag T dx/dt = u - x has the slopes d1 = (u(N1) - x) / T and
+d2 = (u(N2) - x1) / T at x1 = x + h d1, and ends at x + h (d1 + d2) / 2.
+
+**Current limit.** A phase beyond the limit keeps its angle and loses the surplus: its injection becomes the one that
+gives the limit at the voltage found. That moves the voltages, so limiting and solving alternate until both rest. As in
+GridLAB-D this begins at the voltages of the last solution, and injections only ever shrink; beginning at the unlimited
+solution differs a hundred times more. The controller knows nothing of this.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ A = np.exp(2j * np.pi / 3.0)
 BALANCED = np.array([1.0, A**2, A])
 
 GFM_D = GfmDroop(R_f=0.01, X_f=0.15, P_max=1.5, k_ip=30.0)
-"""Defaults of inverter-models section 8."""
+"""GridLAB-D's defaults."""
 GFM_A = GfmDroop(R_f=0.014, X_f=0.1636, P_max=1.5, k_ip=30.0)
 """The same with the autotest's filter."""
 GFL_D = Gfl(
@@ -37,7 +37,7 @@ GFL_D = Gfl(
     S_max=1.0,
     i_max=1.0,
 )
-"""Defaults of inverter-models section 8."""
+"""GridLAB-D's defaults."""
 
 NONE = np.zeros(0, np.complex128)
 

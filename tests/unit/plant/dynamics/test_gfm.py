@@ -131,7 +131,7 @@ def test_the_default_filter_is_critically_damped() -> None:
         (replace(GFM_A, P_max=1.0), GFM_A, 1.8, (0.9, 0.5), (1.0, 0.8), -0.754),
         (REGFM_A1, replace(REGFM_A1, P_max=2.0), 1.2, (1.1, 0.1), (0.9, 0.3), -1.508),
     ],
-    ids=["row 9: by their set-points", "row 10: the overload limiter hands over", "the same of REGFM_A1"],
+    ids=["by their set-points", "the overload limiter hands over", "the same of REGFM_A1"],
 )
 def test_two_gfm_share_a_load(
     first: GfmDroop,

@@ -57,7 +57,7 @@ def load(model: Any, connection: Any, *powers: complex) -> Load:
 @pytest.mark.parametrize(("model", "exponent"), [("Z", 2), ("I", 1), ("P", 0)])
 @pytest.mark.parametrize("connection", ["Y", "D"])
 def test_power_follows_the_voltage_by_the_exponent_of_the_model(model: str, connection: str, exponent: int) -> None:
-    """At 0.9 pu an impedance takes 0.81, a constant current 0.90 of the table's P + jQ, at any angle (row 24)."""
+    """At 0.9 pu an impedance takes 0.81, a constant current 0.90 of the table's P + jQ, at any angle."""
     network = one_bus(load(model, connection, S, 2 * S, 0j))
 
     for voltage in (1.0, 0.9, 0.9 * np.exp(1j * np.pi / 6.0)):
@@ -75,7 +75,7 @@ def test_balanced_delta_equals_wye(model: str) -> None:
 
 
 def test_delta_branch_currents_are_differences() -> None:
-    """Line currents of a delta load are I_AB - I_CA, I_BC - I_AB, I_CA - I_BC (inverter-models 6.2)."""
+    """Line currents of a delta load are I_AB - I_CA, I_BC - I_AB, I_CA - I_BC."""
     network = one_bus(load("P", "D", S, 2 * S, 3 * S))
     V = network.nominal * np.array([0.9, 1.05, 1.0])
     I_ab, I_bc, I_ca = np.conj(np.array([S, 2 * S, 3 * S]) / (V - np.roll(V, -1)))
