@@ -71,7 +71,7 @@ def why(
     """Explain why an agent decided as it did.
 
     That is what it measured, whom it heard and whom not and why, each term of its law, and the limits, from the record
-    of the run. docs/why.md has examples.
+    of the run. docs/how-to/explain-a-run.md has examples.
 
     Example:  gridpeers why runs/islanding/latest/IV inv4 4.3
     """
@@ -140,7 +140,7 @@ def replay(
     """Replay a recorded run, or show what would have been.
 
     The cores get again what they got, when they got it, and must decide the same within 1e-9. With a change, the loop
-    is closed on our plant from then on. docs/replay.md explains both.
+    is closed on our plant from then on. docs/how-to/explain-a-run.md explains both.
 
     Example:  gridpeers replay runs/islanding/latest/IV --without "inv4 <-> inv7" --from 2
     """
