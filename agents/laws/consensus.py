@@ -15,13 +15,22 @@ have no s. Here P is always pu of own rating and w pu of nominal, so m_p is 0.01
 is a pu frequency and k_p is in seconds. Hz or rad/s enter nowhere.
 
 **Discretisation.** All terms come from the same old values and are added; d is the sum of c_ij, and a bar the
-neighbours' mean with weights c_ij. To first order in T this is (12)-(15). docs/laws.md derives it, with its equilibria
-and its stability.
+neighbours' mean with weights c_ij. To first order in T this is (12)-(15).
 
 .. math::
     y &\leftarrow y + \tfrac12 (1 - e^{-2 \kappa d T}) (\bar y - y) - g (1 - e^{-\kappa T}) e \\
     V_{set} &\leftarrow V_{set} - F \big[ \beta d (z - \bar z) + g \alpha (v - 1) \big], \quad
         F = (1 - e^{-\lambda T/k_q}) / \lambda, \quad \lambda = \max(g \alpha, 2 \beta d)
+
+Explicit Euler needs kappa T lambda_max < 2; nine fully meshed agents at T = 20 ms have 2.6. The consensus term is the
+exact solution where the neighbours move towards agent i as it moves towards them. So agent i goes at most half of the
+way, and no eigenvalue of the consensus is below 0, whatever T and d. The leader term is the exact solution against the
+own quasi-steady response de/dy = 1; under one exponential with the consensus term, eight neighbours at 20 ms would
+restore 2.5 times more slowly. V_set rests where its bracket is 0, at every T, because both parts have the factor F. On
+the droop v + z = V_set, so max(alpha, 2 beta d) bounds alpha dv/dV_set + 2 beta d dz/dV_set, and F does not overshoot.
+At rest L y = -g b e, with the Laplacian L and a factor b > 0; the left null vector of L is positive and all e of an
+island are equal, so e = 0 and all y agree. Stability is a result of searches (`tests/unit/agents/test_law.py`): every
+connected graph tried was stable for every T, except where the paper's continuous law is unstable too.
 
 **Limits.** The agent limits P_set and V_set (anti-windup). The paper has no limits and accepts wind-up (its Remark 2).
 `gridpeers.agents.degraded_communication` has these and other options, and other weights c_ij than 1.

@@ -1,4 +1,4 @@
-"""The complete programs of docs/law-programs.md: the paper's law in C and in Python, without anything of ours."""
+"""The complete programs of docs/how-to/law-programs.md: the paper's law in C and in Python, without gridpeers."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tests.conformance.laws.test_carriers import PATIENT
 
 ROOT = Path(__file__).parents[3]
 EXAMPLES = ROOT / "examples" / "law-program"
-PAGE = (ROOT / "docs" / "law-programs.md").read_text()
+PAGE = (ROOT / "docs" / "how-to" / "law-programs.md").read_text()
 PYTHON = (sys.executable, str(EXAMPLES / "paper_law.py"))
 
 
@@ -29,7 +29,7 @@ def in_c(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, ...]:
     if cc is None:
         pytest.skip("no C compiler is here")
     program = tmp_path_factory.mktemp("law") / "law"
-    options = re.search(r"^cc (.*) paper_law\.c -o law -lm$", PAGE, re.MULTILINE)
+    options = re.search(r"^\$ cc (.*) paper_law\.c -o law -lm$", PAGE, re.MULTILINE)
     assert options is not None
     source = str(EXAMPLES / "paper_law.c")
     subprocess.run(
@@ -60,8 +60,8 @@ def test_the_program_in_c_gives_the_history_of_the_class(in_c: tuple[str, ...]) 
     assert written(law, driver="processes").sha256 == islanding(short=True).sha256
 
 
-def test_the_lines_on_the_page_are_what_is_said(command: tuple[str, ...]) -> None:
-    """Both programs answer the page's lines as the page does, and the lines have every field."""
+def test_the_programs_answer_the_pages_lines_as_the_page_does(command: tuple[str, ...]) -> None:
+    """The lines have every field."""
     start, ready, step, decision = re.findall(r"```json\n(.*)\n```", PAGE)
 
     asked = json.loads(step)

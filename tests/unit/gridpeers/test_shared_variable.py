@@ -1,9 +1,7 @@
-"""The recipe of docs/laws.md for a law with a shared variable, followed to the letter; and what reads it."""
+"""The law with a shared variable of docs/how-to/plug-ins.md, and the readers of that variable."""
 
 from __future__ import annotations
 
-import re
-import subprocess
 import sys
 from pathlib import Path
 from typing import Literal
@@ -14,33 +12,24 @@ import pytest
 import gridpeers as gp
 from gridpeers.runs.export import export
 from gridpeers.scenarios.record.record_file import RecordFileError
+from tests.pages.page import blocks_of
 
-DOCS = Path(__file__).parents[3] / "docs" / "laws.md"
+PAGES = Path(__file__).parents[3] / "docs" / "how-to"
 SHORT = {"time.end_s": 1.1, "event": [{"label": "event1", "t_s": 1.0, "open": ["13-152"]}], "paper": ""}
 
 
-def recipe() -> str:
-    """The file of the recipe, as written."""
-    (code,) = re.findall(
-        r"^```python\n(\"\"\"A law that shares.*?)^```$", DOCS.read_text(encoding="utf-8"), re.M | re.S
-    )
-    return str(code)
+def copy(page: str, name: str, folder: Path) -> Path:
+    """Write a file of a page into a folder."""
+    blocks = blocks_of((PAGES / page).read_text(encoding="utf-8"))
+    (code,) = (block.text for block in blocks if block.comments.get("file") == name)
+    (folder / name).write_text(code, encoding="utf-8")
+    return folder / name
 
 
 @pytest.fixture
 def law(tmp_path: Path) -> dict[str, str]:
-    (tmp_path / "omega.py").write_text(recipe(), encoding="utf-8")
+    copy("plug-ins.md", "omega.py", tmp_path)
     return {"use": "omega:Averaging", "folder": str(tmp_path)}
-
-
-def test_the_recipe_is_one_file_that_runs_and_draws(tmp_path: Path) -> None:
-    (tmp_path / "omega.py").write_text(recipe(), encoding="utf-8")
-
-    done = subprocess.run([sys.executable, "omega.py"], cwd=tmp_path, capture_output=True, text=True, check=False)
-
-    assert done.returncode == 0, done.stderr
-    assert "inv9" in done.stdout
-    assert (tmp_path / "Omega.png").read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize("driver", ["inprocess", "processes"])
@@ -62,26 +51,11 @@ def test_a_shared_quantity_is_read_and_drawn_whatever_the_driver(
     assert gp.read(tmp_path / "run").quantity("Omega").equals(Omega)
 
 
-PROGRAM = """
-import json, sys
-for line in sys.stdin:
-    asked = json.loads(line)
-    own = asked["own"]
-    if asked["type"] == "start":
-        Omega = own["m_p"] * own["P_set"]
-        print('{"type": "ready"}', flush=True)
-        continue
-    others = [n["shared"]["Omega"] for n in asked["neighbours"] if "Omega" in n["shared"]]
-    Omega += 0.5 * (sum(others) / len(others) - Omega if others else 0.0) - asked["T"] / 0.2 * own["e"]
-    print(json.dumps({"P_set": Omega / own["m_p"], "V_set": own["V_set"], "shared": {"Omega": Omega}}), flush=True)
-"""
-
-
 def test_a_program_shares_what_the_class_does(law: dict[str, str], tmp_path: Path) -> None:
-    """Declared in the scenario: the same quantity, to the last bit, with the same unit."""
-    (tmp_path / "law.py").write_text(PROGRAM, encoding="utf-8")
+    """The program of docs/how-to/law-programs.md declares it in the scenario: equal bits, equal unit."""
+    file = copy("law-programs.md", "law.py", tmp_path)
     declared = [{"name": "Omega", "unit": "pu", "low": -0.05, "high": 0.05}]
-    program = {"command": [sys.executable, str(tmp_path / "law.py")], "time_limit_s": 30.0, "shared": declared}
+    program = {"command": [sys.executable, str(file)], "time_limit_s": 30.0, "shared": declared}
 
     one, other = (gp.load("islanding").replace({**SHORT, "case.IV.law": of}).run("IV") for of in (law, program))
 
