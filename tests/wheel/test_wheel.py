@@ -84,7 +84,7 @@ def test_the_wheel_runs_beside_a_distribution_with_our_rooms_names(wheels: Wheel
 
 
 def test_the_wheel_has_every_file_of_every_room(wheels: Wheels, tmp_path: Path) -> None:
-    """Also of those that are linked, and the mark that says that its types can be checked."""
+    """Also of those that are linked, the mark that its types can be checked, and the pages if they are built."""
     with ZipFile(wheels.gridpeers) as archive:
         names = {name for name in archive.namelist() if name.startswith("gridpeers/")}
     words = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
@@ -95,6 +95,9 @@ def test_the_wheel_has_every_file_of_every_room(wheels: Wheels, tmp_path: Path) 
         for name in listed.stdout.splitlines()
         if name.partition("/")[0] in rooms | {"gridpeers"} and not (HOME.parent / name).is_symlink()
     }
+
+    site = HOME / "viewer" / "site"
+    expected |= {str(file.relative_to(HOME.parent)) for file in site.rglob("*") if file.is_file()}
 
     assert names == expected
     assert "gridpeers/py.typed" in names

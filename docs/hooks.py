@@ -1,0 +1,192 @@
+"""Hooks of mkdocs: parts of pages that the code gives, pages that are files of the root, comments for the tests."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import typer
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
+
+import gridpeers as gp
+from gridpeers.cli.root import app
+from gridpeers.scenarios.reference import TOPICS, field_docs, markdown_table, page
+
+ROOT = Path(__file__).parents[1]
+
+OF_SEVERAL = 5
+"""An option that as many commands have, in the same words, is described once."""
+
+_CHAPTERS = {
+    r"scenario$|runs|feeder": "Scenarios, runs and results",
+    r"lab.*\.\w+$(?<!parts)": "Theory and replay",
+    r"agents": "Control laws and graphs",
+    r"netem": "Link faults",
+    r"plant": "Inverter models",
+    r"scenarios\.(checks|results\.(claims|findings|metric|window))": "Metrics, checks and claims",
+    r"wire": "Parameters",
+    r"": "Errors, the catalogue and further modules",
+}
+"""Chapters of the reference of Python, by a pattern of the module that has a name."""
+
+
+def command_line() -> Iterator[str]:
+    """Yield every command with its arguments and options, in the groups of `gridpeers --help`."""
+    group: Any = typer.main.get_command(app)
+    context = group.make_context("gridpeers", [], resilient_parsing=True)
+    chapters: dict[str, list[tuple[Any, list[tuple[str, str]]]]] = {}
+    for line in group.get_help(context).splitlines():
+        if section := re.fullmatch(r"(?!Options)(\w[^:]*):", line):
+            chapters[section[1]] = []
+        elif (entry := re.match(r"  ([\w-]+)  +\w", line)) and (command := group.get_command(context, entry[1])):
+            list(chapters.values())[-1].extend(_commands(entry[1], command, context))
+    counts = Counter(record for commands in chapters.values() for _, records in commands for record in records)
+    common = [record for record, count in counts.items() if count >= OF_SEVERAL and record[0].startswith("-")]
+    for title, commands in chapters.items():
+        yield from ("", f"### {title}")
+        for of, records in commands:
+            yield from ("", f"#### {of.command_path}", "", *_docstring(of.command.help))
+            yield from _options(record for record in records if record not in common)
+            if also := [f"`{names.split()[0].rstrip(',')}`" for names, _ in records if (names, _) in common]:
+                yield from ("", f"Also [options of several commands](#options-of-several-commands): {', '.join(also)}.")
+    yield from ("", "### Options of several commands", "", *_options(common))
+
+
+def _commands(name: str, command: Any, parent: Any) -> Iterator[tuple[Any, list[tuple[str, str]]]]:
+    """Yield a command and those below it: the context, and names and meaning of each argument and option."""
+    context = command.make_context(name, [], parent=parent, resilient_parsing=True)
+    records = [param.get_help_record(context) for param in command.get_params(context)]
+    yield context, [record for record in records if record and "--help" not in record[0]]
+    for below in command.list_commands(context) if hasattr(command, "list_commands") else ():
+        yield from _commands(below, command.get_command(context, below), context)
+
+
+def _options(records: Iterable[tuple[str, str]]) -> Iterator[str]:
+    if rows := [(f"`{names}`", _plain(meaning)) for names, meaning in records]:
+        yield from markdown_table(("argument or option", "meaning"), rows)
+
+
+def python() -> Iterator[str]:
+    """Yield every public name with its signature and docstring, in chapters."""
+    chapters: dict[str, list[str]] = {title: [] for title in _CHAPTERS.values()}
+    for name, home in gp._homes().items():  # noqa: SLF001
+        module = home.partition(":")[0].removeprefix("gridpeers.")
+        chapters[next(title for pattern, title in _CHAPTERS.items() if re.match(pattern, module))].append(name)
+    for title, names in chapters.items():
+        yield from ("", f"### {title}")
+        for name in names:
+            it = getattr(gp, name)
+            yield from ("", f"#### gp.{name}", "", *_signature(name, it), *_docstring(inspect.getdoc(it)))
+            if isinstance(it, type):
+                yield from _members(it)
+
+
+def _members(cls: type) -> Iterator[str]:
+    """Yield the fields of a class, its properties and its methods, each with its sentence."""
+    yield ""
+    for field, (_, text) in field_docs(cls).items():
+        if text and not field.startswith("_"):
+            yield f"- `{field}`: {_plain(text)}"
+    for name, member in vars(cls).items():
+        it = getattr(member, "fget", None) or getattr(member, "func", None) or getattr(member, "__func__", member)
+        text = (inspect.getdoc(it) or "").partition("\n\n")[0]
+        if text and inspect.isfunction(it) and not name.startswith("_"):
+            called = f"({', '.join(_parameters(it))})" if it is member or hasattr(member, "__func__") else ""
+            yield f"- `{name}{called}`: {_plain(' '.join(text.split()))}"
+
+
+def _parameters(it: Callable[..., Any]) -> list[str]:
+    return [
+        str(of.replace(annotation=of.empty)) for of in inspect.signature(it).parameters.values() if of.name != "self"
+    ]
+
+
+def _signature(name: str, it: Any) -> tuple[str, ...]:
+    if inspect.isfunction(it):
+        return (f"`gp.{name}({', '.join(_parameters(it))})`", "")
+    return ()
+
+
+def _docstring(text: str | None) -> Iterator[str]:
+    """Yield a docstring as Markdown: parameters as a list, sessions as blocks, a command's example as code."""
+    for paragraph in inspect.cleandoc(text or "").split("\n\n"):
+        if paragraph.startswith(">>>"):
+            yield from ("```pycon", paragraph, "```", "")
+        elif example := re.fullmatch(r"Example: +(.*)", paragraph, re.S):
+            yield from (f"Example: `{' '.join(example[1].split())}`", "")
+        elif section := re.match(r"(\w+)\n-+\n(.*)", paragraph, re.S):
+            yield from (f"{section[1]}:", "")
+            for entry in re.split(r"\n(?! )", section[2]):
+                head, _, meaning = entry.partition("\n")
+                yield f"- `{head.partition(' : ')[0]}`: {_plain(' '.join(meaning.split()))}"
+            yield ""
+        else:
+            yield from (_plain(paragraph), "")
+
+
+def _plain(text: str) -> str:
+    """Return text in which nothing but code is markup."""
+    parts = re.split(r"(`[^`]*`)", text)
+    return "".join(part if part[:1] == "`" else re.sub(r"([*_<\[])", r"\\\1", part) for part in parts)
+
+
+def _topic(topic: str) -> Iterator[str]:
+    """Yield what `gridpeers doc` prints of a topic, without its title, and a level lower."""
+    for line in page(topic).splitlines()[1:]:
+        yield re.sub("^## ", "### ", _plain(line))
+
+
+def _changelog() -> str:
+    return (ROOT / "CHANGELOG.md").read_text(encoding="utf-8").partition("\n## ")[2].replace("\n## ", "\n### ")
+
+
+PARTS: dict[str, Callable[[], Iterator[str]]] = {
+    "command line": command_line,
+    "python": python,
+    **{f"doc {topic}": lambda topic=topic: _topic(topic) for topic in TOPICS},
+    "changelog": lambda: iter([f"### {_changelog()}"]),
+}
+"""Generated parts, by the word after `generated:` in a page's comment."""
+
+
+def part(name: str) -> str:
+    """Return a generated part as Markdown."""
+    return "\n".join(PARTS[name]())
+
+
+def from_root(name: str) -> str:
+    """Return a file of the root as a page: links to pages go by their names, other files are named."""
+    text = (ROOT / name).read_text(encoding="utf-8")
+    text = re.sub(r"\]\(docs/", "](", text)
+    return re.sub(r"\[([^\]]+)\]\((?!https?:|#|[\w/-]+\.md)[^)]*\)", r"\1", text)
+
+
+def on_config(config: MkDocsConfig) -> MkDocsConfig:
+    """Show the version."""
+    config.site_name = f"gridpeers {version('gridpeers')}"
+    return config
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Add the pages that are files of the root, and a line for those that are not written yet."""
+    for title, name in (
+        (t, n) for section in config.nav or () for pages in section.values() for p in pages for t, n in p.items()
+    ):
+        if name == "contributing.md":
+            files.append(File.generated(config, name, content=from_root("CONTRIBUTING.md")))
+        elif name not in files.src_uris:
+            files.append(File.generated(config, name, content=f"# {title}\n\nThis page is not written yet."))
+    return files
+
+
+def on_page_markdown(markdown: str, **_: Any) -> str:
+    """Put generated parts in, show a file's name as the title of its block, and drop the comments for the tests."""
+    markdown = re.sub(r"^<!-- *generated: *(.*?) *-->$", lambda found: part(found[1]), markdown, flags=re.M)
+    markdown = re.sub(r"^( *)<!-- *file: *(.*?) *-->\n(\s*```\w+)", r'\3 title="\2"', markdown, flags=re.M)
+    return re.sub(r"^ *<!-- *(skip|exit|file):.*?-->\n", "", markdown, flags=re.M | re.S)
