@@ -127,9 +127,9 @@ app = typer.Typer(
 
 def _version(asked: bool) -> None:
     if asked:
-        from importlib.metadata import version  # it loads the package email, which few commands need
+        from gridpeers.scenarios.versions import commit, version_of  # it loads the package email: few commands need it
 
-        typer.echo(f"gridpeers {version('gridpeers')}")
+        typer.echo(f"gridpeers {version_of('gridpeers')}" + (f" ({built_from})" if (built_from := commit()) else ""))
         raise typer.Exit
 
 

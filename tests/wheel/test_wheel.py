@@ -5,6 +5,7 @@ What the wheel depends on comes from the environment of the tests, as a folder o
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 import venv
@@ -48,7 +49,7 @@ def wheels(tmp_path_factory: pytest.TempPathFactory) -> Wheels:
 
 
 def test_the_wheel_runs_beside_a_distribution_with_our_rooms_names(wheels: Wheels, tmp_path: Path) -> None:
-    """The two have no file in common, so in either order none is overwritten; a run has the same bytes."""
+    """The two have no file in common: neither overwrites the other, or takes it away; a run has the same bytes."""
     venv.create(tmp_path / "venv", symlinks=True)
     python = tmp_path / "venv" / "bin" / "python"
     (packages,) = (tmp_path / "venv").glob("lib/python*/site-packages")
@@ -78,9 +79,19 @@ def test_the_wheel_runs_beside_a_distribution_with_our_rooms_names(wheels: Wheel
     assert isinstance(result, gp.Result)
     assert result.sha256 == recorded.sha256
 
+    def uninstall(name: str) -> None:
+        subprocess.run([*PIP, "--python", python, "uninstall", "--yes", name], check=True)
+
+    uninstall("gridpeers")
+    assert all((packages / file).exists() for file in theirs)
+    install(wheels.gridpeers)
     install(wheels.neighbour)
+    uninstall(NEIGHBOUR)
     code = "import gridpeers as gp; assert gp.load('islanding').cases; assert gp.Law"
     subprocess.run([python, "-c", code], cwd=elsewhere, check=True)
+    words = [python, "-m", "gridpeers", "--version"]
+    told = subprocess.run(words, cwd=elsewhere, capture_output=True, text=True, check=True)
+    assert re.search(r" \([0-9a-f]{7,}\+?\)$", told.stdout), "the wheel has the commit that it was built from"
 
 
 def test_the_wheel_has_every_file_of_every_room(wheels: Wheels, tmp_path: Path) -> None:
@@ -99,5 +110,5 @@ def test_the_wheel_has_every_file_of_every_room(wheels: Wheels, tmp_path: Path) 
     site = HOME / "viewer" / "site"
     expected |= {str(file.relative_to(HOME.parent)) for file in site.rglob("*") if file.is_file()}
 
-    assert names == expected
+    assert names == expected | {"gridpeers/commit.txt"}
     assert "gridpeers/py.typed" in names

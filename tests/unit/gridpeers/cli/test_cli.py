@@ -212,10 +212,12 @@ def test_a_run_that_breaks_or_is_interrupted_says_so_on_the_screen_and_in_its_fo
 
 
 def test_the_version_is_told_without_a_command() -> None:
-    """`gridpeers --version` names the installed release."""
+    """`gridpeers --version` names the installed release, and the commit of a clone; "+" where it has changed."""
     from importlib.metadata import version
 
-    assert invoke("--version") == (0, f"gridpeers {version('gridpeers')}\n")
+    code, text = invoke("--version")
+    assert code == 0
+    assert re.fullmatch(rf"gridpeers {re.escape(version('gridpeers'))} \([0-9a-f]{{7,}}\+?\)\n", text)
 
 
 @pytest.mark.parametrize("words", [(), ("link",)])
