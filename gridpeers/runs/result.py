@@ -49,7 +49,7 @@ class _FromFolder:
         self.spec = spec
         """The scenario as it was run."""
         self.folder = folder.path
-        """Folder with the files of the run (docs/results.md)."""
+        """Folder with the files of the run (docs/reference/files-and-export.md)."""
 
     @property
     def numbers(self) -> dict[str, Any]:
@@ -218,7 +218,7 @@ class Result(_FromFolder):
 
     @property
     def run_record(self) -> RunRecord:
-        """The record of the case: messages, decisions with their inputs, process events (docs/recorder.md)."""
+        """Record of the case: messages, decisions with their inputs, events (docs/reference/files-and-export.md)."""
         return self._folder.record(self.case)
 
     @cached_property
@@ -236,7 +236,7 @@ class Result(_FromFolder):
 
     @cached_property
     def sha256(self) -> str:
-        """SHA-256 of the bytes of the recorded rows (docs/results.md): equal runs have equal ones."""
+        """SHA-256 of the bytes of the recorded rows (docs/reference/files-and-export.md): equal runs have equal ones."""
         return self.record.sha256
 
     @property
@@ -261,7 +261,10 @@ class Result(_FromFolder):
 
     @cached_property
     def check_verdicts(self) -> tuple[CheckVerdict, ...]:
-        """Verdicts of the checks, each with its violations (docs/checks.md); judged now if the run saved none."""
+        """Verdicts of the checks, each with its violations; judged now if the run saved none.
+
+        docs/reference/measures-and-checks.md defines the checks.
+        """
         saved = self._run.saved_verdicts
         return saved[self.case] if self.case in saved else judge_case(self.checked_case)
 

@@ -114,7 +114,8 @@ def _try_undisturbed(console: Console, campaign: Campaign) -> None:
     if row.violated:
         off = ", ".join(f'{{ use = "{check}", off = true }}' for check in row.violated if check in ALWAYS)
         entry = f": checks = [{off}] at its top" if off else ""
-        advice = f"choose another case (--case), or switch these checks off in the scenario{entry} (docs/checks.md)"
+        page = "docs/reference/measures-and-checks.md"
+        advice = f"choose another case (--case), or switch these checks off in the scenario{entry} ({page})"
         lines = [f"{name}: violated without any disturbance: {text}" for text in row.violated.values()]
         fail(*lines, advice)
     how = "each with processes and again in one" if campaign.driver == "processes" else f"{campaign.jobs} at a time"

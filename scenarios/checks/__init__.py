@@ -1,1 +1,1 @@
-"""Checks: named judgements of every run, with limits in the scenario; registered as metrics are (docs/checks.md)."""
+"""Checks: judgements of every run by name, with limits in the scenario (docs/reference/measures-and-checks.md)."""

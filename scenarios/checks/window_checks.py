@@ -149,7 +149,7 @@ def _unequal(check: PowerSharing | VarSharing, case: CheckedCase, index: str) ->
 class SteadyEnd(Check):
     """At the end of each window, frequency, powers and voltages are steady values: they can be measured.
 
-    A value is steady where the report prints it as a number (`docs/results.md`).
+    A value is steady where the report prints it as a number (`docs/reference/measures-and-checks.md`).
     """
 
     since_s: Since = 0.0

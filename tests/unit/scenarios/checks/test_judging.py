@@ -26,7 +26,7 @@ from tests.unit.scenarios.checks.cases import ran
 
 HERE = __name__
 
-PAGE = (Path(__file__).parents[4] / "docs" / "checks.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[4] / "docs" / "reference" / "measures-and-checks.md").read_text(encoding="utf-8")
 
 
 class Nadir:
@@ -123,7 +123,7 @@ def test_a_wrong_check_is_refused_before_anything_starts(entries: list[Any], sai
 
 
 def test_gridpeers_own_checks_are_entries_like_any_other() -> None:
-    """Each has a sentence, limits that its defaults keep, and its name in docs/checks.md."""
+    """Each has a sentence, limits that its defaults keep, and its name in docs/reference/measures-and-checks.md."""
     for name in {*CHECKS.own, *ALWAYS}:
         assert re.search(rf"`(checks = \[\")?{name}(\"\])?`", PAGE), name
         assert plugin_problems(CHECKS, Plugin(use=name)) == []
