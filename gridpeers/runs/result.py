@@ -236,7 +236,7 @@ class Result(_FromFolder):
 
     @cached_property
     def sha256(self) -> str:
-        """SHA-256 of the bytes of the recorded rows (docs/reference/files-and-export.md): equal runs have equal ones."""
+        """SHA-256 of the bytes of the recorded rows: equal runs have equal ones."""
         return self.record.sha256
 
     @property
