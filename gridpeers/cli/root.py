@@ -20,6 +20,7 @@ _OWN = (
     ("list", "show:list_", "List the scenarios that come with gridpeers."),
     ("check", "show:check", "Check a scenario file and its feeder for problems."),
     ("doc", "show:doc", "Print a reference page that is made from the code."),
+    ("docs", "", "Show the documentation in the browser, offline."),
     ("sweep", "sweep_command:sweep", "Run a scenario many times over values of its keys."),
     ("chaos", "", "Disturb a scenario at random; judge and shrink what fails."),
     ("predict", "", "Predict from theory how a scenario will go."),

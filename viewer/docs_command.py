@@ -1,0 +1,75 @@
+"""`gridpeers docs`: the pages of the documentation in the browser, without a network."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import webbrowser
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from importlib import util
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from gridpeers.cli.usage import BROKEN, exit_code, fail, flag, interruptible, option
+
+SITE = Path(__file__).with_name("site")
+"""The built pages: the wheel brings them, and a clone builds them here."""
+
+CONFIG = Path(__file__).parents[2] / "mkdocs.yml"
+"""In a clone alone: the site from which the pages are built."""
+
+
+def docs(
+    port: Annotated[int, option("N", "Port of the pages; 0 takes any free one.")] = 8124,
+    no_browser: Annotated[bool, flag("Print the address alone.", "--no-browser")] = False,
+) -> None:
+    """Show the documentation in the browser, offline.
+
+    Only this host reaches the pages. A clone builds them first. Ctrl-C ends the command.
+
+    Example:  gridpeers docs
+    """
+    from gridpeers.viewer.page_server import listen, url_of
+
+    with interruptible(), listen("127.0.0.1", port) as listening:
+        if CONFIG.is_file():
+            _build()
+        if not (SITE / "index.html").is_file():
+            fail(f"{SITE} has no pages; install gridpeers from a wheel, which has them")
+        url = url_of(listening, "127.0.0.1")
+        typer.echo(f"documentation: open {url} in a browser; Ctrl-C ends the command")
+        if not no_browser and (sys.platform != "linux" or {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys()):
+            webbrowser.open(url)  # without a display it would take the terminal
+        server = ThreadingHTTPServer(("127.0.0.1", 0), partial(_Quiet, directory=str(SITE)), bind_and_activate=False)
+        server.socket.close()
+        server.socket = listening
+        try:
+            server.serve_forever()
+        except KeyboardInterrupt as stop:
+            fail("the documentation has ended", code=exit_code(stop))
+
+
+class _Quiet(SimpleHTTPRequestHandler):
+    def log_message(self, *_: Any) -> None:
+        """Print nothing of a request."""
+
+
+def _build() -> None:
+    """Build the pages of a clone; those of an earlier build serve where mkdocs is not installed."""
+    if util.find_spec("material") is None:
+        if not (SITE / "index.html").is_file():
+            fail(
+                "mkdocs-material is not installed; it builds the pages of a clone",
+                "install it: pip install -e '.[docs]'",
+            )
+        return
+    typer.echo("building the pages, which takes some seconds ...")
+    words = [sys.executable, "-m", "mkdocs", "build", "--quiet", "--no-strict", "--config-file", str(CONFIG)]
+    env = os.environ | {"NO_MKDOCS_2_WARNING": "1"}
+    done = subprocess.run(words, env=env, capture_output=True, text=True, check=False)
+    if done.returncode:
+        fail("the pages cannot be built:", *done.stderr.strip().splitlines()[-5:], code=BROKEN)
