@@ -214,12 +214,12 @@ def test_bad_rows_of_a_trace_are_named(tmp_path: Path, rows: str | None, words: 
     assert all(word in problem.text for word, problem in zip(words, wrong, strict=True))
 
 
-TEXT = (Path(__file__).parents[3] / "docs" / "netem.md").read_text(encoding="utf-8")
+TEXT = (Path(__file__).parents[3] / "docs" / "reference" / "link-faults.md").read_text(encoding="utf-8")
 
 
 def test_the_example_is_a_scenario_without_a_problem() -> None:
     """The example of the page is a valid scenario and does what the page says."""
-    (example,) = re.findall(r"```toml\n(.*?)```", TEXT, flags=re.S)
+    example = re.findall(r"```toml\n(.*?)```", TEXT, flags=re.S)[0]
     netem, form = read_table(Netem, tomllib.loads(example))
 
     assert not form
