@@ -50,7 +50,7 @@ class Gains(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 class DegradedCommunication(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """How an agent handles late, lost and missing states, and its own saturation. The default is the paper's way.
 
-    Equations, sources and costs are in docs/degraded-communication.md.
+    Equations, sources and costs are in docs/reference/link-faults.md.
     """
 
     stale: Literal["hold", "skip", "age-weighted"] = "hold"

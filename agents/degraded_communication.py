@@ -10,7 +10,7 @@ the weight of neighbour j's state for i (`StalenessWeights`), and d_i the number
 A neighbour counts while its nameplate is known, it is in the own island, it has sent a state, and that state
 is no older than `max_age`. So a lossy link keeps its place in d_i, and a dead one loses it.
 
-docs/degraded-communication.md has the sources, and the cost of each option.
+docs/reference/link-faults.md has the sources, and the cost of each option.
 """
 
 from __future__ import annotations

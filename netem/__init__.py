@@ -1,7 +1,7 @@
 """Faults of links: delay, loss, duplicates, corruption, rate, slots, cuts.
 
 The pure core imports no clock, no socket and no file, and neither numpy nor scipy: agents' processes start fast.
-docs/netem.md has every model with its formula, keys and units.
+docs/reference/link-faults.md has every model with its formula, keys and units.
 """
 
 if not __name__.startswith("gridpeers."):

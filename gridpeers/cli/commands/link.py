@@ -35,7 +35,7 @@ def set_(
     duplicate: Annotated[float | None, option("P", "Probability of a second copy.")] = None,
     corrupt: Annotated[float | None, option("P", "Probability of a flipped bit.")] = None,
     rate: Annotated[float | None, option("BYTES", "Bytes per second that the link sends.")] = None,
-    profile: Annotated[str, option("NAME", "A named link, e.g. lte; see docs/netem.md.")] = "",
+    profile: Annotated[str, option("NAME", "A named link, e.g. lte; see docs/reference/link-faults.md.")] = "",
     duration: _For = None,
 ) -> None:
     """Give links faults. What is set takes the place of what the link had of the same kind.
