@@ -1,4 +1,4 @@
-"""Keys; and docs/protocol.md, from which people write agents of their own, against the code."""
+"""Keys; and docs/reference/protocol.md, from which people write agents of their own, against the code."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from gridpeers.wire.messages import (
 
 zenoh = pytest.importorskip("zenoh")
 
-PAGE = (Path(__file__).parents[3] / "docs" / "protocol.md").read_text()
+PAGE = (Path(__file__).parents[3] / "docs" / "reference" / "protocol.md").read_text()
 SECTION = PAGE.split("## Write an agent of your own")[1].split("\n## ")[0]
 NEEDED = (Nameplate, Ready, State, Leave, LinkAcknowledgement, Prepare, Measurement, Stop, Waiting, LinkRequest)
 
