@@ -7,7 +7,7 @@
 
 The argument of a rule is the nameplates of all agents on the roster, by name in natural order; it returns the
 in-neighbours of each. Every agent applies it by itself: the same nameplates must give the same graph. A class with
-parameters (annotated attributes, `docs/plugins.md`) and a method `__call__(self, members)` is a rule too.
+parameters (annotated attributes, `docs/how-to/plug-ins.md`) and a method `__call__(self, members)` is a rule too.
 """
 
 from __future__ import annotations

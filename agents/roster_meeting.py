@@ -1,6 +1,6 @@
 """How an agent in simulated time gets ready for a roster: it meets all members, and has proof that it hears some. Pure.
 
-docs/protocol.md says why each in-neighbour is asked twice ("Why each agent asks twice").
+docs/reference/protocol.md says why each in-neighbour is asked twice ("Why an agent asks twice").
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ measurement begins the wait anew. A neighbour that dies is waited for no more. A
 deadline without any of it the agent breaks off and names the missing messages. The plant, which waits half as long and
 sees all agents, names the culprit first. A process that was stopped itself (Ctrl-Z) waits once more.
 
-docs/protocol.md shows that this cannot deadlock.
+docs/reference/protocol.md shows that this cannot deadlock.
 """
 
 from __future__ import annotations

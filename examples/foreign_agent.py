@@ -1,8 +1,10 @@
-"""An agent that is not ours: it joins a run with `eclipse-zenoh` and `msgpack` alone, as docs/protocol.md says.
+"""A foreign agent: it joins a run with the packages `eclipse-zenoh` and `msgpack` alone (docs/reference/protocol.md).
 
-`python foreign_agent.py tcp/127.0.0.1:7447 lab inv2` (real time: endpoint, run, inverter; the plant sends the rest), or
-`python foreign_agent.py < inv2.json`, which has the plant's configuration of it. It runs the paper's law, in simulated
-time to the byte, with default options. It sends no AgentStatus: `gridpeers watch` shows only the plant's data.
+Real time: `python foreign_agent.py tcp/127.0.0.1:7447 lab inv2`, with endpoint, run and inverter.
+Simulated time: `python foreign_agent.py < inv2.json`, with the plant's configuration of the agent.
+
+It runs the paper's law with default options; in simulated time it gives the bytes of an agent of gridpeers. It sends no
+AgentStatus, so `gridpeers watch` shows only the plant's data.
 """
 
 import json

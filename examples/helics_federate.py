@@ -1,6 +1,7 @@
-"""A grid of somebody else, as a HELICS federate: it imports nothing of gridpeers, whose agents control its inverters.
+"""A foreign grid as a HELICS federate, which imports nothing of gridpeers; agents of gridpeers control its inverters.
 
-Nine inverters share one bus by droop. The substation is lost at 1 s, and the load falls at 4 s (docs/helics.md).
+Nine inverters share one bus by droop. The substation fails at 1 s, and the load falls at 4 s.
+docs/how-to/cosimulation.md shows how to run it.
 """
 
 import sys
@@ -31,7 +32,7 @@ for name, rating in RATING.items():
 
 
 def solve_and_publish(t: float) -> None:
-    """Find the common frequency and voltage under the set-points of now, and publish what the sensors show at t."""
+    """Find the common frequency and voltage for the present set-points, and publish the sensors at t."""
     got = {key: h.helicsInputGetDouble(topic) for key, topic in in_.items()}
     load = 2.0e6 if t > FALLS else 2.4e6
     surplus = (sum(got[n, "P_set"] for n in RATING) - load) / sum(RATING.values()) if t > ISLANDED else 0.0  # pu

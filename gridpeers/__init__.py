@@ -5,8 +5,8 @@
 >>> list(scenario.cases)
 ['I', 'II', 'III', 'IV']
 
-`scenario.run("IV")` gives a `Result`: its `history`, `metrics`, `events` and `links` are pandas tables, `plot()` draws
-it, and `save(folder)` writes the folder that the command `gridpeers run` writes. docs/python.md has the whole face.
+`scenario.run("IV")` returns a `Result`: its `history`, `metrics`, `events` and `links` are pandas tables, `plot()`
+draws it, and `save(folder)` writes a run folder. docs/reference/python.md has all public names.
 
 Nothing heavy is imported before it is used: the command line and every agent's process start through this package.
 """

@@ -102,7 +102,7 @@ def _default(field: Field) -> str:
     return "none" if value is None else f"`{shown(value)}`"
 
 
-_LAW = "A class derived from gridpeers.Law; `docs/laws.md` has the contract and examples."
+_LAW = "A class derived from gridpeers.Law; `docs/how-to/plug-ins.md` has the contract and examples."
 _INVERTER = "A class derived from gridpeers.InverterModel; `docs/how-to/plug-ins.md` has the contract and an example."
 
 _REGISTRIES: dict[str, tuple[Registry[Any], str, str]] = {

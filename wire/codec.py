@@ -114,7 +114,7 @@ class RejectedMessages:
         if not self.counts[kind]:
             line = (
                 f"{self._who}: dropped a message on {key}: {kind} ({KINDS[kind]}): {printable(text, 200)}. "
-                "More of this kind are only counted. See docs/protocol.md"
+                "More of this kind are only counted. docs/reference/protocol.md explains the kinds."
             )
             self._lines.append("\n".join([line, *(printable(row, 200) for row in trace.splitlines()[-40:])]))
         self.counts[kind] += count

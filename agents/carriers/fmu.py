@@ -1,10 +1,10 @@
 """A law that is a functional mock-up unit for co-simulation, FMI 2 or 3, by the package fmpy (extra `fmu`).
 
-What is compiled cannot be interrupted, and may take its process with it: so an FMU runs in one of its own,
-to which the lines of a law program go (docs/law-programs.md): `python -m gridpeers.agents.carriers.fmu PATH FOLDER`.
-What the FMU prints goes to standard error.
+Compiled code cannot be interrupted, and may crash its process. So an FMU runs in a process of its own,
+`python -m gridpeers.agents.carriers.fmu PATH FOLDER`, which gets the lines of a law program. Its output goes to
+standard error.
 
-docs/laws.md has the names and types of its variables; an FMU declares those that it uses.
+docs/how-to/law-programs.md has the lines, and the names and types of the variables; an FMU declares those that it uses.
 """
 
 from __future__ import annotations

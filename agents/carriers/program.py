@@ -1,7 +1,7 @@
 """A law that is any program: one JSON line a tick on its standard input, one on its standard output.
 
-docs/law-programs.md has the lines. The program runs in the folder of the scenario; what it prints on standard error
-goes to the log of its agent.
+docs/how-to/law-programs.md has the lines. The program runs in the scenario's folder. Its standard error goes to the log
+of its agent.
 """
 
 from __future__ import annotations

@@ -123,9 +123,9 @@ class SetPoints(NamedTuple):
 
 
 class Law:
-    """Base of all laws. Parameters are annotated attributes (`gridpeers.wire.schema.table_schema`; docs/laws.md).
+    """Base of all laws: derive from it, annotate the parameters, and write `step` (docs/how-to/plug-ins.md).
 
-    Raise ValueError if the value of a parameter is wrong, unknown or missing.
+    A wrong, unknown or missing parameter raises ValueError.
     """
 
     source: ClassVar[str] = ""

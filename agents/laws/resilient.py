@@ -8,7 +8,7 @@ m_q q in (14), (15), each by itself. The leaders' own errors stay as they are: n
 **Claim of the paper.** With at most F liars among the neighbours of each honest agent, consensus never leaves the range
 of the honest agents' values, on any graph. They agree if the graph is (2F + 1)-robust; `gridpeers predict` has r.
 
-Before the trimming come three defences of ours, each of them off at 0: `tolerance`, `rate` and `T_out` (docs/laws.md).
+Three defences of gridpeers come before the trimming, each off at 0: `tolerance`, `rate` and `T_out`.
 All inverters of an island see one frequency, so a neighbour on its droop delivers p_j = P_set,j - e/m_p,j, e being the
 own frequency error: by that it is plausible or not.
 """

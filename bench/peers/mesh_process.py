@@ -25,7 +25,7 @@ from bench.peers.mesh import DEADLINE, HUB, WARM_UP, MeshMember
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
 
 RUNTIME = "(rx: (worker_threads: 1), acc: (handover: app), net: (handover: app), tx: (handover: app))"
-"""Threads of Zenoh as gridpeers has them (docs/protocol.md); with the defaults a tick takes longer."""
+"""Threads of Zenoh as in `wire/driver/zenoh_settings.py`; with the defaults a tick takes longer."""
 
 ONE_THREAD = "(rx: (handover: app), acc: (handover: app), net: (handover: app), tx: (handover: app))"
 """Threads of a member that reaches the others through the hub, as our agents do through the plant."""

@@ -1,7 +1,7 @@
 """The HELICS federate of a run, as its plant sees it: topics, requests with a deadline, failures as one sentence.
 
-A plant publishes at every record time t what its sensors show at t. A controller hears it and publishes set-points
-`ACT` later: by then all values of t are there, and the plant takes the set-points for what follows t (docs/helics.md).
+A plant publishes its sensors of each record time t. A controller publishes set-points `ACT` later, when all values of
+t are there. The plant takes these set-points for the step after t (docs/how-to/cosimulation.md).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-/* The paper's law, (12)-(15), as a program: lines of JSON as docs/law-programs.md says.
+/* The paper's law, (12)-(15), as a program: lines of JSON as docs/how-to/law-programs.md says.
  *
  *     cc -std=c99 -O2 -ffp-contract=off paper_law.c -o law -lm
  *

@@ -1,9 +1,9 @@
-"""The paper's law, (12)-(15), as a program: lines of JSON as docs/law-programs.md says. It imports nothing of ours.
+"""The paper's law, (12)-(15), as a program without gridpeers; docs/how-to/law-programs.md describes its lines of JSON.
 
     [case.IV]
     law = { command = ["python3", "paper_law.py"], k_p = 0.0007 }
 
-The order of operations is that of agents/laws/consensus.py: so the history is the same to the byte.
+It keeps the order of operations of agents/laws/consensus.py, so the history is the same to the byte.
 """
 
 import json

@@ -1,7 +1,7 @@
 """A user-defined fault: its base class, the registry of faults, and its judge.
 
 A message meets it after loss and before the line's rate: it is dropped, or goes on, later by what `judge` returns.
-docs/plugins.md has an example.
+docs/how-to/plug-ins.md has an example.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ Judge f and V only where `history.present` is true: an inverter that is off the 
 
 A check is a function of a recorded case that returns its violations, none for a run that passes; it raises
 `gridpeers.NotJudgedError` where the record has no data for it. A class with parameters (annotated attributes,
-`docs/plugins.md`), which are its limits, and a method `__call__(self, case)` is a check too.
+`docs/how-to/plug-ins.md`), which are its limits, and a method `__call__(self, case)` is a check too.
 """
 
 from __future__ import annotations

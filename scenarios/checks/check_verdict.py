@@ -31,7 +31,7 @@ class NotJudgedError(Exception):
 
 
 class Check:
-    """A check: its limits are annotated attributes, with unit, range and default (docs/plugins.md)."""
+    """A check: its limits are annotated attributes, with unit, range and default (docs/how-to/plug-ins.md)."""
 
     def __call__(self, case: CheckedCase) -> Iterable[Violation]:
         """Return the violations of a recorded case; raise NotJudgedError where it cannot be judged."""

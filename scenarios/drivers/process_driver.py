@@ -58,8 +58,8 @@ def run_processes(
     In real time the death of an agent is only an event, and the scenario's kills and pauses are real signals. The plant
     listens at its `listen`, or at a free port. `on_start` is called once all processes are started, in the
     `start_order`. Agents share `shared` processes, 0 gives each its own. `star` lets all processes link to the plant
-    alone in simulated time (docs/protocol.md). ListenError or SessionError, with nothing started, if the port is in use
-    or Zenoh is missing.
+    alone in simulated time (docs/reference/protocol.md). ListenError or SessionError, with nothing started, if the port
+    is in use or Zenoh is missing.
     """
     agents = {config.name: config for config in agent_configs}
     wall = plant_config.clock == "wall"

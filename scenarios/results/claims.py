@@ -9,7 +9,7 @@
 A claim is a function of what was found that returns whether it holds, and our value with its unit; or a
 `gridpeers.Claim` object, which also says which cases, events and steady values it needs. What was found:
 `findings.results[case][event]` has the measures (f_error_Hz, MPSI, V_error, MQSI, t_restore_s, t_load_s), and
-`findings.own[case][event].values[name]` the scenario's own metrics (`docs/plugins.md`).
+`findings.own[case][event].values[name]` the scenario's own metrics (`docs/how-to/plug-ins.md`).
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@
         return window.f[:, window.nameplates.GFM].min()
 
 A metric returns a number, or several by name. A name ends in the unit, as a key does. A class with parameters
-(annotated attributes, `docs/plugins.md`) and a method `__call__(self, window)` is a metric too.
+(annotated attributes, `docs/how-to/plug-ins.md`) and a method `__call__(self, window)` is a metric too.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""What laws share beside the paper's values, such as an integral Omega, as quantities of a record: read and plotted.
+"""Quantities that laws share beside the paper's values, such as an integral Omega: read from a record, and plotted.
 
-A law declares them (docs/laws.md); the values stand in the states that its agents sent, whose time is that of the
-measurement: in simulated time all agents' are the same.
+A law declares them (docs/how-to/plug-ins.md). The values are in the states that its agents sent. The time of a state is
+that of its measurement; in simulated time all agents have the same.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""Zenoh's settings for a session of a run, in lock-step and in real time. Pure.
-
-`docs/protocol.md` has the measured reason of each setting.
-"""
+"""Zenoh's settings for a session of a run, in simulated time and in real time, each with its reason. Pure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the README and the page on Python tell to type and to write works as it stands."""
+"""The commands, snippets and sessions of the README work as they stand."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_a_command_of_the_readme_is_one(row: str, line: list[str]) -> None:
 
 
 ROOT = Path(__file__).parents[3]
-PAGES = ("README.md", "docs/python.md")
+PAGES = ("README.md",)
 
 
 @pytest.mark.parametrize("page", PAGES)
