@@ -1,4 +1,4 @@
-"""Latency study: the effect of delay on the links between agents, by a metric of our own.
+"""Latency study: the effect of delay on the links between agents, with a metric of your own.
 
 python examples/latency_study.py
 """
@@ -27,4 +27,4 @@ table = gp.sweep(
 print(table.drop(columns=["case", "seed", "status", "why", "metric_warnings"]).round(4).to_string(index=False))
 
 limits = gp.predict(gp.load("islanding"), "IV", voltage=False).delay_limits
-print("\nWhat theory says of the longest delay (s):", limits.round(3), sep="\n")
+print("\nLongest delay for which the case is stable, by theory (s):", limits.round(3), sep="\n")

@@ -1,8 +1,8 @@
-"""Live run: ten processes in real time; a link gets late, an agent leaves and returns, and the run is read at its end.
+"""Live run: ten processes in real time; a link becomes late, an agent leaves, and Python reads the run.
 
     python examples/live_run.py [tcp/127.0.0.1:7447]
 
-Every command here can be typed in a terminal of its own: docs/operations.md.
+docs/learn/live-run.md shows the same commands in terminals.
 """
 
 import subprocess
@@ -29,7 +29,7 @@ with tempfile.TemporaryDirectory() as parent:
         try:
             for line in run.stdout:
                 print(line, end="", flush=True)
-                if "switch 13-152 opened" in line:  # the grid is gone: nine agents hold the microgrids
+                if "switch 13-152 opened" in line:  # the microgrids are an island now
                     break
             gridpeers("link", "set", "inv1 <-> inv4", "--delay", "0.1", "--for", "2")
             gridpeers("stop", "inv2")

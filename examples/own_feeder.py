@@ -1,4 +1,4 @@
-"""Own feeder: four buses at 400 V and 50 Hz, written as tables, with three inverters that share its load.
+"""Own feeder: four buses at 400 V and 50 Hz as tables, and three inverters that share the load.
 
 python examples/own_feeder.py
 """

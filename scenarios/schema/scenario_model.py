@@ -103,8 +103,8 @@ class PlantTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     """Table `[plant]`: the feeder, its loads, and where the inverters start."""
 
     simulator: str = OURS
-    """What simulates the plant: "gridpeers"; "gridlabd", GridLAB-D in its delta mode (plant.md); or "helics", a
-    federate of a HELICS co-simulation (helics.md)."""
+    """Simulator of the plant: "gridpeers"; "gridlabd", GridLAB-D in its delta mode; or "helics", a federate of a HELICS
+    co-simulation (docs/how-to/cosimulation.md)."""
     feeder: str = "microgrid123"
     """Name of a feeder that comes with gridpeers, or a path to a folder of the same layout, seen from this file."""
     load_set: str = "main"
