@@ -8,15 +8,17 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
-from mkdocs.config.defaults import MkDocsConfig
-from mkdocs.structure.files import File, Files
 
 import gridpeers as gp
 from gridpeers.cli.root import app
 from gridpeers.scenarios.reference import TOPICS, field_docs, markdown_table, page
+
+if TYPE_CHECKING:
+    from mkdocs.config.defaults import MkDocsConfig
+    from mkdocs.structure.files import Files
 
 ROOT = Path(__file__).parents[1]
 
@@ -175,6 +177,8 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add the pages that are files of the root, and a line for those that are not written yet."""
+    from mkdocs.structure.files import File
+
     for title, name in (
         (t, n) for section in config.nav or () for pages in section.values() for p in pages for t, n in p.items()
     ):

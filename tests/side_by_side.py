@@ -14,6 +14,8 @@ REAL_TIME = ("tests/processes/realtime", "tests/schedules")
 IN_PROCESS = ("tests/unit", "tests/golden", "tests/papers", "tests/fuzz")
 """Folders of tests that start hardly a process. They come last on the other workers, as each is short."""
 
+PAGES = ("tests/pages/test_pages.py",)
+
 ONE_RUN = (
     "tests/golden/catalogue",
     "tests/papers/singhal2022",
@@ -30,6 +32,8 @@ class RealTimeApart(LoadFileScheduling):
     """
 
     def _split_scope(self, nodeid: str) -> str:
+        if _within(nodeid, PAGES):
+            return nodeid  # each page is a test of its own, of some seconds
         file = super()._split_scope(nodeid)
         return ONE_RUN[0] if _within(file, ONE_RUN) else str(file)
 
@@ -47,7 +51,7 @@ class RealTimeApart(LoadFileScheduling):
 
 
 def _within(file: str, folders: tuple[str, ...]) -> bool:
-    return any(PurePosixPath(file).is_relative_to(folder) for folder in folders)
+    return any(PurePosixPath(file.partition("::")[0]).is_relative_to(folder) for folder in folders)
 
 
 def compile_once() -> None:
