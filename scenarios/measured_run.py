@@ -65,6 +65,7 @@ def write_measures(
         verdicts=judge(findings, (*benchmark.claims, *map(claim_of, own))) if claims else (),
         benchmark=benchmark,
         checks=checks,
+        expected={case: rule.expected_failures for case, rule in scenario.cases.items()},
         failures={name: law_failures(case.events) for name, case in cases.items()},
         notes=[*notes, *told],
         folder=place,

@@ -1,4 +1,4 @@
-"""Show the progress of a run, or of many runs together: bars on a terminal, lines elsewhere."""
+"""Show the progress of a run, or of many runs together: bars on a terminal, few lines elsewhere."""
 
 from __future__ import annotations
 
@@ -20,12 +20,11 @@ TellPart = Callable[[str, float], None]
 PATIENCE = 4.0
 """A start that takes longer than this (s) is explained; usually it takes about 1 s."""
 
-COMPILING = (
-    "still starting: the plant is built, and the first run ever compiles its inner loop, which takes some seconds ..."
-)
-TRYING = (
-    "still at work: the plant is tried; the first use ever compiles its inner loop, which takes some 20 seconds ..."
-)
+COMPILING = "starting ... the very first run compiles the plant, which takes about 20 s"
+TRYING = "checking the start of the plant ... the very first use compiles it, which takes about 20 s"
+
+LONG = 30.0
+"""A case that takes longer than this (s) has a line in a log; so the output of most runs fits one screen."""
 
 MEMORY = 300.0
 """Window of a bar's estimate of the time left (s); runs differ in how long they take."""
@@ -60,7 +59,8 @@ def progress(console: Console, cases: tuple[str, ...], explanation: str = COMPIL
             bars.update(bar, completed=t)
             if t >= end and case in left:
                 left.remove(case)
-                console.print(f"case {case}: {end:g} s simulated in {monotonic() - began[case]:.1f} s")
+                if not console.is_terminal and (took := monotonic() - began[case]) > LONG:
+                    console.print(f"case {case}: {end:g} s simulated in {took:.1f} s")
 
         yield tell
 

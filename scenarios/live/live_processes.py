@@ -34,6 +34,7 @@ from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.scenarios.results.record import Recorded, Recorder, RecordError
 from gridpeers.scenarios.results.run_files import set_broken, set_complete, shown
 from gridpeers.scenarios.run_request import Request
+from gridpeers.wire.driver.command_line import command_line
 from gridpeers.wire.driver.drive import StoppedError
 from gridpeers.wire.driver.ending import stop_at_signals
 from gridpeers.wire.driver.machine import keep_out_of_the_heap
@@ -329,11 +330,11 @@ def conclude(outcome: ProcessOutcome, metrics: Request) -> ProcessOutcome:
         from gridpeers.scenarios.measured_run import write_measures  # a signal may come meanwhile
         from gridpeers.scenarios.results.plots.drawing import drawing_of
         from gridpeers.scenarios.results.plots.run_figures import draw_all
-        from gridpeers.scenarios.results.report import show
+        from gridpeers.scenarios.results.report import show_summary
 
         report, cases = write_measures(metrics, {case: recorded}, pacing, (), place=f"{shown(folder)}/")
         draw_all(drawing_of(metrics.scenario, cases), folder / "plots")
-        show(report, terminal())
+        show_summary(report, terminal(), command_line("export", shown(folder)))
         set_complete(folder)
     except (StoppedError, KeyboardInterrupt) as stop:
         set_broken(folder, "interrupted while its numbers were made")

@@ -1,4 +1,4 @@
-"""The report at the end of a run: tables with our numbers beside the paper's, a verdict per claim, the folder."""
+"""The end of a run in words: a summary of one screen, and the report with every number, claim and check."""
 
 from __future__ import annotations
 
@@ -6,11 +6,13 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 
 from rich.console import Console, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from gridpeers.scenarios.checks.check_registry import LAW_FAILED
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict, summary
 from gridpeers.scenarios.console import text_of
 from gridpeers.scenarios.results.claims import NO_BENCHMARK, Benchmark, Verdict
@@ -18,6 +20,8 @@ from gridpeers.scenarios.results.findings import Findings
 from gridpeers.scenarios.results.metric import DIGITS, UNITS, Quantity, heading, label
 from gridpeers.scenarios.results.metrics import SHARING, STEADY, Steady
 from gridpeers.scenarios.results.recorded_events import LawFailure, first_of
+from gridpeers.wire.driver.command_line import command_line
+from gridpeers.wire.wording import counted
 
 GAP = 2  # Spaces behind a column
 
@@ -34,6 +38,8 @@ class RunReport:
     benchmark: Benchmark = NO_BENCHMARK
     """The publication of the experiment; its numbers stand beside ours."""
     checks: Mapping[str, tuple[CheckVerdict, ...]] = field(default_factory=dict)
+    expected: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """Checks that each case is built to fail."""
     failures: Mapping[str, tuple[LawFailure, ...]] = field(default_factory=dict)
     notes: Sequence[str]
     folder: str
@@ -42,6 +48,11 @@ class RunReport:
     def fails(self, check: str = "") -> bool:
         verdicts = (verdict for of in self.checks.values() for verdict in of)
         return any(verdict.status == "failed" and check in ("", verdict.check) for verdict in verdicts)
+
+    def broken(self, case: str) -> list[CheckVerdict]:
+        """Return the checks that a case fails though it is not built to."""
+        failed = (verdict for verdict in self.checks.get(case, ()) if verdict.status == "failed")
+        return [verdict for verdict in failed if verdict.check not in self.expected.get(case, ())]
 
 
 def plain(report: RunReport) -> str:
@@ -56,6 +67,150 @@ def show(report: RunReport, console: Console) -> None:
         console.print(plain(report), end="", soft_wrap=True)
 
 
+LINES, COLUMNS = 14, 80  # Size of a summary; one line of a screen is for what comes before it
+
+
+def show_summary(report: RunReport, console: Console, after: str, figure: str = "png") -> None:
+    """Print the answer of a run on one screen: what failed, each case, the claims, the files, the next command.
+
+    `after` is the command to type next if nothing failed and no browser shows runs; `figure` is the kind of picture.
+    """
+    failed = [*_failures(report)]
+    tail = [Text(line) for line in _claims_in_short(report)]
+    notes = [*_without_agent(report), *report.notes]
+    if report.folder:
+        more = f" ({counted(len(notes), 'note')})" if notes else ""
+        tail += [Text.assemble(f"{'figure':8}", (f"{report.folder}plots/overview.{figure}", "bold"))]
+        tail += [Text(f"{'report':8}{report.folder}report.txt{more}"), Text(f"{'next':8}{_next(report, after)}")]
+    room = LINES - 4 - len(tail) - min(len(report.checks), 5)
+    shown = failed if len(failed) <= room else failed[: room - 1]
+    head = [_answer(report, failed), *(Text(_cut(line), "red") for line in shown)]
+    if len(shown) < len(failed):
+        head.append(Text(f"and {len(failed) - len(shown)} more failures: see the report", "red"))
+    table = _cases(report, LINES - len(head) - len(tail))
+    room = LINES - len(head) - len(table) - len(tail)
+    blank = [Text()] if room >= 2 else []
+    table += [
+        Text.assemble(("NOTE", "yellow"), _cut(f"  {note}", COLUMNS - 4))
+        for note in notes[: max(room - 2 * len(blank), 0)]
+    ]
+    for line in (*head, *blank, *table, *blank, *tail):
+        console.print(line, soft_wrap=True)
+
+
+def _failures(report: RunReport) -> Iterator[str]:
+    yield from (f"FAILED  case {case}: {first_of(of)}" for case, of in report.failures.items() if of)
+    for case in report.checks:
+        for verdict in report.broken(case):
+            if verdict.check != LAW_FAILED or not report.failures.get(case):
+                yield f"FAILED  case {case}: {verdict.sentence.replace(' failed: ', ': ', 1)}"
+    yield from (f"FAILED  {it.claim.text}: {it.found}" for it in report.verdicts if it.status == "FAIL")
+
+
+_STATES = {
+    "law failed": ("run", "a law that failed", "law failed"),
+    "broken": ("break", "limits", "broken"),
+    "kept": ("keep", "all limits", "kept"),
+    "expected": ("break", "some as expected", "as expected"),
+    "not judged": ("have", "no limit that was judged", "not judged"),
+}
+"""Verb and object of a sentence about cases by their state, and its words in a table."""
+
+
+def _state(report: RunReport, case: str) -> str:
+    of = {verdict.status for verdict in report.checks.get(case, ())}
+    if report.failures.get(case):
+        return "law failed"
+    if report.broken(case):
+        return "broken"
+    return "expected" if "failed" in of else "kept" if "passed" in of else "not judged"
+
+
+def _answer(report: RunReport, failed: Sequence[str]) -> Text:
+    """Say in one line which cases keep their limits and which break them, as expected or not."""
+    states = {case: _state(report, case) for case in report.checks}
+    wrong = sum(verdict.status == "FAIL" for verdict in report.verdicts)
+    for named in (len(_STATES), 1, 0):  # the first clauses name their cases, as far as there is room
+        parts = [f"{counted(wrong, 'claim')} failed"] * bool(wrong)
+        for state, (verb, what, _) in _STATES.items():
+            of = [case for case in states if states[case] == state]
+            who = f"all {len(of)} cases" if len(of) == len(states) > 1 else counted(len(of), "case")
+            if len(parts) - bool(wrong) < named and who[:3] != "all":
+                who = f"case{'s' * (len(of) > 1)} {' and '.join(filter(None, (', '.join(of[:-1]), *of[-1:])))}"
+            verb = ("has" if verb == "have" else f"{verb}s") if len(of) == 1 else verb
+            parts += [f"{who} {verb} {what}"] if of else []
+        parts = parts if "kept" in states.values() else [part.replace(" some ", " limits ") for part in parts]
+        text = f"{report.scenario}: {'; '.join(parts)}"
+        if len(text) <= COLUMNS:
+            break
+    return Text(_cut(text), "bold red" if failed else "bold")
+
+
+def _cases(report: RunReport, room: int) -> list[Text]:
+    """Return a row for each case with its largest values after any event, as far as there is room."""
+    found, cases = report.findings, [*report.checks]
+    rows = {
+        case: [_worst(found, case, name) for name in ("f_error_Hz", "MPSI", "MQSI", "t_restore_s")] for case in cases
+    }
+    heads = ["f error", "uneven P", "uneven Q", "restored in"]
+    measured = any(found.results.values())  # without an event there is no window to measure in
+    room -= 1 + measured
+    left = cases if len(cases) <= room else cases[: max(room - 1, 1)]
+    table = [[*(heads if measured else ()), "limits"]]
+    table += [[*(rows[case] if measured else ()), _STATES[_state(report, case)][2]] for case in left]
+    widths = [max(len(row[column]) for row in table) for column in range(len(table[0]))]
+    first = [_cut(_case(report, case), max(COLUMNS - sum(widths) - GAP * len(widths), len(case))) for case in left]
+    width = max(map(len, ("case", *first)))
+    lines = []
+    for name, row in zip(("case", *first), table, strict=True):
+        cells = [f"{cell:>{size}}" for cell, size in zip(row[:-1], widths, strict=False)]
+        style = {"law failed": "red", "broken": "red", "kept": "green"}.get(row[-1], "")
+        lines.append(Text.assemble((" " * GAP).join([f"{name:{width}}", *cells, ""]), (row[-1], style)))
+    lines += [Text(f"and {len(cases) - len(left)} more cases: see the report")] * (len(left) < len(cases))
+    words = "largest values after any event; uneven P, Q: MPSI, MQSI, 0 if shared equally"
+    return lines + [Text(words, "dim")] * measured
+
+
+def _worst(found: Findings, case: str, name: str) -> str:
+    """Return the largest value of a measure after any event, in any island, or in a word why there is none."""
+    parts = [
+        part
+        for event, whole in found.results.get(case, {}).items()
+        for part in (found.apart(case, event) or {"": whole}).values()
+    ]
+    shared = [part for part in parts if not _nothing_shared(part, "MPSI" if name == "t_restore_s" else name)]
+    reasons = [part.reasons[name].partition(":")[0] for part in shared if name in part.reasons]
+    values = [getattr(part, name) for part in shared]
+    if reasons or not values:
+        return (reasons or ["-"])[0]
+    if None in values:
+        return "never"
+    return f"{max(values):.2f} s" if name == "t_restore_s" else f"{max(values):.3f}{UNITS[name]}"
+
+
+def _claims_in_short(report: RunReport) -> Iterator[str]:
+    of = Counter(verdict.status for verdict in report.verdicts)
+    if judged := of.total() - of["NOT RUN"]:
+        rest = f", {counted(of['MISS'], 'known deviation')}" if of["MISS"] else ""
+        rest += f", {of['NOT RUN']} need other cases" if of["NOT RUN"] else ""
+        yield f"{of['PASS']} of {judged} claims{' of the paper' * bool(report.benchmark.numbers)} hold{rest}"
+
+
+def _next(report: RunReport, after: str) -> str:
+    """Return the command to type next: it explains the first failure, or shows the run."""
+    folder = report.folder.rstrip("/")
+    for case in report.checks:
+        for verdict in report.broken(case):
+            for it in verdict.violations:
+                if it.agent and it.t is not None:
+                    return command_line("why", f"{folder}/{case}", it.agent, f"{it.t:.2f}")
+    return command_line("view", folder) if find_spec("starlette") else after
+
+
+def _cut(text: str, width: int = COLUMNS) -> str:
+    return text if len(text) <= width else f"{text[: width - 3].rstrip()}..."
+
+
 def _print(report: RunReport, console: Console) -> None:
     blocks: list[list[RenderableType]] = [
         [Text(f"FAILED  case {case}: {first_of(of)}", "bold red") for case, of in report.failures.items() if of],
@@ -63,18 +218,20 @@ def _print(report: RunReport, console: Console) -> None:
         [*_claims(report)],
         [_checks(case, verdicts) for case, verdicts in report.checks.items()],
     ]
-    notes = [
-        f"case {case}: {', '.join(names)} without an agent: MPSI, MQSI and the time to restore leave "
-        f"{'it' if len(names) == 1 else 'them'} out; frequency and voltage do not"
-        for case, names in report.findings.without_agent.items()
-    ]
-    blocks += [[Text.assemble(("NOTE", "yellow"), f"  {note}")] for note in (*notes, *report.notes)]
+    notes = [*_without_agent(report), *report.notes]
+    blocks += [[Text.assemble(("NOTE", "yellow"), f"  {note}")] for note in notes]
     blocks += [[Text.assemble("Results: ", (report.folder, "bold"))]] if report.folder else []
     for number, block in enumerate(filter(None, blocks)):
         if number:
             console.print()
         for line in block:
             console.print(line, soft_wrap=not isinstance(line, Table))
+
+
+def _without_agent(report: RunReport) -> Iterator[str]:
+    for case, names in report.findings.without_agent.items():
+        them = "it" if len(names) == 1 else "them"
+        yield f"case {case}: {', '.join(names)} without an agent: MPSI, MQSI and the time to restore leave {them} out"
 
 
 def _claims(report: RunReport) -> Iterator[Text]:
@@ -155,7 +312,7 @@ def _places(found: Findings) -> Iterator[tuple[str, str, str, Steady]]:
 
 
 def _case(report: RunReport, case: str) -> str:
-    return f"{case} {report.titles.get(case, '')}".strip()
+    return f"{case}: {title}" if (title := report.titles.get(case)) else case
 
 
 def _cell(report: RunReport, case: str, event: str, quantity: Quantity, values: Steady, island: str) -> str:

@@ -17,7 +17,7 @@ from gridpeers.netem.schema.netem import Netem
 from gridpeers.plant.equipment import InverterRow, Tables
 from gridpeers.plant.inverters.inverter_registry import INVERTERS, given
 from gridpeers.scenarios.checks.check_registry import ALWAYS as ALWAYS_CHECKED
-from gridpeers.scenarios.checks.check_registry import CHECKS, LAW_FAILED, switched_off
+from gridpeers.scenarios.checks.check_registry import CHECKS, LAW_FAILED, check_name, switched_off
 from gridpeers.scenarios.results.claims import BENCHMARKS, CLAIMS
 from gridpeers.scenarios.results.metric import ALWAYS, METRICS, good_name, name_of
 from gridpeers.scenarios.schema.participants import with_agent
@@ -139,6 +139,10 @@ def check_plugins(scenario: ScenarioModel, feeder: Tables | None, problems: Prob
     for i, key in enumerate(scenario.claims):
         _check(f"claims[{i}]", key, CLAIMS, problems)
     _check_named("checks", scenario.checks, CHECKS, ALWAYS_CHECKED, problems)
+    known = dict.fromkeys((*ALWAYS_CHECKED, *map(check_name, scenario.checks)))
+    for case, rule in scenario.cases.items():
+        for i, name in enumerate(rule.expected_failures):
+            problems.unknown(f"case.{case}.expected_failures[{i}]", "check", name, known)
     _check_laws(scenario, problems)
     _check_graphs(scenario, feeder, problems)
 

@@ -83,7 +83,6 @@ def test_a_replay_is_written_as_a_run_with_table_and_figure(run: Result, elsewhe
     assert code == 0, text
     assert "short, case IV, in simulated time: gains.k_p = 0.002" in text
     assert "would be" in text
-    assert re.search(r"^case IV: 1 s simulated in [\d.]+ s$", text, re.MULTILINE), text
     assert isinstance(gp.read("would"), Result)
     for name in ("IV/history.csv", "metrics.json", "plots/counterfactual.png", "comparison.txt"):
         assert (elsewhere / "would" / name).stat().st_size > 100
@@ -156,7 +155,7 @@ def test_a_folder_of_what_would_have_been_says_so(run: Result, tmp_path: Path) -
 
     gp.counterfactual(tmp_path / "latest", without="* <-> *", since=0.5, folder=tmp_path / "would")
 
-    assert "IV what would have been, without * <-> *, from 0.5 s on" in (tmp_path / "would" / "report.txt").read_text()
+    assert "IV: what would have been, without * <-> *, from 0.5 s on" in (tmp_path / "would" / "report.txt").read_text()
     as_run = tomllib.loads((tmp_path / "would" / "scenario.toml").read_text())["as_run"]
     assert as_run["replayed"] == str((run.folder / "IV" / "run.mcap").resolve())
     assert (as_run["driver"], as_run["clock"]) == ("inprocess", "simulated")

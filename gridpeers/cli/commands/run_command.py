@@ -24,6 +24,7 @@ from gridpeers.cli.usage import (
     require_loadable,
     terminal,
 )
+from gridpeers.wire.driver.command_line import command_line
 
 if TYPE_CHECKING:
     from gridpeers.plant.equipment import Tables
@@ -53,6 +54,9 @@ def run(
     seed: Annotated[int | None, option("N", "Seed instead of the one in the scenario.", min=0)] = None,
     require_checks: Annotated[
         bool, flag("Exit code 1 also if a check fails; one that is not judged has not.", "--require-checks")
+    ] = False,
+    details: Annotated[
+        bool, flag("Print the whole report, as report.txt has it: tables, claims, checks, notes.", "--details")
     ] = False,
     out: Annotated[
         Path | None, option("DIR", "Folder for the results, new or empty; runs/SCENARIO/TIME when left out.")
@@ -93,9 +97,13 @@ def run(
         why = f"FAILED  {error}" if by_law else f"the run broke: {error}"
         fail(why, *([left] if folder.is_dir() else []), code=CLAIM_FAILED if by_law else BROKEN)
     from gridpeers.scenarios.checks.check_registry import LAW_FAILED
-    from gridpeers.scenarios.results.report import show  # imports numpy, which the run does without
+    from gridpeers.scenarios.results.report import show, show_summary  # imports numpy, which the run does without
 
-    show(report, console)
+    if details:
+        show(report, console)
+    else:
+        ours = spec.plant.simulator == "gridpeers"
+        show_summary(report, console, command_line("up", scenario) if ours else command_line("export", shown(folder)))
     failed = any(verdict.status == "FAIL" for verdict in report.verdicts) or report.fails(LAW_FAILED)
     failed |= require_checks and report.fails()
     raise typer.Exit(CLAIM_FAILED if failed else PASSED)

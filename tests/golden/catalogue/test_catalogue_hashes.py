@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
-from tests.golden.catalogue.pins import cases, environment, read, run_case
+from gridpeers.scenarios.checks.check_verdict import judge_case
+from gridpeers.scenarios.checks.checked_case import CheckedCase
+from gridpeers.scenarios.schema import load_scenario
+from tests.golden.catalogue.pins import cases, environment, ran, read, run_case
 
 PINNED = read()
 PINS = PINNED.here()
@@ -19,6 +24,16 @@ def test_a_case_gives_the_pinned_history(name: str, case: str) -> None:
         assert pin == PINS[name, case], 'if it should move: python -m tests.golden.catalogue.pin "the reason"'
     else:
         assert pin.last == pytest.approx(PINS[name, case].last, rel=1e-7, abs=1e-4)
+
+
+@pytest.mark.parametrize(("name", "case"), cases())
+def test_a_case_fails_those_checks_that_it_is_built_to_fail(name: str, case: str, tmp_path: Path) -> None:
+    """The key `expected_failures` tells the truth; `stale_values` needs a record of messages, not made here."""
+    scenario, feeder = load_scenario(name)
+    found = judge_case(CheckedCase.of(scenario, feeder, case, ran(name, case)[0], tmp_path))
+    failed = {verdict.check for verdict in found if verdict.status == "failed"}
+
+    assert failed == set(scenario.cases[case].expected_failures) - {"stale_values"}
 
 
 def test_every_case_is_pinned_and_nothing_else() -> None:

@@ -97,7 +97,7 @@ def test_terminals_in_the_order_of_people(desk: Desk) -> None:
     assert code == 0
     assert text.startswith("run lab ends at t = ")
     assert [terminal.end() for terminal in (plant, again, late)] == [0, 0, 0]
-    plant.expect(r"NOTE  case IV: people gave 3 commands that may change the run \(events.csv\), first: inv2 was asked")
+    plant.expect("NOTE  case IV: people gave 3 commands that may change the run")
     assert json.loads((desk.folder / "here" / "metrics.json").read_text())["cases"]["IV"]["commands"] == 3
     events = (desk.folder / "here" / "IV" / "events.csv").read_text()
     assert re.findall(",command,([^,]*),", events) == ["inv2", "48", "13-152"]
@@ -156,7 +156,7 @@ def test_up_stays_until_it_is_ended_and_leaves_no_process(desk: Desk) -> None:
     for child in children:
         with pytest.raises(ProcessLookupError):
             os.kill(child, 0)
-    up.expect(r"NOTE  case IV: ended at .* s of 3600 s; what is measured ends there")
+    up.expect(r"NOTE  case IV: ended at .* s of 3600 s; what is measured")
     here = desk.folder / "here"
     events = (here / "IV" / "events.csv").read_text()
     assert " left" not in events
@@ -236,9 +236,10 @@ def test_laws_that_fail_in_a_live_run_are_exit_code_1_and_named(desk: Desk) -> N
 
     assert desk.type("down")[0] == 0
     assert up.end() == 1
-    why = r"inv[123] at t = .* s: .* and 2 more"
-    up.expect(rf"FAILED  case IV: {why}")
-    assert re.match(f"FAILED  case IV: {why}\n", (desk.folder / "here" / "report.txt").read_text())
+    up.expect("FAILED  case IV: inv[123] at t = ")
+    assert re.match(
+        r"FAILED  case IV: inv[123] at t = .* s: .* and 2 more\n", (desk.folder / "here" / "report.txt").read_text()
+    )
 
 
 SCRIPT = Path(__file__).parents[3] / "examples" / "live_run.py"

@@ -93,7 +93,7 @@ def test_a_run_fills_its_folder_from_which_it_can_be_repeated(elsewhere: Path) -
     code, text = invoke(*command, figures=True)
 
     assert code == 0, text
-    assert "Results: here/" in text
+    assert "report  here/report.txt\n" in text
     here = elsewhere / "here"
     assert {path.name for path in here.iterdir()} == {
         *("I", "log", "plots", "metrics.json", "checks.json", "report.txt", "scenario.toml", "status.txt"),
@@ -144,7 +144,7 @@ def test_a_required_check_that_fails_is_exit_code_1_and_one_that_is_not_judged_i
     off = ", ".join(f'{{ use = "{name}", off = true }}' for name in ALWAYS)
     (elsewhere / "short.toml").write_text(f'checks = ["mine:{check}", {off}]\n{SHORT}')
 
-    code, text = invoke("run", "short.toml", "--driver", "inprocess", "--require-checks", "--out", "here")
+    code, text = invoke("run", "short.toml", "--driver", "inprocess", "--require-checks", "--details", "--out", "here")
 
     assert code == exit_code, text
     said = {"fails": "0 of 1 checks passed, ", "cannot_judge": "0 of 0 checks passed, 1 not judged, "}[check]
@@ -164,9 +164,7 @@ class Mine(gp.Law):
     ('on_law_failure = "stop"', 1, "FAILED  case IV: ended at t = 1.02 s, as on_law_failure says: inv1: law mine"),
     ('checks = [{ use = "law_failed", off = true }]', 0, "FAILED  case IV: inv1 at t = 1.02 s: law mine:Mine ("),
 ])  # fmt: skip
-def test_a_law_that_fails_is_exit_code_1_and_the_first_line(
-    top: str, exit_code: int, line: str, elsewhere: Path
-) -> None:
+def test_a_law_that_fails_is_exit_code_1_and_comes_first(top: str, exit_code: int, line: str, elsewhere: Path) -> None:
     """Whoever switches its check off has it said all the same; `compare`, `sweep` and `replay` follow one rule."""
     (elsewhere / "mine.py").write_text(FAILING)
     case = '[case.IV]\nsecondary = "all"\ngraph = "full"\n'
@@ -176,8 +174,8 @@ def test_a_law_that_fails_is_exit_code_1_and_the_first_line(
     code, text = invoke("run", "short.toml", "--driver", "inprocess", "--out", "here")
 
     assert code == exit_code, text
-    shown = [one for one in text.splitlines() if not one.startswith("case IV: 1.2 s simulated")]
-    assert shown[0].removeprefix("gridpeers: ").startswith(line), text
+    shown = text.removeprefix("islanding: case IV runs a law that failed\n").removeprefix("gridpeers: ")
+    assert shown.startswith(line), text
     if "stop" not in top:
         assert (elsewhere / "here" / "report.txt").read_text().startswith(line)
         compared = invoke("compare", "here", "here", "--out", "c.png")[1]

@@ -24,7 +24,9 @@ def test_a_script_becomes_an_islanding_that_runs(elsewhere: Path) -> None:
     The switch has the line's name everywhere, in events too.
     """
     code, made = invoke("init", "mine", "--feeder", str(FEEDERS / "ieee13.dss"))
-    end, ran = invoke("run", "mine/islanding.toml", "--driver", "inprocess", "--case", "ring", "--out", "out")
+    end, ran = invoke(
+        "run", "mine/islanding.toml", "--driver", "inprocess", "--case", "ring", "--details", "--out", "out"
+    )
 
     assert code == 0, made
     assert " kW in all, proposed" in made

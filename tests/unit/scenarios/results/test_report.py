@@ -1,4 +1,4 @@
-"""The report at the end of a run: plain text for files and pipes, colours on a terminal only."""
+"""The end of a run: a summary of one screen, and a report; colours on a terminal only."""
 
 import io
 from dataclasses import replace
@@ -6,11 +6,12 @@ from dataclasses import replace
 import pytest
 
 from gridpeers.papers.singhal2022.paper_benchmarks import CLAIMS, ISLANDING
+from gridpeers.scenarios.checks.check_verdict import CheckVerdict, Violation
 from gridpeers.scenarios.console import terminal
 from gridpeers.scenarios.results.claims import NO_BENCHMARK, judge
 from gridpeers.scenarios.results.findings import Findings
 from gridpeers.scenarios.results.metrics import Steady
-from gridpeers.scenarios.results.report import RunReport, plain, show
+from gridpeers.scenarios.results.report import RunReport, plain, show, show_summary
 from tests.papers.singhal2022.test_claims import changed
 
 
@@ -33,7 +34,7 @@ def test_ours_stand_beside_the_papers() -> None:
     text = plain(report())
 
     assert "0.137 | 0.14" in text
-    assert "I no control" in text
+    assert "I: no control" in text
     assert "PASS" in text
     assert text.endswith("Results: runs/islanding/x/\n")
 
@@ -83,3 +84,67 @@ def test_what_several_islands_share_together_is_not_told() -> None:
     assert [row[4:] for row in rows if row[1:2] == ["island"]] == [["0.041", "0.019", "0.37", "s"], ["0.0900", "0.135"]]
     assert text.count("-: where there are several islands, each shares for itself") == 2
     assert "-:" not in plain(report())
+
+
+def summary(of: RunReport, *, coloured: bool = False) -> list[str]:
+    out = io.StringIO()
+    show_summary(of, terminal(file=out, force_terminal=coloured, width=80), "gridpeers up islanding")
+    return out.getvalue().splitlines()
+
+
+def verdicts(**failed: str) -> dict[str, tuple[CheckVerdict, ...]]:
+    """Verdicts of cases that fail the check of their name; of no name they pass it."""
+    found = {case: Violation(text="abs(f - 60)", agent="inv1", t=3.0) for case in failed}
+    return {
+        case: (
+            CheckVerdict(check=check or "steady", status="failed" if check else "passed", violations=(found[case],)),
+        )
+        for case, check in failed.items()
+    }
+
+
+def test_the_first_line_is_the_answer_and_the_last_the_next_command() -> None:
+    """A case that is built to fail is no failure; one line counts the claims of the paper."""
+    of = replace(report(), checks=verdicts(I="frequency", IV=""), expected={"I": ("frequency",)})
+
+    lines = summary(of)
+
+    assert lines[0] == "islanding: case IV keeps all limits; case I breaks some as expected"
+    assert lines[3:5] == [
+        "I: no control  0.137 Hz     0.000     0.300        never  as expected",
+        "IV             0.000 Hz     0.000     0.050       0.90 s  kept",
+    ]
+    assert "12 of 12 claims of the paper hold" in lines
+    assert lines[-3:-1] == [
+        "figure  runs/islanding/x/plots/overview.png",
+        "report  runs/islanding/x/report.txt (1 note)",
+    ]
+    assert lines[-1] in ("next    gridpeers view runs/islanding/x", "next    gridpeers up islanding")
+
+
+def test_unexpected_failures_come_first_and_red_and_the_next_command_explains_the_first() -> None:
+    of = replace(report(f_error=0.2), checks=verdicts(I="frequency", IV=""))
+
+    lines = summary(of)
+
+    assert lines[0] == "islanding: 1 claim failed; case I breaks limits; case IV keeps all limits"
+    assert lines[1] == "FAILED  case I: frequency: abs(f - 60): inv1 at t = 3.00 s"
+    assert lines[2].startswith("FAILED  all eight abs(f-60) within 0.01 Hz of Table I: 7 of 8")
+    assert lines[-1] == "next    gridpeers why runs/islanding/x/I inv1 3.00"
+    assert all(line.startswith("\x1b[") for line in summary(of, coloured=True)[:3])
+
+
+@pytest.mark.parametrize("measured", [True, False])
+def test_a_summary_fits_one_screen_whatever_the_run(measured: bool) -> None:
+    """Many cases with long titles and many failures, or no event to measure after: the report has what is left out."""
+    cases = {f"case{i}": "frequency" if i % 3 else "" for i in range(30)}
+    steady = report().findings.results["IV"]
+    found = Findings(results=dict.fromkeys(cases, steady if measured else {}))
+    of = replace(report(), titles=dict.fromkeys(cases, "a long title " * 9), checks=verdicts(**cases), findings=found)
+
+    lines = summary(of)
+
+    assert len(lines) <= 14
+    assert max(map(len, lines)) <= 80
+    assert lines[0] == "islanding: 20 cases break limits; 10 cases keep all limits"
+    assert sum("more failures: see the report" in line or "more cases: see the report" in line for line in lines) == 2
