@@ -1,1 +1,1 @@
-"""Chaos: schedules of disturbances drawn at random, runs judged by checks, failures shrunk (docs/chaos.md)."""
+"""Chaos: random schedules of disturbances, runs judged by checks, failures shrunk (docs/how-to/chaos.md)."""

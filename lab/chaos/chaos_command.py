@@ -48,8 +48,8 @@ def chaos(
     """Disturb a scenario at random; judge and shrink what fails.
 
     Agents are killed and paused, leave and join; links are cut, slow and lossy; switches open and close; agents lie.
-    Once the last of it has ended, the checks judge the run (docs/chaos.md). Each kind of failure becomes a scenario
-    file with few disturbances, for `gridpeers run`.
+    After the last disturbance, the checks judge the run (docs/how-to/chaos.md). Each kind of failure becomes a
+    scenario file with few disturbances, for `gridpeers run`.
 
     Example:  gridpeers chaos islanding --runs 200
     """

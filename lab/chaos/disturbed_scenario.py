@@ -1,7 +1,7 @@
 """Disturbances as entries of a scenario file, and a scenario with those of a schedule, checked as if a person wrote it.
 
 So a scenario can say all that chaos can. The checks of such a run judge the promises of control once the last
-disturbance has ended (docs/chaos.md).
+disturbance has ended (docs/how-to/chaos.md).
 """
 
 from __future__ import annotations

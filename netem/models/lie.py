@@ -42,7 +42,7 @@ Before = Callable[[float], State]
 class Lie(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="model"):
     in_name_of: Annotated[str, Example('"inv5"')] = ""
     """Another inverter, in whose name it lies: that one's states arrive falsified, its own are true. Empty: in its own.
-    Certificates keep such a lie out (docs/security.md)."""
+    Certificates keep such a lie out (docs/understand/guarantees.md)."""
     plant: bool = False
     """Whether the plant hears the lie as well, so that the inverter follows it; else only its neighbours hear it."""
 

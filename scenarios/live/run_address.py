@@ -84,7 +84,8 @@ def objection(option: str, endpoint: str, *, keys: bool, insecure: bool) -> str:
     if not (keys or insecure or is_loopback_host(parsed.host)):
         return (
             f"{option}: {endpoint} is not on this host's loopback, and without certificates whoever reaches it reads "
-            f"and commands the run: say --keys DIR and {tls} (docs/security.md), or --insecure if you trust the network"
+            f"and commands the run; use --keys DIR and {tls} (docs/how-to/several-hosts.md), or --insecure on a "
+            "network that you trust"
         )
     return ""
 

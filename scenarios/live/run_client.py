@@ -206,4 +206,4 @@ def _refusal(text: str, where: RunAddress) -> str:
     advice = "say by --keys the folder of its site, or by --connect where the plant of this site is"
     if where.credentials is None:
         advice = f"say --keys DIR and {endpoint._replace(protocol='tls')}"
-    return f"what listens at {text} {refusal}; {advice} (docs/security.md)"
+    return f"what listens at {text} {refusal}; {advice} (docs/how-to/several-hosts.md)"

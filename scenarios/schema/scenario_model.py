@@ -237,7 +237,8 @@ class ScenarioModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     """Seed of everything drawn at random: the fates of messages on links with faults."""
     security: Literal["none", "mtls"] = "none"
     """"mtls": links between processes are mutual TLS, and a run needs --keys DIR, a folder with certificates
-    (docs/security.md); "none": links are open, unless --keys is said. In one process there are no links to secure."""
+    (docs/how-to/several-hosts.md); "none": links are open, unless --keys is given. A run in one process has no
+    links."""
     record: RecordLevel = "all"
     """What the record run.mcap of each case has: "all", decisions of agents with their inputs but no arrivals
     ("decisions"), or rows and events alone ("physics")."""

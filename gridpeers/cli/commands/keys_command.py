@@ -21,7 +21,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     help="Make, issue and revoke the certificates of a site.\n\n"
     "With them links are encrypted, every process proves who it is, and each may send only what is its own "
-    "(docs/security.md).\n\n"
+    "(docs/how-to/several-hosts.md).\n\n"
     "Example:  gridpeers keys init lab",
 )
 

@@ -37,7 +37,9 @@ Connect = Annotated[
     list[str] | None, option("ENDPOINT", f"Where the plant listens, {ENDPOINT} if left out; repeatable.")
 ]
 Wait = Annotated[float, option("SECONDS", "Longest wait for the plant.")]
-Keys = Annotated[Path | None, option("DIR", "With certificates from here, links are TLS (docs/security.md).")]
+Keys = Annotated[
+    Path | None, option("DIR", "Folder with certificates; links are then TLS (docs/how-to/several-hosts.md).")
+]
 As = Annotated[str, option("NAME", "With --keys: whose certificate; the operator's if left out.", "--as")]
 Insecure = Annotated[
     bool, flag("Let an endpoint be open to everybody who reaches it, beyond the loopback.", "--insecure")

@@ -88,8 +88,8 @@ def test_a_viewer_is_told_who_may_command(elsewhere: Path) -> None:
 
 FAR, NEAR = "tcp/192.0.2.1:7447", "tcp/127.0.0.1:1"
 OPEN = (
-    "is not on this host's loopback, and without certificates whoever reaches it reads and commands the run: say "
-    "--keys DIR and tls/192.0.2.1:7447 (docs/security.md), or --insecure if you trust the network"
+    "is not on this host's loopback, and without certificates whoever reaches it reads and commands the run; use "
+    "--keys DIR and tls/192.0.2.1:7447 (docs/how-to/several-hosts.md), or --insecure on a network that you trust"
 )
 
 

@@ -134,7 +134,7 @@ def test_a_mended_failure_passes(file: Path) -> None:
 
 @pytest.mark.parametrize("name", ["returns-cut", "returns-partition", "var_sharing-kill", "rating-kill-after-lie"])
 def test_a_limit_of_the_law_is_still_one(name: str) -> None:
-    """The limits that docs/chaos.md explains violate their checks, with the words in their first line."""
+    """The limits that docs/how-to/chaos.md names violate their checks, with the words in their first line."""
     file = CORPUS / "limits" / f"{name}.toml"
     first = file.read_text(encoding="utf-8").partition("\n")[0]
     assert first.startswith(HEAD)
@@ -144,5 +144,5 @@ def test_a_limit_of_the_law_is_still_one(name: str) -> None:
 
     assert first.removeprefix(HEAD) in sentence, (
         f"{file.stem} does not show its limit any more: it violates {sentence}; "
-        "if the law does better now, take it out of the corpus and of docs/chaos.md"
+        "if the law does better now, take it out of the corpus and of docs/how-to/chaos.md"
     )

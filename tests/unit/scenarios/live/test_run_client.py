@@ -169,9 +169,9 @@ def test_a_refused_certificate_ends_the_wait(waiting: Waiting, monkeypatch: pyte
 
     assert waiting({}, 60.0, None, 0) == [
         "what listens at tcp/127.0.0.1:7447 asks for a certificate; say --keys DIR and tls/127.0.0.1:7447 "
-        "(docs/security.md)"
+        "(docs/how-to/several-hosts.md)"
     ]
     assert waiting({}, 60.0, SHOWN, 0)[0].endswith(
         "asks for a certificate; say by --keys the folder of its site, or by --connect where the plant of this site is "
-        "(docs/security.md)"
+        "(docs/how-to/several-hosts.md)"
     )
