@@ -13,6 +13,7 @@ from typing import Any
 
 from gridpeers.agents.laws.call import LawError
 from gridpeers.agents.laws.law import LIMITS, Law, Neighbour, Own, SetPoints, Terms
+from gridpeers.wire.driver.machine import POSIX
 from gridpeers.wire.plugins.registry import ANYTHING, named
 
 FIRST = 10.0
@@ -32,9 +33,9 @@ def limited(what: str, seconds: float, limit: str) -> Iterator[None]:
 
     Of real time it may take `BLOCKED` times as many: what else a machine does must not decide what a run in simulated
     time gives. It is interrupted by SIGALRM: in the main thread of a process alone, and not while C code does not
-    return. The error names `what` is inside, and the `limit` as a scenario calls it.
+    return; Windows has no such signal. The error names `what` is inside, and the `limit` as a scenario calls it.
     """
-    if threading.current_thread() is not threading.main_thread():
+    if not POSIX or threading.current_thread() is not threading.main_thread():
         yield
         return
     over = ended = False

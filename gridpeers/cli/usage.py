@@ -18,7 +18,7 @@ from typer.core import TyperGroup
 from gridpeers.scenarios.console import terminal as terminal
 from gridpeers.wire.driver.command_line import command_line
 from gridpeers.wire.driver.ending import stop_handler
-from gridpeers.wire.driver.machine import too_few_files
+from gridpeers.wire.driver.machine import POSIX, too_few_files
 from gridpeers.wire.wording import DISTRIBUTIONS, InputError, damaged, printable, suggestion
 
 if TYPE_CHECKING:
@@ -110,6 +110,13 @@ def require_loadable(module: str, user: str) -> None:
         fail(damaged(module, reason, user))
 
 
+def require_posix(what: str) -> None:
+    """End with a clear line on a system where gridpeers runs in one process alone."""
+    if not POSIX:
+        run = command_line("run", "SCENARIO", "--driver", "inprocess")
+        fail(f"{what} needs Linux or macOS; this system runs a scenario in one process: {run}")
+
+
 def fail(*lines: str, code: int = BAD_INPUT) -> NoReturn:
     """End the command with lines on standard error; characters that cannot be printed are escaped."""
     for line in lines:
@@ -128,7 +135,7 @@ def interruptible() -> Iterator[None]:
     terminate, numbers = stop_handler(TerminatedError), [signal.SIGTERM]
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else a shell has it ignored, or another has it
         numbers.append(signal.SIGINT)
-    if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # else nohup has asked that the run outlives its terminal
+    if POSIX and signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # else nohup: the run outlives its terminal
         numbers.append(signal.SIGHUP)
     before = {number: signal.signal(number, terminate) for number in numbers}
     try:

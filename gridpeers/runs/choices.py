@@ -12,6 +12,7 @@ from gridpeers.plant.simulators import SIMULATORS
 from gridpeers.scenarios.run_request import SPEEDS, Clock, Driver
 from gridpeers.scenarios.schema import ScenarioError
 from gridpeers.scenarios.schema import scenario_model as model
+from gridpeers.wire.driver.machine import POSIX
 from gridpeers.wire.wording import suggestion
 
 
@@ -46,7 +47,9 @@ def check_how(driver: str, pace: Pace, spec: model.ScenarioModel, *, dash: str =
     for word, value, choices in (("driver", driver, get_args(Driver)), ("clock", clock, get_args(Clock))):
         if value not in choices:
             raise ScenarioError([f'{dash}{word}: there is no "{value}"; {suggestion(value, choices, "choices")}'])
-    if processes < 0:
+    if driver == "processes" and not POSIX:
+        problem = f"driver processes: needs Linux or macOS; use {dash}driver inprocess"
+    elif processes < 0:
         problem = f"processes: must be a number of processes from 1, or 0 for one an agent, got {processes}"
     elif processes and driver == "inprocess":
         problem = f"processes: needs {dash}driver processes; in one process all agents share it"

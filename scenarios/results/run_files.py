@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import csv
 import errno
-import fcntl
 import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -19,6 +18,7 @@ import msgspec
 
 from gridpeers.wire.codec import decode_foreign
 from gridpeers.wire.driver.ending import OutputLostError
+from gridpeers.wire.driver.machine import POSIX
 from gridpeers.wire.wording import InputError
 
 RUNS = Path("runs")  # Parent of the run folders that the user does not name, seen from the working directory
@@ -164,7 +164,11 @@ LOCK = ".lock"
 
 def locked(folder: Path, option: str, command: str) -> int:
     """Lock a folder until this process ends; raise FolderError if another process has locked it."""
-    handle = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+    handle = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
+    if not POSIX:
+        return handle
+    import fcntl
+
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:

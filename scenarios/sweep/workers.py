@@ -14,6 +14,8 @@ from collections.abc import Callable, Generator, Iterable
 from multiprocessing import resource_tracker
 from typing import Any, TypeVar
 
+from gridpeers.wire.driver.machine import POSIX
+
 T = TypeVar("T")
 
 Task = Callable[..., T]
@@ -53,12 +55,13 @@ def _parallel(runs: Calls, task: Task[T]) -> Generator[T, None, None]:
 
     tasks = (delayed(task)(*call) for call in runs)
     resource_tracker.ensure_running()  # before, as it lets SIGINT through again
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # workers inherit it
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if POSIX else set()
     try:
         # one run a batch: each result is kept at once
         results: Any = Parallel(return_as="generator_unordered", batch_size=1)(tasks)
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        if POSIX:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
     try:
         # not `yield from`, which would close the results, with a warning, before we can
         for done in results:  # noqa: UP028

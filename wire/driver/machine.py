@@ -5,8 +5,13 @@ from __future__ import annotations
 import ctypes
 import errno
 import os
-import resource
 from contextlib import suppress
+
+POSIX = hasattr(os, "fork")
+"""False on Windows, where gridpeers runs in one process alone."""
+
+if POSIX:
+    import resource
 
 
 def usable_cores() -> int:
@@ -33,12 +38,16 @@ MOST_FILES = 65_536
 
 def limit() -> int:
     """Return the number of files that this process may have open; `MOST_FILES` where there is no limit."""
+    if not POSIX:
+        return MOST_FILES
     soft, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     return MOST_FILES if soft == resource.RLIM_INFINITY else soft
 
 
 def raise_limit() -> None:
     """Raise the limit of this process, and of those that it starts, as far as the system lets everybody do it."""
+    if not POSIX:
+        return
     _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = MOST_FILES if hard == resource.RLIM_INFINITY else min(hard, MOST_FILES)
     if limit() < wanted:

@@ -21,7 +21,7 @@ from gridpeers.cli.commands.options import (
     finish,
     of_live_run,
 )
-from gridpeers.cli.usage import BROKEN, argument, fail, flag, option, terminal
+from gridpeers.cli.usage import BROKEN, argument, fail, flag, option, require_posix, terminal
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
 from gridpeers.scenarios.live.run_address import (
     RUN,
@@ -54,6 +54,7 @@ def agent(
 
     Example:  gridpeers agent inv2 --keys lab --connect tls/192.168.1.10:7447
     """
+    require_posix("a live run")
     from gridpeers.scenarios.live.live_processes import agent_here
 
     check_inverters(inverters)

@@ -21,7 +21,7 @@ from gridpeers.cli.commands.options import (
     of_live_run,
     opened,
 )
-from gridpeers.cli.usage import ScenarioName, chosen, flag, load, option
+from gridpeers.cli.usage import ScenarioName, chosen, flag, load, option, require_posix
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
 from gridpeers.scenarios.live.run_address import (
     ENDPOINT,
@@ -60,6 +60,7 @@ class Start:
 
 def _start(start: Start, *, agents: bool) -> None:
     """Run the plant, with its agents or without, until it ends; end with its exit code."""
+    require_posix("a live run")
     from gridpeers.scenarios.live.live_options import check_alone, chosen_case, configure, folders, live_record
 
     # first: reading a scenario takes seconds, and a forgotten run is reported at once

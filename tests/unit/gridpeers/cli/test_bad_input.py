@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from gridpeers.cli import usage
+from gridpeers.runs import choices
 from gridpeers.scenarios.catalogue_files import CATALOGUE
 from tests.command_line import invoke
 
@@ -133,3 +135,14 @@ def test_nobody_there_is_told_within_the_wait(words: list[str]) -> None:
         f"gridpeers: nothing answers at {endpoint} within 0.2 s; start a plant there (gridpeers plant SCENARIO), "
         "or say by --connect where it is; a frozen one goes on by kill -CONT"
     ]
+
+
+@pytest.mark.parametrize("words", ["run islanding", "up islanding", "plant islanding", "agent inv2"])
+def test_windows_is_told_that_it_runs_scenarios_in_one_process(words: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in (usage, choices):
+        monkeypatch.setattr(module, "POSIX", False)
+
+    code, text = invoke(*words.split())
+    assert (code, text.count("\n")) == (2, 1)
+    assert "needs Linux or macOS; " in text
+    assert "--driver inprocess" in text
