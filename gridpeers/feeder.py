@@ -1,4 +1,4 @@
-"""Feeders in Python: of our own tables, or written for OpenDSS or GridLAB-D."""
+"""Feeders in Python: from tables, or from files of OpenDSS or GridLAB-D."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Names = Sequence[str]
 
 
 class Feeder(Tables, frozen=True, kw_only=True):
-    """A feeder: its buses, branches, switches, loads and inverters. It never changes; methods return another one.
+    """A feeder: its buses, branches, switches, loads and inverters. It never changes; methods return a new one.
 
     >>> feeder = Feeder.read("microgrid123")
     >>> feeder
@@ -53,21 +53,27 @@ class Feeder(Tables, frozen=True, kw_only=True):
         leave_out: Names = (),
         switches: Names = (),
     ) -> Feeder:
-        """Return a feeder that comes with gridpeers, by its name, that of a folder of tables, or of another program.
+        """Return a feeder by the name of a shipped one, or from a folder of tables, or from a file of another program.
 
-        A folder has its load set `main`, or another one. Of another program is a script for OpenDSS (.dss), often
-        Master.dss, which needs the extra `opendss`; a model for GridLAB-D (.glm) as it is once its controls rest, which
-        needs the extra `gridlabd`; or a file with a reader of your own. The nominal frequency (Hz) is the file's if
-        left out. Elements to leave out are written `Class.name`, with `*` for any: "PVSystem.*". The `switches` are
-        lines that can be opened, beside those that the file calls so.
-        `gridpeers.plant.tables.FeederError` has every problem of the tables, all that the other program refuses, and
-        all that cannot be represented.
+        Other programs are OpenDSS (.dss, extra `opendss`), GridLAB-D (.glm with its controls at rest, extra
+        `gridlabd`), and those with a reader of your own. A `gridpeers.plant.tables.FeederError` lists every problem.
+
+        Parameters
+        ----------
+        name : str or Path
+            Name of a shipped feeder, path of a folder of tables, or path of a file.
+        load_set : str, optional
+            Load set of a folder of tables; "main" by default.
+        f_nom : float, optional
+            Nominal frequency (Hz) of a file; by default the file has it.
+        leave_out : list of str
+            Elements of a file to leave out, as `Class.name`, with `*` for any: "PVSystem.*".
+        switches : list of str
+            Lines of a file that become switches.
         """
         if is_foreign(name):
             if load_set is not None:
-                raise InputError(
-                    f"load_set is for a folder of tables; {name} has the one set of loads that it describes"
-                )
+                raise InputError(f"load_set is for a folder of tables; {name} has one set of loads")
             read = READERS.resolve(_ending(name))
             tables = read(name, f_nom, leave_out=_listed(leave_out), switches=_listed(switches))
         else:
@@ -96,12 +102,24 @@ class Feeder(Tables, frozen=True, kw_only=True):
         m_q: float = 0.05,
         params: str = "",
     ) -> Feeder:
-        """Return the feeder with one inverter more; ValueError says why there can be none.
+        """Return the feeder with one more inverter; a ValueError says why the bus cannot have it.
 
-        The bus must have its phases, without another inverter on them. P_rated (W) is of all its phases; m_p and m_q
-        are droops (pu frequency per pu power, pu voltage per pu reactive power). The phases return to `neutral`: a node
-        of the bus by its number or letter, or "earth"; by default the neutral to which loads return, else earth.
-        `params` names a published set of parameters, "regfm_a1"; a scenario gives others, in `[plant.inverter.NAME]`.
+        The bus must have the phases, without another inverter on them. A scenario changes further parameters in
+        `[plant.inverter.NAME]`.
+
+        Parameters
+        ----------
+        P_rated : float
+            Rating (W), of all phases together.
+        neutral : str or int
+            Node to which the phases return, by its number or letter, or "earth". By default the neutral of the loads
+            at the bus, else earth.
+        m_p : float
+            P-f droop (pu frequency per pu power).
+        m_q : float
+            Q-V droop (pu voltage per pu reactive power).
+        params : str
+            Name of a published set of parameters, such as "regfm_a1".
         """
         from gridpeers.plant.tables.shunts import problems_of
 
@@ -133,11 +151,11 @@ class Feeder(Tables, frozen=True, kw_only=True):
         return replace(self, inverters=(*self.inverters, row))
 
     def solve(self, open_switches: Names = ()) -> pd.DataFrame:
-        """Return the voltages that the substation alone gives: bus, phase, V (V), V_pu, angle_deg, to.
+        """Return the voltages with the substation as the only source: bus, phase, V (V), V_pu, angle_deg, to.
 
-        They are 0 where it does not reach. Those of phases A, B and C count from the neutral of the bus, whose letter
-        is in `to`; those of other nodes, and of phases without a neutral, from earth: `to` is empty. ValueError if
-        there is no substation, or no such switch; ArithmeticError if the feeder cannot carry its loads.
+        A part that the substation does not reach has 0 V. Phases A, B and C count from the neutral of the bus, whose
+        letter is in `to`. Other nodes, and phases without a neutral, count from earth, and `to` is empty. Raise
+        ValueError without a substation or for an unknown switch, ArithmeticError if the feeder cannot carry its loads.
         """
         import numpy as np
         import pandas as pd
@@ -163,7 +181,7 @@ class Feeder(Tables, frozen=True, kw_only=True):
         )
 
     def plot(self, *, voltages: bool = False) -> Figure:
-        """Return a one-line diagram with microgrids, or coloured by each bus's lowest energised phase."""
+        """Return a one-line diagram, coloured by microgrid, or by the voltage of each bus's lowest energised phase."""
         from gridpeers.scenarios.results.plots.feeder_diagram import feeder_diagram
 
         V: Any = None
@@ -174,7 +192,7 @@ class Feeder(Tables, frozen=True, kw_only=True):
         return feeder_diagram(self, V)
 
     def save(self, folder: str | Path) -> Path:
-        """Write the tables into a folder, which a scenario names as `plant.feeder`; return its path."""
+        """Write the tables into a folder and return its path; `plant.feeder` of a scenario names such a folder."""
         from gridpeers.plant.tables.write import write_feeder
 
         write_feeder(self, Path(folder))

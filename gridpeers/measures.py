@@ -1,4 +1,4 @@
-"""Measures of the rows of a record, and how a run settles after an event; all pure functions of arrays."""
+"""Measures of the rows of a record, and of how a run settles after an event: pure functions of arrays."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ if TYPE_CHECKING:
 
 
 def settling(history: History, nameplates: Nameplates, window: Window, f_nom: float) -> Settling:
-    """Measure how a case settles in a window, from an event to the next or to the end of the run.
+    """Measure how a case settles in a window: from an event to the next one, or to the end of the run.
 
-    `nameplates` are in the order of the columns of the history (`Result.record`); f_nom in Hz.
+    `history` is `Result.record`; `nameplates` are in the order of its columns; f_nom is in Hz.
     """
     return metrics.settling(window.cut(history), nameplates, window, f_nom)
 
@@ -41,7 +41,7 @@ def settling(history: History, nameplates: Nameplates, window: Window, f_nom: fl
 def nameplates_of(spec: ScenarioModel, feeder: Tables, case: str = "") -> Nameplates:
     """Return the nameplates of a scenario's inverters, in the order of a record's columns.
 
-    With a case, those without an agent in it are left out, as the sharing indices do.
+    With a case, inverters without an agent in it are left out, as in the sharing indices.
     """
     from gridpeers.scenarios.schema.participants import inverters_of, without_agent
 

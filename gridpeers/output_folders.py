@@ -1,4 +1,4 @@
-"""Folders of results: new ones, how far they are, what made them; and those of feeders."""
+"""Folders of results: make them, set their status, and fill them as a whole or not at all."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from gridpeers.wire.driver.ending import OutputLostError as OutputLostError
 
 @contextmanager
 def files_written(place: Path) -> Iterator[None]:
-    """Write files within this; FolderError says which could not be written: `place` if the system does not say."""
+    """Turn an OSError of the block into a FolderError, which names the file, or `place` if the system names none."""
     try:
         yield
     except OSError as error:
@@ -31,9 +31,9 @@ def files_written(place: Path) -> Iterator[None]:
 
 @contextmanager
 def whole_folder(folder: Path) -> Iterator[None]:
-    """Fill a folder, new or empty, within this; whatever ends it early leaves the folder as it was.
+    """Fill a new or empty folder in the block; an early end of the block leaves the folder as it was.
 
-    FolderError if there is something in it, or it cannot be written.
+    Raise FolderError if the folder is not empty, or cannot be written.
     """
     there = folder.exists()
     empty_folder(folder)

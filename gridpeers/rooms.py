@@ -1,6 +1,6 @@
-"""What the rooms above the face bring to it, by name: entry points of the group "gridpeers.rooms".
+"""Parts that the rooms above the Python library bring, by name: entry points of the group "gridpeers.rooms".
 
-The face and what is below it import no room, so that each may be missing.
+The library imports no room, so each room may be missing.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ ROOMS: Registry[Any] = Registry("part of a room", "rooms", lambda it: "")
 READERS: Registry[Callable[..., Tables]] = Registry(
     "reader of feeders", "feeder readers", lambda it: "" if callable(it) else "it cannot be called"
 )
-"""Readers of feeders that were written for other programs, by the end of the file's name without its dot.
+"""Readers of feeders of other programs, by the ending of the file's name without its dot.
 
 Each takes the path and the nominal frequency (Hz) or None, and by name `leave_out` and `switches`.
 """

@@ -1,4 +1,4 @@
-"""A scenario in Python: loaded, built or changed; always checked; run to a result."""
+"""Scenarios in Python: load, build, change, check and run them."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ def as_scenario(it: Scenario | str | Path) -> Scenario:
 
 
 def load(name_or_path: str | Path) -> Scenario:
-    """Read and check a scenario of the catalogue (`gridpeers.catalogue()` names them), or of a file.
+    """Read and check a scenario of the catalogue (`gridpeers.catalogue()` lists them) or a scenario file.
 
-    ScenarioError has every problem of the file and of its feeder.
+    A ScenarioError lists every problem of the file and of its feeder.
 
     >>> load("islanding")
     <Scenario islanding: cases I, II, III, IV; 2 events; 7 s; 9 inverters on 134 buses>
@@ -46,10 +46,10 @@ def load(name_or_path: str | Path) -> Scenario:
 
 
 class Scenario:
-    """An experiment: a feeder, its inverters, what happens to them, and the cases of control that are compared.
+    """An experiment: a feeder with inverters, events, and cases of control to compare.
 
-    It is made of the tables of a scenario file (`gridpeers doc scenario`), with paths seen from the working directory.
-    It is checked when it is made, so one in hand can be run; it never changes.
+    The arguments are the tables of a scenario file (`gridpeers doc scenario`); relative paths start at the working
+    directory. A scenario is checked when it is made, and never changes.
 
     >>> Scenario(
     ...     name="mine",
@@ -86,10 +86,10 @@ class Scenario:
         self._feeder = feeder
 
     def replace(self, changes: Mapping[str, Any]) -> Scenario:
-        """Return a scenario with values changed by the dotted path of their keys, e.g. `gains.k_p`, `event[0].t_s`.
+        """Return a scenario with changed values, given by dotted paths of keys such as `gains.k_p` or `event[0].t_s`.
 
-        A table replaces a whole table, and can make a new case: `{"case.V": {...}}`. None takes a key out, so that its
-        default holds. A class or a function becomes its reference `module:Name`.
+        A table replaces a whole table, or makes a new case: `{"case.V": {...}}`. None removes a key, so its default
+        applies. A class or a function becomes its reference `module:Name`.
 
         >>> load("islanding").replace({"gains.k_p": 0.001, "case.IV.graph": "ring"}).cases["IV"].graph
         'ring'
@@ -114,9 +114,9 @@ class Scenario:
         return self._of(tree, self._path, self._text, changed, problems)
 
     def check(self) -> tuple[str, ...]:
-        """Return notes on what events de-energise or overload, and on graphs that bear too few liars for their law.
+        """Return notes on parts that events de-energise or overload, and on graphs too sparse for a law among liars.
 
-        ScenarioError if the plant cannot start.
+        A ScenarioError says why the plant cannot start.
         """
         from gridpeers.rooms import ROOMS
         from gridpeers.scenarios.schema.loading import start_problem
@@ -136,31 +136,34 @@ class Scenario:
     def run(
         self, case: str | list[str] | tuple[str, ...] | None = None, driver: Driver = "inprocess", **how: Unpack[How]
     ) -> Result | Results:
-        """Run a case, which gives a `Result`; several, or with None all, give `Results`.
+        """Run one case and return a `Result`; run a list of cases, or all by default, and return `Results`.
 
-        The driver is "inprocess", or "processes": a plant process and processes of agents over Zenoh. In simulated time
-        both give the same bytes. ScenarioError if there is no such case, driver or clock; BrokenRunError if a case
-        could not be finished, with the place of the log; FolderError if the folder has something in it, or cannot be
-        written.
+        Both drivers give the same bytes in simulated time. Raise ScenarioError for an unknown case, driver or clock,
+        BrokenRunError with the place of the log if a case breaks, and FolderError if the folder is not empty or cannot
+        be written.
 
         Parameters
         ----------
+        case : str, list of str or None
+            Name of a case, several names, or None for all cases.
+        driver : {"inprocess", "processes"}
+            One process for all, or a plant process and processes of agents over Zenoh.
         keys : str or Path, optional
-            With "processes": folder with certificates (`gridpeers keys init`), for mutual TLS. Without it links are
+            Folder with certificates (`gridpeers keys init`) for mutual TLS between processes. Without it links are
             open, on the loopback.
         processes : int
-            With "processes": number of processes that the agents share; 0 gives each agent its own. An agent that the
-            scenario starts, stops, kills or pauses has its own in any case.
+            Number of processes that the agents share; 0 gives each agent its own. An agent that the scenario starts,
+            stops, kills or pauses always has its own.
         clock : {"simulated", "wall"}
-            Lock-step, or real time, which needs "processes".
+            Simulated time, or real time, which needs the driver "processes".
         speed : float
             In real time: seconds of the run per second, from 0.1 to 50.
         strict : bool
             In real time: break the run when it cannot keep pace.
         progress : Callable[[str, float, float], None], optional
-            Takes the case, the time that it has reached (s) and its end (s).
+            Gets the name, the time reached (s) and the end (s) of a case while it runs.
         folder : str or Path, optional
-            New or empty; takes the run folder with its figures. Without it the files live as long as the results.
+            New or empty folder for the files and figures. Without it the files disappear with the results.
         """
         from gridpeers.runs.running import run
 
@@ -174,7 +177,7 @@ class Scenario:
 
     @property
     def title(self) -> str:
-        """One line on what it is."""
+        """Title of the scenario, one line."""
         return self._spec.title
 
     @property
@@ -184,7 +187,7 @@ class Scenario:
 
     @property
     def events(self) -> tuple[model.Event, ...]:
-        """What happens, in the order of time."""
+        """Events in the order of time."""
         return self._spec.events
 
     @property
@@ -194,7 +197,7 @@ class Scenario:
 
     @property
     def inverters(self) -> tuple[str, ...]:
-        """Names of the inverters, those that join later last."""
+        """Names of the inverters; those that join later come last."""
         from gridpeers.scenarios.schema.participants import inverters_of
 
         return tuple(row.name for row in inverters_of(self._spec, self._feeder))
@@ -206,16 +209,16 @@ class Scenario:
 
     @property
     def tables(self) -> Tree:
-        """Tables as they were written, without defaults; a copy."""
+        """Copy of the tables as written, without defaults."""
         return copy.deepcopy(self._tree)
 
     @property
     def path(self) -> Path:
-        """File that it is from; relative paths in it start there."""
+        """File of the scenario; relative paths start in its folder."""
         return self._path
 
     def to_toml(self) -> str:
-        """Return the text of a scenario file with every key spelled out."""
+        """Return the text of a scenario file with every key, defaults included."""
         from gridpeers.scenarios.schema.scenario_writing import to_toml
 
         return to_toml(self._spec, {})
@@ -227,7 +230,7 @@ class Scenario:
 
     @property
     def extent(self) -> str:
-        """Its cases, and how many events, seconds, inverters and buses it has."""
+        """Cases, and numbers of events, seconds, inverters and buses, in words."""
         cases, events, feeder = self._spec.cases, len(self._spec.events), self._feeder
         return (
             f"case{'s' * (len(cases) != 1)} {', '.join(cases)}; {counted(events, 'event')}; "
@@ -239,7 +242,7 @@ class Scenario:
 
 
 def plain(value: Any) -> Any:
-    """Return a value as TOML has it; ValueError with a sentence if a scenario file could not hold it.
+    """Return a value as TOML has it; raise ValueError if a scenario file cannot hold it.
 
     numpy's scalars and arrays become numbers and lists, and a class or a function becomes its reference `module:Name`.
 
@@ -266,12 +269,12 @@ def plain(value: Any) -> Any:
     if hasattr(value, "__qualname__") and hasattr(value, "__module__"):
         if "<" in value.__qualname__:
             raise ValueError(
-                f"{value.__qualname__} is defined inside a function, where nobody can import it; define it at the top "
+                f"{value.__qualname__} is defined inside a function, so it cannot be imported; define it at the top "
                 "of a module or of the notebook"
             )
         return f"{value.__module__}:{value.__qualname__}"
     if callable(getattr(value, "tolist", None)):  # numpy and pandas, which need not be imported for this
         return plain(value.tolist())
     raise ValueError(
-        f"a value of type {type(value).__name__} is none of a scenario's; give a number, text, list or table"
+        f"a scenario cannot hold a value of type {type(value).__name__}; give a number, text, list or table"
     )

@@ -1,4 +1,4 @@
-"""Options of a run: cases, driver, clock. Their check imports nothing that a run needs: commands make it first."""
+"""Options of a run: cases, driver, clock, and their check, which imports no part of a run."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from gridpeers.wire.wording import suggestion
 
 
 def with_cases(spec: model.ScenarioModel, names: Iterable[str] | None, *, option: str = "") -> model.ScenarioModel:
-    """Return a scenario with some of its cases, in its order; all if none is named. An `option` heads every problem."""
+    """Return a scenario with some of its cases, in its order; None keeps all. `option` precedes each problem."""
     if names is None:
         return spec
     chosen = list(names)
@@ -30,7 +30,7 @@ def with_cases(spec: model.ScenarioModel, names: Iterable[str] | None, *, option
 
 
 class Pace(TypedDict, total=False):
-    """Time and processes of a run: fields of a `Request`, options of the command, arguments of `Scenario.run`."""
+    """Time and processes of a run: fields of a `Request`, options of a command, arguments of `Scenario.run`."""
 
     clock: Clock
     speed: float
@@ -40,7 +40,7 @@ class Pace(TypedDict, total=False):
 
 
 def check_how(driver: str, pace: Pace, spec: model.ScenarioModel, *, dash: str = "") -> None:
-    """Check the options of a scenario's run; `dash` stands before their names: "--" on a command line."""
+    """Check the options of a run; `dash` precedes their names: "--" on a command line."""
     clock, speed, strict = pace.get("clock", "simulated"), pace.get("speed", 1.0), pace.get("strict", False)
     processes, keys, simulator = pace.get("processes", 0), pace.get("keys"), SIMULATORS.resolve(spec.plant.simulator)
     problem = ""

@@ -1,4 +1,4 @@
-"""Two runs side by side: differences of their scenarios and of their metrics, and a figure."""
+"""Compare two runs: their scenarios, metrics and histories."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ RunSource = Result | Results | str | Path
 
 
 def compare(a: RunSource, b: RunSource, *, names: tuple[str, str] = ("a", "b")) -> Comparison:
-    """Compare two results, or the folders of runs; `names` are two different words for them, in tables and figures.
+    """Compare two results or run folders; `names` are two different words for them in tables and figures.
 
-    Of runs with several cases, those are compared that both have; two single cases whatever they are called.
+    Runs with several cases are compared in their common cases. Two single cases need no common name.
     """
     if names[0] == names[1]:
-        raise ScenarioError([f'names: two different words are needed, as ("before", "after"), got {names!r:.60}'])
+        raise ScenarioError([f'names: give two different words, such as ("before", "after"), got {names!r:.60}'])
     first, second = map(_cases_of, (a, b))
     if len(first) == len(second) == 1:
         return Comparison({"": (*first.values(), *second.values())}, names)  # type: ignore[dict-item]
@@ -55,18 +55,18 @@ def _cases_of(run: RunSource) -> Mapping[str, Result]:
 
 
 class Comparison:
-    """Two runs side by side; made by `gridpeers.compare`. The name of a pair of single cases is empty."""
+    """Two runs side by side; `gridpeers.compare` returns it."""
 
     def __init__(self, pairs: dict[str, tuple[Result, Result]], names: tuple[str, str]) -> None:
         self._pairs = pairs
         self.names = names
-        """Words for the two."""
+        """Words for the two runs."""
 
     @cached_property
     def table(self) -> pd.DataFrame:
-        """Metrics of both and their difference (second minus first), a row per (window, metric), or (case, ...).
+        """Metrics of both runs and their difference (second minus first): a row per (window, metric) or (case, ...).
 
-        What is shared has no value where a window has several islands: `Result.islands` has that of each.
+        Sharing indices have no value in a window with several islands; `Result.islands` has those of each island.
         """
         frames = {case: _table(*pair, self.names) for case, pair in self._pairs.items()}
         if list(frames) == [""]:
@@ -77,7 +77,7 @@ class Comparison:
 
     @cached_property
     def changes(self) -> pd.DataFrame:
-        """Keys of the scenarios that differ, with both values; "" where a scenario has no such key."""
+        """Keys of the scenarios that differ, with both values; empty where a scenario lacks the key."""
         first, second = (_keys(pair) for pair in zip(*self._pairs.values(), strict=True))
         keys = [key for key in dict.fromkeys((*first, *second)) if first.get(key) != second.get(key)]
         rows = {key: [str(of.get(key, "")) for of in (first, second)] for key in keys}
@@ -89,7 +89,7 @@ class Comparison:
         return all(first.sha256 == second.sha256 for first, second in self._pairs.values())
 
     def plot(self) -> Figure:
-        """Draw f, MPSI, V and MQSI of both, case by case."""
+        """Draw f, MPSI, V and MQSI of both runs, case by case."""
         from gridpeers.scenarios.results.plots.run_figures import comparison
 
         shown_in_notebooks()
@@ -108,7 +108,7 @@ class Comparison:
         return "\n\n".join((*self.failures(), changes, table, verdict))
 
     def failures(self) -> Iterator[str]:
-        """Yield a line for each run in which a law failed: its numbers are not those of its law."""
+        """Yield a line for each run with a failed law, whose numbers are those of droop."""
         for case, pair in self._pairs.items():
             for name, run in zip(self.names, pair, strict=True):
                 if len(failed := run.failures):

@@ -1,4 +1,4 @@
-"""The tables of a run's record as files of other programs, also of a run that was killed or still goes on."""
+"""Write the tables of a record as files for other programs, also of a killed or a live run."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ SHEET = 1_048_575  # Rows of a sheet below its header
 
 
 def export(record: RunRecord, to: Format, folder: Path) -> list[Path]:
-    """Write the tables of a record into a folder, and return the files: one for each table, or one for all.
+    """Write the tables of a record into a folder, and return the files: one per table, or one for all.
 
-    Columns have the names of history.csv, events.csv and links.csv, with their units. Values that the law declares to
-    share have a table of their own, "shared". Raise RecordFileError if the record has no rows, FolderError if a format
-    cannot hold them, OSError if a file cannot be written.
+    Columns have the names of history.csv, events.csv and links.csv, with their units. Declared shared variables have
+    the table "shared". Raise RecordFileError if the record has no rows, FolderError if the format cannot hold them,
+    OSError if a file cannot be written.
     """
     emulated = any(counts.sent for counts in record.link_counts().values())
     if to == "csv":
@@ -89,7 +89,7 @@ def _mat(tables: dict[str, pd.DataFrame]) -> bytes:
     for name, table in tables.items():
         fields = [re.sub(r"^(?=[^A-Za-z])", "x", re.sub(r"\W", "_", column)) for column in table]
         if len(set(fields)) < len(fields):
-            raise FolderError(f"{name}: in MATLAB two of its columns would have one name; use --to parquet or csv")
+            raise FolderError(f"{name}: two of its columns would have the same name in MATLAB; use --to parquet or csv")
         columns = [table[column] for column in table]
         arrays = [it.to_numpy(it.dtype if it.dtype.kind in "fi" else "U") for it in columns]
         structs[name] = dict(zip(fields, arrays, strict=True))

@@ -1,4 +1,4 @@
-"""The results of a run: tables, figures and verdicts, read from its folder."""
+"""Results of a run: tables, figures and verdicts, read from its folder."""
 
 from __future__ import annotations
 
@@ -42,18 +42,18 @@ if TYPE_CHECKING:
 
 
 class _FromFolder:
-    """What one case and all cases of a run share."""
+    """The common part of `Result` and `Results`."""
 
     def __init__(self, folder: RunFolder, spec: model.ScenarioModel, feeder: Tables) -> None:
         self._folder, self._feeder = folder, feeder
         self.spec = spec
-        """The scenario as it was run."""
+        """Scenario of the run, as typed values."""
         self.folder = folder.path
         """Folder with the files of the run (docs/reference/files-and-export.md)."""
 
     @property
     def numbers(self) -> dict[str, Any]:
-        """The content of metrics.json."""
+        """Content of metrics.json."""
         return self._folder.numbers
 
     @property
@@ -63,12 +63,12 @@ class _FromFolder:
 
     @property
     def report(self) -> str:
-        """Text that `gridpeers run` prints at the end, of all cases; it names the folder if that stays."""
+        """Report on all cases, as `gridpeers run` writes it; it names the folder if that is permanent."""
         return self._folder.read("report.txt", lambda file: file.read_text(encoding="utf-8"))
 
 
 class Results(_FromFolder, Mapping[str, "Result"]):
-    """Results of several cases of one run, by case; made by `Scenario.run()` and `gridpeers.read`."""
+    """Mapping from case to `Result`, for one run; `Scenario.run` and `gridpeers.read` return it."""
 
     def __init__(self, folder: RunFolder, spec: model.ScenarioModel, feeder: Tables) -> None:
         super().__init__(folder, spec, feeder)
@@ -87,25 +87,25 @@ class Results(_FromFolder, Mapping[str, "Result"]):
 
     @property
     def metrics(self) -> pd.DataFrame:
-        """Metrics of all cases, a row per (case, window)."""
+        """Metrics of all cases: a row per (case, window)."""
         frame = pd.concat({case: result.metrics for case, result in self.items()}, names=["case"])
         frame.attrs["units"] = next(iter(self.values())).metrics.attrs["units"]
         return frame
 
     @cached_property
     def saved_verdicts(self) -> Mapping[str, tuple[CheckVerdict, ...]]:
-        """Verdicts of the checks by case, as the run judged them; empty for a run without them."""
+        """Verdicts of the checks by case, as the run saved them; empty without any."""
         file = self.folder / check_verdict.FILE
         return self._folder.read(file.name, check_verdict.read_verdicts) if file.exists() else {}
 
     @property
     def checks(self) -> pd.DataFrame:
-        """Verdicts of the checks of all cases, a row per (case, check)."""
+        """Verdicts of the checks of all cases: a row per (case, check)."""
         return pd.concat({case: result.checks for case, result in self.items()}, names=["case"])
 
     @property
     def failures(self) -> pd.DataFrame:
-        """Laws that failed, a row each: case, t (s), agent, and why; empty if none did."""
+        """Failed laws, a row each: case, t (s), agent, why; empty without failures."""
         return frames.failures_frame({case: law_failures(result.plant_events) for case, result in self.items()})
 
     @property
@@ -114,15 +114,15 @@ class Results(_FromFolder, Mapping[str, "Result"]):
         return {case: result.sha256 for case, result in self.items()}
 
     def plot(self, figure: str = "overview") -> Figure:
-        """Draw all cases in one figure of the run folder; ValueError names those that there are.
+        """Draw all cases in one figure.
 
-        "overview", "frequency", "MPSI", "V_error", "MQSI", "voltage", "power_GFM", "power_GFL", and those that belong
-        to the events of this scenario.
+        The figures are "overview", "frequency", "MPSI", "V_error", "MQSI", "voltage", "power_GFM", "power_GFL", shared
+        quantities by name, and those for the events of the scenario. For another name, a ValueError lists them.
         """
         return _draw(self.drawing(self._results), figure)
 
     def save(self, folder: str | Path) -> Path:
-        """Write the run folder as the command does, figures included, into a new or empty folder; return its path."""
+        """Write the run folder with its figures into a new or empty folder, and return its path."""
         from gridpeers.scenarios.results.plots.run_figures import draw_all
 
         new = new_home(folder)
@@ -138,12 +138,12 @@ class Results(_FromFolder, Mapping[str, "Result"]):
 
     @cached_property
     def findings(self) -> Findings:
-        """The measures as claims judge them."""
+        """Measures, as a claim gets them."""
         return find({case: result.checked_case for case, result in self.items()})
 
     @property
     def verdicts(self) -> tuple[Verdict, ...]:
-        """Claims of the scenario's benchmark, and its own, judged; none in a live run, or one that people changed."""
+        """Verdicts on the claims of the benchmark and of the scenario; empty for a live or changed run."""
         if self.driver == LIVE or any(self._folder.numbers_of(case).get("commands") for case in self):
             return ()
         claims = benchmark_of(self.spec.paper).claims
@@ -159,7 +159,7 @@ class Results(_FromFolder, Mapping[str, "Result"]):
 
 
 class Result(_FromFolder):
-    """Result of one case; made by `Scenario.run(case)` and `gridpeers.read`. Tables are read when first asked for."""
+    """Result of one case; `Scenario.run` and `gridpeers.read` return it. It reads a table at the first use."""
 
     def __init__(self, folder: RunFolder, spec: model.ScenarioModel, feeder: Tables, run: Results, case: str) -> None:
         super().__init__(folder, spec, feeder)
@@ -169,7 +169,7 @@ class Result(_FromFolder):
 
     @cached_property
     def record(self) -> History:
-        """The recorded rows as numpy arrays, by quantity."""
+        """Recorded rows as numpy arrays, by quantity."""
         return self._folder.recorded(self.case, lambda record: record.physics())
 
     @cached_property
@@ -178,9 +178,9 @@ class Result(_FromFolder):
         return self.record.frame()
 
     def quantity(self, name: str) -> pd.DataFrame:
-        """One quantity over time, a column for each inverter: f, P, Q, V, P_set or V_set, or one that the law shares.
+        """Return f, P, Q, V, P_set, V_set or a shared quantity over time: a column per inverter, index t (s).
 
-        Its unit is in `attrs["units"]`. RecordFileError if no law shared it, or the run was not recorded.
+        The unit is in `attrs["units"]`. Raise RecordFileError if no law shared it, or the run was not recorded.
         """
         if name in UNITS and name != "t":
             frame: pd.DataFrame = self.history.xs(name, axis=1, level="quantity")
@@ -190,14 +190,14 @@ class Result(_FromFolder):
 
     @cached_property
     def metrics(self) -> pd.DataFrame:
-        """Metrics, a row per window; nan with a reason (column `reasons`) where there is no steady value."""
+        """Metrics: a row per window; nan without a steady value, with the reason in the column `reasons`."""
         return frames.metrics_frame(frames.windows_of(self._folder.numbers_of(self.case)))
 
     @cached_property
     def islands(self) -> pd.DataFrame:
-        """Metrics of each island, a row per (window, island); empty where there never are several.
+        """Metrics of each island: a row per (window, island); empty if the run never has several islands.
 
-        An island is known by its first inverter. What is shared has no value over several islands together.
+        The name of an island is its first inverter. Sharing indices have no value over several islands together.
         """
         return frames.islands_frame(frames.windows_of(self._folder.numbers_of(self.case)))
 
@@ -208,7 +208,7 @@ class Result(_FromFolder):
 
     @property
     def failures(self) -> pd.DataFrame:
-        """Laws that failed, a row each, as `Results.failures`."""
+        """Failed laws, a row each, as in `Results.failures`."""
         return frames.failures_frame({self.case: law_failures(self.plant_events)})
 
     @cached_property
@@ -223,30 +223,30 @@ class Result(_FromFolder):
 
     @cached_property
     def plant_events(self) -> tuple[PlantEvent, ...]:
-        """Events of the plant and the agents, as they were sent."""
+        """Events of the plant and the agents, as messages."""
         return self._folder.recorded(self.case, lambda record: record.events())
 
     def decision(self, agent: str, t: float) -> Explanation:
-        """Explain the decision of an agent that was in force at a run time (s), as `gridpeers why` does.
+        """Explain the decision of an agent in force at a run time (s), as `gridpeers why` does.
 
-        RecordFileError if the run was not recorded, there was no such agent, or it had not decided by then.
+        Raise RecordFileError for an unknown agent, before its first decision, or without a record.
         """
         found: Explanation = ROOMS.resolve("explain")(self.run_record, agent, t)
         return found
 
     @cached_property
     def sha256(self) -> str:
-        """SHA-256 of the bytes of the recorded rows: equal runs have equal ones."""
+        """SHA-256 of the bytes of the recorded rows; equal runs have equal hashes."""
         return self.record.sha256
 
     @property
     def links_sha256(self) -> str:
-        """SHA-256 of all fates of messages on emulated links; "" without such links."""
+        """SHA-256 of all fates of messages on emulated links; empty without such links."""
         return str(self._folder.numbers_of(self.case).get("links_sha256", ""))
 
     @cached_property
     def checked_case(self) -> CheckedCase:
-        """The case as metrics and checks see it: what a check of one's own is called with."""
+        """The case as a check gets it."""
         measured = frames.windows_of(self._folder.numbers_of(self.case))  # a live run need not reach all events
         return CheckedCase(
             scenario=self.spec,
@@ -261,25 +261,22 @@ class Result(_FromFolder):
 
     @cached_property
     def check_verdicts(self) -> tuple[CheckVerdict, ...]:
-        """Verdicts of the checks, each with its violations; judged now if the run saved none.
-
-        docs/reference/measures-and-checks.md defines the checks.
-        """
+        """Verdicts of the checks with all violations (docs/reference/measures-and-checks.md)."""
         saved = self._run.saved_verdicts
         return saved[self.case] if self.case in saved else judge_case(self.checked_case)
 
     @cached_property
     def checks(self) -> pd.DataFrame:
-        """Verdicts of the checks, a row per check: status, number of violations, and the first one or the reason."""
+        """Verdicts of the checks: a row per check with status, number of violations, and the first one or a reason."""
         return frames.checks_frame(self.check_verdicts)
 
     @property
     def verdicts(self) -> tuple[Verdict, ...]:
-        """Claims of the scenario's benchmark, judged, of all cases of the run; see `Results.verdicts`."""
+        """Verdicts on the claims, over all cases of the run, as in `Results.verdicts`."""
         return self._run.verdicts
 
     def plot(self, figure: str = "overview") -> Figure:
-        """Draw the case, as `Results.plot`."""
+        """Draw the case in one figure, as `Results.plot` does."""
         return _draw(self.drawing(), figure)
 
     def drawing(self) -> Drawing:
@@ -287,7 +284,7 @@ class Result(_FromFolder):
         return self._run.drawing({self.case: self})
 
     def save(self, folder: str | Path) -> Path:
-        """Write the run folder as the command does, with all cases of the run; see `Results.save`."""
+        """Write the run folder with all cases of the run, as `Results.save` does."""
         return self._run.save(folder)
 
     def __repr__(self) -> str:
@@ -302,7 +299,7 @@ def _draw(drawing: Drawing, name: str) -> Figure:
 
 
 def shown_in_notebooks() -> None:
-    """Have a notebook show a figure that is the value of a cell as a picture, also without pyplot."""
+    """Let a notebook show a figure as a picture when it is the value of a cell, also without pyplot."""
     shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
     if shell is None:
         return

@@ -1,4 +1,4 @@
-"""The folder of a run as Python reads it; a temporary one goes with its results if nobody has asked to keep it."""
+"""Read the folder of a run; a temporary one disappears with its results."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ T = TypeVar("T")
 
 
 class RunFolder:
-    """A run folder; a temporary one is removed when nobody holds a result of it any more."""
+    """A run folder; a temporary one is removed with the last result of it."""
 
     def __init__(self, path: Path, *, temporary: bool = False) -> None:
         self.path = path
@@ -36,7 +36,7 @@ class RunFolder:
             self._removal.detach()
 
     def read(self, name: str, reader: Callable[[Path], T]) -> T:
-        """Read a file of the run, which somebody may have removed or changed since."""
+        """Read a file of the run, which may be removed or changed by now."""
         file = self.path / name
         try:
             return reader(file)
@@ -53,7 +53,7 @@ class RunFolder:
         return self._records[case]
 
     def recorded(self, case: str, read: Callable[[RunRecord], T]) -> T:
-        """Read something from the record of a case, which a run that came to its end has whole."""
+        """Read from the record of a case; a finished run has it whole."""
 
         def whole(_: Path) -> T:
             found = read(record := self.record(case))

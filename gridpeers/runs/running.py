@@ -1,4 +1,4 @@
-"""Run a scenario from Python, or open the folder of a run that somebody made: both give `Results`."""
+"""Run a scenario from Python, or open a run folder: both give `Results`."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class How(Pace, total=False):
-    """Options of a run beside its driver; `gridpeers.Scenario.run` explains them."""
+    """Options of a run beside its driver, as in `gridpeers.Scenario.run`."""
 
     progress: Progress | None
     folder: str | Path | None
@@ -53,7 +53,7 @@ def run(
         try:
             home = RunFolder(Path(tempfile.mkdtemp(prefix="gridpeers-")), temporary=True)
         except OSError as error:
-            text = f"there is nowhere for temporary files: {error.strerror}; say folder=..., or set TMPDIR"
+            text = f"no place for temporary files: {error.strerror}; give folder=..., or set TMPDIR"
             raise FolderError(text) from error
     lasting = folder is not None
     request = Request(scenario=spec, feeder=scenario.feeder, driver=driver, folder=home.path, lasting=lasting, **pace)
@@ -61,7 +61,7 @@ def run(
         report = run_request(request, progress or (lambda case, t, end: None))
     except BrokenRunError as error:
         home.keep()
-        raise type(error)(f"{error}; what came until then is in {home.path}") from error
+        raise type(error)(f"{error}; the files up to then are in {home.path}") from error
     warn_of_laws({case: first_of(failures) for case, failures in report.failures.items()}, depth=2)
     return Results(home, spec, scenario.feeder)
 
@@ -74,17 +74,17 @@ def warn_of_laws(failed: Mapping[str, str], depth: int) -> None:
 
 
 def read(folder: str | Path) -> Result | Results:
-    """Open the folder of a run, whoever made it: `Result.save`, `gridpeers run` or `gridpeers up`.
+    """Open a run folder that `Result.save`, `gridpeers run` or `gridpeers up` wrote.
 
-    It gives a `Result` if the run has one case. FolderError if it is no folder of a run that came to its end.
+    Return a `Result` if the run has one case, else `Results`. Raise FolderError if the folder has no finished run.
     """
     path = as_folder(folder)
     if not (path / "status.txt").is_file():
         hint = f"; {path / 'latest'} is one" if (path / "latest" / "status.txt").is_file() else ""
-        raise FolderError(f"{folder}: this is no folder of a run, which has a file status.txt{hint}")
+        raise FolderError(f"{folder}: not a run folder, because it has no status.txt{hint}")
     status = (path / "status.txt").read_text(encoding="utf-8", errors="replace").strip()
     if not is_complete(status):
-        raise FolderError(f'{folder}: the run has no results: its status is "{status}"')
+        raise FolderError(f'{folder}: the run has no results; its status is "{status}"')
     try:
         text, tables = read_toml(path / "scenario.toml")
         problems = Problems(str(path / "scenario.toml"), text)

@@ -1,4 +1,4 @@
-"""One scenario run many times over values of its keys, into one pandas table."""
+"""Sweeps: one scenario, run over values of its keys, into one pandas table."""
 
 from __future__ import annotations
 
@@ -37,28 +37,29 @@ def sweep(
     jobs: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> pd.DataFrame:
-    """Run a scenario over values of its keys, and return a row per run.
+    """Run a scenario over values of its keys, and return a table with a row per run.
 
-    Its columns are case, seed, the varied keys, `status` ("ran", "broke" or "law failed") and `why`, the metrics as
-    "WINDOW.METRIC" (nan where there is no value), and without `metrics` also `history_sha256` and the like. Units are
-    in its `attrs`. ScenarioError has everything that is wrong with the values, before anything is run; WorkersError
-    if a worker has gone.
+    The columns are case, seed, the varied keys, `status` ("ran", "broke" or "law failed"), `why`, and the metrics as
+    "WINDOW.METRIC" (nan without a value); without `metrics` also hashes such as `history_sha256`. Units are in `attrs`.
+    A ScenarioError lists every wrong value before the first run. Raise WorkersError if a worker process ends early.
 
     Parameters
     ----------
     grid : Mapping[str, Iterable], optional
         Values by the dotted path of a key, as in `Scenario.replace`; every combination is run.
     zip : Mapping[str, Iterable], optional
-        Keys whose values go together, first with first.
+        Keys whose values vary together, first with first.
+    cases : str or list of str, optional
+        Cases to run; all by default.
     seeds : int
-        How many seeds every point is run with: the scenario's, and those that follow it.
-    metrics : iterable, optional
-        Metrics to keep, e.g. `["MPSI", "t_restore_s"]`, of every window; all when left out. One of your own is a
+        Number of seeds for each point: the scenario's seed and the next ones.
+    metrics : list, optional
+        Metrics to keep, such as `["MPSI", "t_restore_s"]`, of every window; all by default. A metric of your own is a
         function of a window, its registered name, `module:Name`, or a table with `use` and parameters.
     jobs : int, optional
-        Processes; one per core when left out. More than one needs joblib, of the extra `sweep`.
+        Number of processes; one per core by default. More than one needs joblib (extra `sweep`).
     progress : Callable[[int, int], None], optional
-        Takes the number of runs that are done, and of all runs.
+        Gets the number of finished runs and of all runs.
     """
     known = as_scenario(scenario)
     checked, chosen = _with_metrics(known, metrics)

@@ -51,9 +51,9 @@ def test_a_saved_run_is_read_back_the_same_and_has_its_figures(run: gp.Result, t
     assert again.report.endswith(f"Results: {tmp_path / 'kept'}/\n")
 
 
-def test_what_is_no_finished_run_is_not_read(tmp_path: Path) -> None:
-    """A folder of something else, and one of a run that broke, are told in one line."""
-    with pytest.raises(gp.FolderError, match="no folder of a run"):
+def test_a_folder_without_a_finished_run_is_refused(tmp_path: Path) -> None:
+    """Another folder, and the folder of a broken run, are errors of one line."""
+    with pytest.raises(gp.FolderError, match="not a run folder"):
         gp.read(tmp_path)
     with pytest.raises(gp.FolderError, match="needs the path of a folder, got"):
         gp.read("x" * 5000)
@@ -134,5 +134,5 @@ def test_a_machine_without_room_for_temporary_files_is_told(
         raise FileNotFoundError(2, "No usable temporary directory found")
 
     monkeypatch.setattr("tempfile.mkdtemp", refuse)
-    with pytest.raises(ValueError, match="there is nowhere for temporary files: No usable temporary directory found"):
+    with pytest.raises(ValueError, match="no place for temporary files: No usable temporary directory found"):
         scenario.run("I")

@@ -64,8 +64,8 @@ def test_numpy_values_and_classes_become_what_a_file_would_hold() -> None:
         gp.load("islanding").replace({"case.IV.graph": Counter})
 
 
-def test_what_no_file_can_hold_is_refused_with_its_key() -> None:
-    """An object without a value, and a class that nobody can import, are problems as all others."""
+def test_a_value_that_no_file_can_hold_is_refused_with_its_key() -> None:
+    """An object without a value and a class inside a function are two problems."""
 
     class Inside:
         pass
@@ -73,13 +73,13 @@ def test_what_no_file_can_hold_is_refused_with_its_key() -> None:
     with pytest.raises(gp.ScenarioError) as caught:
         gp.load("islanding").replace({"seed": object(), "title": Inside})
 
-    assert "replace: seed: a value of type object" in str(caught.value)
+    assert "replace: seed: a scenario cannot hold a value of type object" in str(caught.value)
     assert "replace: title: " in str(caught.value)
     assert "defined inside a function" in str(caught.value)
 
 
 def test_every_argument_of_a_run_has_its_text_and_the_command_its_option() -> None:
-    """A new one that is forgotten in one of the places is found here; an unknown one is refused."""
+    """A new argument without text or option fails here; an unknown one is refused."""
     text, options = gp.Scenario.run.__doc__ or "", inspect.signature(command).parameters
 
     assert [name for name in How.__annotations__ if f"\n        {name} : " not in text] == []

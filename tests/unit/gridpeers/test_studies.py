@@ -114,10 +114,10 @@ def test_the_command_compare_prints_the_table_and_draws_both(
     Path("two").rename("latest")
     code, text = invoke("compare", "one", ".")
     assert code == 2
-    assert text == "gridpeers: .: this is no folder of a run, which has a file status.txt; latest is one\n"
+    assert text == "gridpeers: .: not a run folder, because it has no status.txt; latest is one\n"
     code, text = invoke("compare", "one", "nowhere")
     assert code == 2
-    assert text == "gridpeers: nowhere: this is no folder of a run, which has a file status.txt\n"
+    assert text == "gridpeers: nowhere: not a run folder, because it has no status.txt\n"
 
 
 def test_runs_without_a_common_case_are_not_compared(runs: gp.Results) -> None:
