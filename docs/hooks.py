@@ -133,9 +133,10 @@ def _docstring(text: str | None) -> Iterator[str]:
 
 
 def _plain(text: str) -> str:
-    """Return text in which nothing but code is markup."""
+    """Return text in which nothing but code is markup, and a path of a page a link; all parts are in one folder."""
     parts = re.split(r"(`[^`]*`)", text)
-    return "".join(part if part[:1] == "`" else re.sub(r"([*_<\[])", r"\\\1", part) for part in parts)
+    plain = (part if part[:1] == "`" else re.sub(r"([*_<\[])", r"\\\1", part) for part in parts)
+    return re.sub(r"(?<!`)docs/([\w/-]+\.md)", r"[\1](../\1)", "".join(plain))
 
 
 def _topic(topic: str) -> Iterator[str]:
@@ -193,4 +194,10 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
     """Put generated parts in, show a file's name as the title of its block, and drop the comments for the tests."""
     markdown = re.sub(r"^<!-- *generated: *(.*?) *-->$", lambda found: part(found[1]), markdown, flags=re.M)
     markdown = re.sub(r"^( *)<!-- *file: *(.*?) *-->\n(\s*```\w+)", r'\3 title="\2"', markdown, flags=re.M)
+    markdown = re.sub(r"^\|.*", lambda row: re.sub(r"`[^`]+`", _unescaped, row[0]), markdown, flags=re.M)
     return re.sub(r"^ *<!-- *(skip|exit|file):.*?-->\n", "", markdown, flags=re.M | re.S)
+
+
+def _unescaped(code: re.Match[str]) -> str:
+    """Return code of a table as mkdocs wants it: GitHub needs a backslash before a bar, and mkdocs would show it."""
+    return code[0].replace("\\|", "|")
