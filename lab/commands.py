@@ -42,7 +42,7 @@ def predict(
 
     That is modes, settling times, limits of step and delay, and times to restore after each event.
     Nothing is run but the plant on droop alone, to learn the load of each event and how vars answer to V_set.
-    docs/theory.md has the equations, and how far they met the plant.
+    docs/understand/findings.md has the equations, and how far they met the plant.
 
     Example:  gridpeers predict islanding --case IV
     """

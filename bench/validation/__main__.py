@@ -1,6 +1,6 @@
 """The plant beside other simulators: python -m bench.validation [PART ...].
 
-It prints the tables of docs/validation.md. Exit code: 0 all limits are kept, 1 one is broken, 2 a part cannot run.
+docs/understand/evidence.md sums up its tables. Exit code: 0 all limits are kept, 1 one is broken, 2 a part cannot run.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from bench.validation.random_feeders import RANDOM_FEEDERS
 from bench.validation.validation_part import CaseResult, ValidationPart
 
 PARTS = {part.name: part for part in (POWER_FLOW, GRIDLABD, AUTOTESTS, GRID_FORMING, RANDOM_FEEDERS)}
-"""In the order of the page."""
+"""In the order in which they run."""
 
 
 def main(

@@ -5,7 +5,7 @@ With y = m_p P_set, K = diag(kappa), the Laplacian L, leaders g and the quasi-st
 
 .. math:: \dot y = -K (L + g w^T) y + \mathrm{const}
 
-Equations and limits are those of docs/theory.md, which has the sources.
+docs/understand/findings.md sums up equations and limits.
 """
 
 from __future__ import annotations
@@ -115,7 +115,7 @@ def _zeroed(value: float) -> float:
 def delay_limit_closed(inverters: InverterGroup, kind: DelayKind) -> float:
     """Return the longest delay (s) with which the continuous law is stable, the same on every link.
 
-    - "neighbours": infinite on every graph (Atay 2013 without leaders; with them docs/theory.md).
+    - "neighbours": infinite on every graph (Atay 2013, without leaders).
     - "disagreement": pi / (2 kappa lambda_max), Olfati-Saber and Murray (2004).
     - "local loop": about pi / (2 slowest rate), as of one integrator with delay; pi N / (2 kappa n_L) when sharing is
       fast.
@@ -217,6 +217,7 @@ def robustness_notes(scenario: ScenarioModel, feeder: Tables) -> Iterator[str]:
         found = robustness(inverters.A[np.ix_(inverters.acts, inverters.acts)])
         if found.F < F:
             yield (
-                f"case {case}: W-MSR with F = {F} asks for a graph with r {2 * F + 1}, and this one has {found}: even "
-                f"without liars its agents may never agree; take more links, or F = {found.F} (docs/hostile.md)"
+                f"case {case}: W-MSR with F = {F} needs a graph with r {2 * F + 1}, and this one has {found}: even "
+                f"without liars its agents may never agree; use more links, or "
+                f"F = {found.F} (docs/understand/findings.md)"
             )

@@ -166,7 +166,7 @@ class Response:
               T_{ff} \dot\phi = f - \phi, \quad T_{pf} \dot\pi_j = y_j - \phi - \pi_j
 
     Left out: power limits, voltages (loads are constant power), the angles' swing among the GFM, current controllers,
-    dead bands. Without the lags ("quasi-steady") e = sum w_i y_i - l, docs/theory.md's plant.
+    dead bands. Without the lags ("quasi-steady") e = sum w_i y_i - l.
     """
 
     A: Floats

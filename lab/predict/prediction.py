@@ -1,4 +1,4 @@
-"""Predictions by theory of the cases of a scenario before it is run (docs/theory.md): as numbers, tables and text."""
+"""Predictions by theory for the cases of a scenario (docs/understand/findings.md), as numbers, tables and text."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What theory says of a scenario, part by part; `gridpeers.predict` has all of it for one case (docs/theory.md).
+"""The theory of a scenario, part by part; `gridpeers.predict` has all of it for one case (docs/understand/findings.md).
 
 The functions take what a scenario holds: its keys as typed values (`Scenario.spec`) and its feeder (`Scenario.feeder`).
 """

@@ -19,13 +19,13 @@ from gridpeers.papers.singhal2022.tables import (
 )
 
 EVENT, RETURN = "event1", "return"
-"""Labels of the events in the scenario; the paper has the first alone."""
+"""Labels of the events in the scenario; the paper has only the first."""
 
 ROWS = ("full", "reduced", "link-failure")
 """Rows of Table IV."""
 
 UNTUNED, ADAPTIVE = "untuned", "adaptive"
-"""The reduced graph with the gains of the full one, and with an alpha that adapts; the paper has no such rows."""
+"""The reduced graph with the gains of the full one, and with an adaptive alpha; the paper has neither."""
 
 communication = ExperimentClaims("communication", figure="communication", events=(EVENT,))
 communication.column("IV", "f_error_Hz")
@@ -35,7 +35,7 @@ communication.relative("IV")
 
 
 @communication.add(
-    f"MQSI: full, then link failure, then reduced, and that below {REDUCED_MQSI:g}",
+    f"MQSI rises from full to link failure to reduced, and stays below {REDUCED_MQSI:g}",
     source="Table IV",
     figure="",
     cases=ROWS,
@@ -62,7 +62,7 @@ def re_tuning_pays(found: Findings) -> tuple[bool, str]:
 
 
 @communication.add(
-    "an alpha that grows with the voltage error shares vars better still, at the same V_error",
+    "an alpha that grows with the voltage error shares vars still better, at the same V_error",
     source="ours: the paper mentions adaptive weights and gives none",
     cases=("reduced", ADAPTIVE),
     measures=("MQSI", "V_error"),
@@ -92,16 +92,16 @@ def same_steady_state(found: Findings) -> tuple[bool, str]:
     "reduced needs about 0.5 s more for power sharing to converge",
     source="section 4, figure of reduced communication",
     cases=("full", "reduced"),
-    known_miss="islanding starts from equal powers, so nearly nothing is left to share and the frequency decides, "
-    "which fewer neighbours hold back less; from unequal powers it does hold, see next (docs/reproduction.md)",
+    known_miss="islanding starts from equal powers, so little is left to share; from unequal powers the claim holds, "
+    "see the next one (docs/understand/evidence.md)",
 )
 def reduced_is_slower(found: Findings) -> tuple[bool, str]:
     return _slower(found, EVENT)
 
 
 @communication.add(
-    "the same where powers are unequal: inverter 2 has returned at no load",
-    source="ours: the paper does not tell what its figure starts from",
+    "the same from unequal powers, as inverter 2 returns at no load",
+    source="ours: the paper does not state the first powers of its figure",
     cases=("full", "reduced"),
     events=(RETURN,),
 )
@@ -123,7 +123,7 @@ class GraphRun:
 
     links: int
     connected: bool
-    """Whether there is a way between any two inverters; a graph with links enough may still lack one."""
+    """Whether a path joins any two inverters; a graph with enough links may lack one."""
     settled: Settling
     steady: Steady
 
@@ -145,7 +145,7 @@ def connected(found: Findings) -> tuple[GraphRun, ...]:
 
 
 TREE, BEND = 8, FEW_LINKS
-"""Links of a tree of nine inverters, with fewer of which no graph is connected; and where the paper's curve bends."""
+"""Links of a tree of nine inverters, the least of a connected graph; and of the bend of the paper's curve."""
 
 topology = ExperimentClaims("topology", source="section 4, figure of topologies", figure="topology")
 
@@ -167,7 +167,7 @@ def more_links_are_faster(found: Findings) -> tuple[bool, str]:
     return times[last] < times[BEND] < times[first], shown
 
 
-@topology.add("it rises slowly from 36 down to about 12 links, and sharply toward 8")
+@topology.add("it rises slowly from 36 to about 12 links, and sharply from there to 8")
 def steepest_at_few_links(found: Findings) -> tuple[bool, str]:
     times = medians(connected(found))
     last = max(times)

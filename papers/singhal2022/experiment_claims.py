@@ -42,7 +42,7 @@ class ExperimentClaims:
         self._near(number, quantity, "", bound, Cell.within)
 
     def relative(self, number: TableNumber, known_miss: str = "") -> None:
-        """Add the claim that all V_error of a table are near the paper's beside their own size."""
+        """Add the claim that all V_error of a table are near the paper's, in proportion to their size."""
         bound = f"{100 * V_RELATIVE:g} % of Table {number}'s"
         self._near(number, "V_error", "_relative", bound, Cell.within_relative, known_miss)
 
@@ -59,14 +59,14 @@ class ExperimentClaims:
 
         def lacking(found: Findings) -> str:
             absent = [cell for cell in cells if not found.has(cell)]
-            return f"there is no such number: {absent[0].where}" if absent else ""
+            return f"this number is missing: {absent[0].where}" if absent else ""
 
         def judge(found: Findings) -> tuple[bool, str]:
             off = {cell: abs(found.value(cell) - cell.paper) for cell in cells}
             worst = max(cells, key=lambda cell: math.inf if math.isnan(off[cell]) else off[cell])
             near = sum(bool(within(cell, found.value(cell))) for cell in cells)
             some = f"{near} of {len(cells)}, " if near < len(cells) else ""
-            return near == len(cells), f"{some}at most off by {off[worst]:.4f}{UNITS[quantity]} ({worst.where})"
+            return near == len(cells), f"{some}largest difference {off[worst]:.4f}{UNITS[quantity]} ({worst.where})"
 
         claim = Claim(
             name=f"table_{number}_{quantity}{suffix}",
@@ -96,5 +96,5 @@ def listed(values: Iterable[tuple[str, str]]) -> str:
 
 
 def seconds(t: float | None) -> str:
-    """Write a time that may never come."""
+    """Write a time, or "never"."""
     return "never" if t is None else f"{t:.2f} s"

@@ -38,7 +38,7 @@ def experiment(
     """Run an experiment on late, lossy or broken links.
 
     It writes its figure and table, with theory beside.
-    A sweep that was interrupted goes on by the same command. docs/experiments.md tells what was found.
+    A sweep that was interrupted goes on by the same command. docs/understand/findings.md has the findings.
 
     Example:  gridpeers experiment delay
     """

@@ -1,7 +1,7 @@
-"""Benchmarks: the paper's numbers and claims for each experiment, and how near ours are, in a few lines.
+"""Benchmarks: the paper's numbers and claims for each experiment, and a summary of our distance from them.
 
-An experiment is named in the scenario's key `paper`. The lines leave nothing out: judged, not judged, beside its own
-size.
+The scenario's key `paper` names the experiment. The summary counts every number: with a tolerance, without one, and
+V_error in proportion to its size.
 """
 
 from __future__ import annotations
@@ -30,39 +30,39 @@ def numbers(found: Findings, tables: Iterable[PaperTable]) -> list[ComparedNumbe
 
 
 def within(all_numbers: Iterable[ComparedNumber], judge: Callable[[Cell, float], bool | None]) -> tuple[int, int]:
-    """Return how many numbers pass a judgement, and how many it is about."""
+    """Return the number of those that pass a judgement, and of those that it judges."""
     passed = [judge(cell, ours) for cell, ours in all_numbers]
     return sum(map(bool, passed)), sum(verdict is not None for verdict in passed)
 
 
 def headline(all_numbers: Sequence[ComparedNumber]) -> list[str]:
-    """Return lines on numbers within their tolerance, numbers that have none, and V_error beside its own size."""
+    """Return lines on numbers with a tolerance, on those without, and on V_error in proportion to its size."""
     lines = []
     near, judged = within(all_numbers, Cell.within)
     if judged:
         named = _tables(all_numbers)
-        lines.append(f"{near} of the {judged} numbers of {named} that are judged by a tolerance are within it.")
+        lines.append(f"{near} of the {judged} numbers of {named} that have a tolerance are within it.")
     if left := [number for number in all_numbers if number.cell.tolerance.value is None]:
         near, _ = within(left, Cell.within_factor)
         times = [ours / cell.paper for cell, ours in left if not math.isnan(ours)]
-        times_off = f"they are {min(times):.2g} to {max(times):.2g} times the paper's, " if times else ""
+        times_off = f"{min(times):.2g} to {max(times):.2g} times the paper's, " if times else ""
         far = _farthest(left, lambda cell, ours: abs(math.log(ours / cell.paper)) if ours > 0.0 else math.inf)
         lines.append(
-            f"The other {len(left)}, all MQSI of {_tables(left)}, are not judged by a tolerance: {times_off}"
-            f"{near} of {len(left)} within a factor of {MQSI_FACTOR:g}; farthest off: {far}."
+            f"The other {len(left)}, all MQSI of {_tables(left)}, have no tolerance: {times_off}"
+            f"{near} of {len(left)} within a factor of {MQSI_FACTOR:g}; largest difference: {far}."
         )
     if about := [number for number in all_numbers if number.cell.relative is not None]:
         near, judged = within(about, Cell.within_relative)
         far = _farthest(about, lambda cell, ours: abs(ours - cell.paper) / (cell.relative or math.nan))
         lines.append(
-            f"V_error beside its own size: {near} of {judged} within {100 * V_RELATIVE:g} % of the paper's number or "
-            f"half of its last digit; farthest off: {far}."
+            f"V_error in proportion: {near} of {judged} within {100 * V_RELATIVE:g} % of the paper's number or half of "
+            f"its last digit; largest difference: {far}."
         )
     return lines
 
 
 def _farthest(some: Sequence[ComparedNumber], off: Callable[[Cell, float], float]) -> str:
-    """Return the number that is farthest off, ours for the paper's; one that is no number is farther than all."""
+    """Return the number with the largest difference, ours for the paper's; NaN comes before all others."""
     cell, ours = max(some, key=lambda one: math.inf if math.isnan(one.ours) else off(*one))
     shown = "not steady" if math.isnan(ours) else f"{ours:.{cell.digits + 1}f}"
     return f"{shown} for {cell.paper:.{cell.digits}f} (Table {cell.table}, {cell.where})"
@@ -83,7 +83,7 @@ CLAIMS: dict[str, tuple[Claim, ...]] = {
     "switching": plant_claims.switching.all,
     "wind-up": plant_claims.wind_up.all,
 }
-"""Claims by experiment, named as in the scenario's key `paper`; the topologies are a sweep and have no scenario."""
+"""Claims by the scenario's key `paper`; "topology" is a sweep without a scenario."""
 
 
 def _benchmark(experiment: str) -> Benchmark:

@@ -23,10 +23,10 @@ FEASIBLE = ("350kW", "275kW", "250kW", "225kW", "200kW")
 """Cases of Table III."""
 
 CUT = FEASIBLE[1:]
-"""Those of them in which power is really lost."""
+"""Those of them that lose power."""
 
 INFEASIBLE = "175kW"
-"""Below the table's last column: the others have not enough left."""
+"""Below the table's last column: the power of the others does not suffice."""
 
 intermittency = ExperimentClaims(
     "intermittency", source="section 4, Table III and figure", figure="intermittency", events=(CLOUDS,)
@@ -37,14 +37,14 @@ intermittency.column("III", "V_error")
 intermittency.relative("III")
 
 
-@intermittency.add("inverters 2, 5 and 8 give what they have", cases=CUT, measures=("p",))
+@intermittency.add("inverters 2, 5 and 8 deliver their available power", cases=CUT, measures=("p",))
 def saturated_at_their_limit(found: Findings) -> tuple[bool, str]:
     limits = [(case, name, limit) for case in CUT for name, limit in found.available[case].items()]
     off = max((abs(found.results[case][CLOUDS].p[name] - limit) for case, name, limit in limits), default=float("inf"))
     return off < AT_LIMIT, f"at most {off:.4f} pu off their limits"
 
 
-@intermittency.add("the others take over alike, and 60 Hz returns", cases=CUT, measures=("f_error_Hz", "p"))
+@intermittency.add("the others take over equally, and 60 Hz returns", cases=CUT, measures=("f_error_Hz", "p"))
 def others_take_over(found: Findings) -> tuple[bool, str]:
     others = [_others(found, case) for case in CUT]
     spread = max(max(p) - min(p) for p in others)
@@ -68,7 +68,7 @@ def MQSI_unmoved(found: Findings) -> tuple[bool, str]:
 
 
 @intermittency.add(
-    "below 200 kW the headroom of the others is used up",
+    "below 200 kW the others reach their limits",
     cases=(INFEASIBLE,),
     measures=("p",),  # the frequency falls: that is the claim
 )
@@ -85,19 +85,19 @@ def _others(found: Findings, case: str) -> list[float]:
 
 WIND_UP_CASES = ("none", "clamp", "conditional")
 SUN = "sun"
-"""Label of the event from which on power is there again; it is short from `CLOUDS` on."""
+"""Label of the event that ends the lack of power; `CLOUDS` begins it."""
 
 wind_up = ExperimentClaims("wind-up", source="ours, on Remark 2", figure="wind-up", cases=WIND_UP_CASES)
 
 
-@wind_up.add("set-points without limits hold the frequency up while power is short", events=(CLOUDS,))
+@wind_up.add("without limits, set-points hold the frequency up while power is short", events=(CLOUDS,))
 def wind_up_holds_frequency_up(found: Findings) -> tuple[bool, str]:
     errors = {case: found.results[case][CLOUDS].f_error_Hz for case in WIND_UP_CASES}  # not steady: the frequency falls
     shown = listed((case, f"{error:.2f}") for case, error in errors.items())
     return errors["none"] < min(errors["clamp"], errors["conditional"]), f"abs(f-60) {shown} Hz"
 
 
-@wind_up.add("with limits f and sharing are back within 1 s when power is, and sooner than without", events=(SUN,))
+@wind_up.add("with limits, f and sharing return within 1 s of the power, and sooner than without", events=(SUN,))
 def limits_restore_sooner(found: Findings) -> tuple[bool, str]:
     times = {case: found.results[case][SUN].t_restore_s for case in WIND_UP_CASES}
     free, *limited = times.values()
@@ -147,7 +147,7 @@ def shares_again(found: Findings) -> tuple[bool, str]:
 
 
 @plug_n_play.add(
-    f"IV: V_error below {V_FIGURE:g} pu after both",
+    f"IV: V_error below {V_FIGURE:g} pu after leave and return",
     events=(LEAVE, RETURN),
     measures=("V_error",),
 )
@@ -165,8 +165,8 @@ switching.column("V", "MPSI")
 switching.column("V", "V_error")
 switching.relative(
     "V",
-    known_miss="0.000 asks for terminals within 0.0005 pu of nominal; with equal vars those of one of our "
-    "microgrids lie 0.002 pu apart (docs/reproduction.md)",
+    known_miss="the paper prints 0.000; on our feeder the terminals within one microgrid differ by 0.002 pu "
+    "when vars are equal (docs/understand/evidence.md)",
 )
 switching.column("V", "MQSI")
 
@@ -181,7 +181,7 @@ def three_islands(found: Findings) -> tuple[bool, str]:
 
 
 @switching.add(
-    "each island shares its own load equally, at a level of its own",
+    "each island shares its own load equally, at its own level",
     source="section 4, figures of P and Q of each microgrid",
     measures=("p",),
 )

@@ -1,4 +1,4 @@
-"""The error of both methods of time stepping beside the integrated equations, the islanding alone (validation.md)."""
+"""The error of both methods of time stepping beside the integrated equations, the islanding alone."""
 
 from __future__ import annotations
 

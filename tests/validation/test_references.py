@@ -1,4 +1,4 @@
-"""The parts of docs/validation.md, each case with the limits of the page."""
+"""The parts of `python -m bench.validation`, each case with its limits."""
 
 import pytest
 
@@ -33,7 +33,7 @@ def test_the_power_flow_is_that_of_both_opendss_engines(case: str) -> None:
         assert result.facts["states"].startswith("652 of 1024,")
 
 
-# (b) the plant beside GridLAB-D, in a fifth of the page's time
+# (b) the plant beside GridLAB-D, in a fifth of the time
 @pytest.mark.parametrize("case", [name for name, run in RUNS.items() if run.in_tests])
 def test_the_plant_goes_through_a_run_as_gridlabd_does(case: str) -> None:
     """With set-points from a list and from agents, f, P, Q and V of all inverters are GridLAB-D's at each step."""

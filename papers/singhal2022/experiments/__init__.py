@@ -1,7 +1,7 @@
 """Experiments on links that are late, lossy or down: one command each to a figure and a table with theory beside.
 
 An experiment is a sweep of the catalogue, or a scenario with histories, and a function from its rows or histories to
-a page and a table. docs/experiments.md tells what was found.
+a page and a table. docs/understand/findings.md has the findings.
 """
 
 from __future__ import annotations
@@ -34,4 +34,4 @@ EXPERIMENTS: Mapping[str, Experiment] = {
     "partition": Experiment(partition, scenario="partition"),
     "hostile": Experiment(hostile, sweep="hostile"),
 }
-"""In the order of docs/experiments.md."""
+"""In the order of the list."""

@@ -43,17 +43,17 @@ class Reproduction:
 
     @property
     def failed(self) -> bool:
-        """True if a claim failed that is no known miss. A number out of its tolerance fails the claim on its column."""
+        """True if a claim failed without a known reason. A number beyond its tolerance fails its column's claim."""
         return self.counts()["FAIL"] > 0
 
     def counts(self) -> dict[str, int]:
-        """Return how many claims have which status."""
+        """Return the number of claims by status."""
         statuses = [verdict.status for verdict in self.verdicts]
         return {status: statuses.count(status) for status in dict.fromkeys(("PASS", "FAIL", "MISS", *statuses))}
 
     @property
     def claims(self) -> str:
-        """How many claims hold, in words."""
+        """The number of claims that hold, in words."""
         counts = self.counts()
         held = f"{counts['PASS']} of {len(self.verdicts)} claims hold, {counts['MISS']} missed for a known reason"
         return f"{held}, {counts['FAIL']} failed."
@@ -112,11 +112,11 @@ def tolerances(table: PaperTable) -> list[str]:
     for quantity in table.quantities:
         cell = next(cell for cell in table.cells if cell.quantity == quantity)
         value = cell.tolerance.value
-        bound = f"compared by a factor of {MQSI_FACTOR:g} only" if value is None else f"within {value:g}"
+        bound = f"only compared by a factor of {MQSI_FACTOR:g}" if value is None else f"within {value:g}"
         found.append(f"{HEADINGS[quantity]}: {bound}; {cell.tolerance.reason}")
         if cell.relative is not None:
             own_size = f"{100 * V_RELATIVE:g} % of the paper's number, or half of its last digit"
-            found.append(f"{HEADINGS[quantity]}, beside its own size: {own_size}")
+            found.append(f"{HEADINGS[quantity]}, in proportion: {own_size}")
     return found
 
 
@@ -161,7 +161,7 @@ _TEMPLATES.globals |= {
 
 
 def render(template: str, whole: Reproduction, settings: Sequence[tuple[str, str, str]]) -> str:
-    """Return the text of a report by its template in this folder; `settings` are those that are not the paper's."""
+    """Return the text of a report from its template in this folder; `settings`: those that the paper does not print."""
     data = {"whole": whole, "settings": settings, "machine": machine(), "versions": versions()}
     return _TEMPLATES.get_template(template).render(data)
 

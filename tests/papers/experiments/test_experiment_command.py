@@ -63,10 +63,10 @@ def test_a_result_is_a_figure_and_the_same_table_twice(tmp_path: Path) -> None:
     assert (tmp_path / "table.md").read_text().splitlines()[-1] == "| 1 | never |"
 
 
-def test_every_experiment_is_told_with_its_figure() -> None:
-    """docs/experiments.md has a row and the figure of each, and there is no other figure."""
-    text = (DOCS / "experiments.md").read_text(encoding="utf-8")
+def test_the_page_on_findings_has_the_command_and_the_figure_of_every_experiment() -> None:
+    """There is no other figure beside them."""
+    text = (DOCS / "understand" / "findings.md").read_text(encoding="utf-8")
 
-    assert all(f"| [`{name}`](#" in text for name in EXPERIMENTS)
+    assert all(f"`gridpeers experiment {name}`" in text for name in EXPERIMENTS)
     assert all(f"images/experiments/{name}.png" in text for name in EXPERIMENTS)
     assert {path.stem for path in (DOCS / "images" / "experiments").iterdir()} == set(EXPERIMENTS)

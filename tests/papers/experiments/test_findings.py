@@ -1,4 +1,4 @@
-"""What docs/experiments.md says was found, on short runs of the real agents and the real plant over emulated links."""
+"""The findings of docs/understand/findings.md, on short runs over emulated links."""
 
 from __future__ import annotations
 

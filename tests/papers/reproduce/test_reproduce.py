@@ -66,10 +66,10 @@ def test_every_number_verdict_and_reason_is_told(tmp_path: Path, template: str) 
     for verdict in one.verdicts:
         assert verdict.status in text
     assert "within 0.02; " in text
-    assert "compared by a factor of 2 only" in text
+    assert "only compared by a factor of 2" in text
     assert "24 of the 24 numbers" in text
     assert "The other 8, all MQSI" in text
-    assert "V_error beside its own size: 8 of 8" in text
+    assert "V_error in proportion: 8 of 8" in text
 
 
 def test_a_number_that_is_off_fails_the_whole(tmp_path: Path) -> None:

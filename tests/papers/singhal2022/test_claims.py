@@ -86,7 +86,7 @@ def test_a_V_error_is_judged_beside_its_own_size(V_error: float) -> None:
 
     assert verdict("table_II_V_error", results).status == "PASS"
     assert verdict("table_II_V_error_relative", results).status == "MISS"  # neither passed nor failed
-    assert "7 of 8, at most off by" in verdict("table_II_V_error_relative", results).found
+    assert "7 of 8, largest difference" in verdict("table_II_V_error_relative", results).found
 
 
 def test_a_claim_about_a_case_or_an_event_that_is_not_there_is_not_judged() -> None:
@@ -156,21 +156,21 @@ def test_an_experiment_without_the_papers_islands_fails_its_table() -> None:
     verdicts = judge(found, CLAIMS["switching"])
 
     assert {verdict.status for verdict in verdicts} == {"FAIL"}
-    assert verdicts[0].found == "there is no such number: case IV, event2, island of inv1"
+    assert verdicts[0].found == "this number is missing: case IV, event2, island of inv1"
 
 
 @pytest.mark.parametrize(("case", "event", "values", "line", "told"), [
-    ("IV", "event1", {"MQSI": 0.0133}, 1, "they are 0.33 to 1 times the paper's, 7 of 8 within a factor of 2; farthest "
-     "off: 0.013 for 0.04 (Table II, case IV, event1)."),
-    ("IV", "event2", {"V_error": 0.0}, 0, "24 of the 24 numbers of Tables I and II that are judged by a tolerance are"),
+    ("IV", "event1", {"MQSI": 0.0133}, 1, "0.33 to 1 times the paper's, 7 of 8 within a factor of 2; largest "
+     "difference: 0.013 for 0.04 (Table II, case IV, event1)."),
+    ("IV", "event2", {"V_error": 0.0}, 0, "24 of the 24 numbers of Tables I and II that have a tolerance are"),
     ("IV", "event2", {"V_error": 0.0}, 2, "7 of 8 within 25 % of the paper's number or half of its last digit; "
-     "farthest off: 0.0000 for 0.001 (Table II, case IV, event2)."),
-    ("II", "event1", {"reasons": {"MQSI": "not steady: it grows"}}, 1, "farthest off: not steady for 2.03"),
+     "largest difference: 0.0000 for 0.001 (Table II, case IV, event2)."),
+    ("II", "event1", {"reasons": {"MQSI": "not steady: it grows"}}, 1, "largest difference: not steady for 2.03"),
 ])  # fmt: skip
-def test_the_headline_counts_what_is_near_and_names_the_farthest(
+def test_the_headline_counts_near_numbers_and_names_the_largest_difference(
     case: str, event: str, values: dict[str, object], line: int, told: str
 ) -> None:
-    """Also of numbers that no tolerance judges; a zero is far from 0.001, what is not steady from any number."""
+    """It includes numbers without a tolerance. A zero is far from 0.001, and an unsteady value from any number."""
     found = Findings(results=changed(case, event, **values))
 
     assert told in headline(numbers(found, tables_of("islanding")))[line]

@@ -1,4 +1,4 @@
-"""The graphs of docs/theory.md on the islanding scenario, and runs on the real plant with delays in ticks."""
+"""Graphs of the islanding scenario that theory predicts, and runs on the real plant with delays in ticks."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ def test_a_number_that_is_off_is_marked_and_fails() -> None:
     text = plain(report(f_error=0.2))
 
     assert "0.200 | 0.14 !" in text
-    assert "at most off by 0.0600 Hz (case I, event1)" in text
+    assert "largest difference 0.0600 Hz (case I, event1)" in text
     assert "FAIL" in text
 
 
