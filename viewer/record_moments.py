@@ -25,7 +25,7 @@ from gridpeers.scenarios.emulation.link_data import (
 )
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.viewer.run_view import FROZEN
-from gridpeers.viewer.strips import LENGTH, Point, next_due, point_of
+from gridpeers.viewer.strips import LENGTH, Point, Sampler, point_of
 from gridpeers.wire.journal import Decision
 from gridpeers.wire.messages import LinkReport, LinkRequest, Measurement, State, Telemetry
 
@@ -83,13 +83,7 @@ class PlantRows:
 
     def _read_points(self, part: int, length: float) -> list[Point]:
         inverters, rows = self._rows_in(part)
-        points: list[Point] = []
-        due = 0.0
-        for row in rows:
-            if row[0] + 1e-9 >= due:
-                points.append(point_of(inverters, row, self._configs))
-                due = next_due(row[0], len(inverters), length)
-        return points
+        return [*Sampler(length).points(inverters, rows, self._configs)]
 
 
 GONE = 0.5

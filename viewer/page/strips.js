@@ -26,6 +26,7 @@ export class Strips {
     });
   }
   clear() { this.points = []; this.ranges = {}; }
+  // points: [t, values, beyond]; beyond: of a column, its extremes since the point before, where they lie outside of both
   add(points) {
     this.points.push(...points);
     const end = this.latest - LENGTH;
@@ -74,8 +75,9 @@ export class Strips {
         g.globalAlpha = this.lit && each && !lit ? .18 : many ? .55 : .95;
         g.beginPath();
         let pen = false;
-        for (const [t, values] of this.points) {
-          const v = values[column];
+        for (const [t, values, beyond] of this.points) {
+          const v = values[column], extremes = beyond[column];
+          if (extremes) { pen ? g.lineTo(x(t), y(extremes[0])) : g.moveTo(x(t), y(extremes[0])); g.lineTo(x(t), y(extremes[1])); pen = true; }
           if (v === null || v === undefined) { pen = false; continue; }
           pen ? g.lineTo(x(t), y(v)) : g.moveTo(x(t), y(v)); pen = true;
         }
@@ -101,7 +103,8 @@ export class Strips {
   // Scales grow at once, and shrink only when the lines fill less than half: else they would never rest.
   range(quantity, columns) {
     let low = Infinity, high = -Infinity;
-    for (const [, values] of this.points) for (const c of columns) { const v = values[c]; if (v !== null && v !== undefined) { if (v < low) low = v; if (v > high) high = v; } }
+    const take = v => { if (v !== null && v !== undefined) { if (v < low) low = v; if (v > high) high = v; } };
+    for (const [, values, beyond] of this.points) for (const c of columns) { take(values[c]); beyond[c]?.forEach(take); }
     if (!(low <= high)) return this.ranges[quantity.key] || [0, 1];
     if (quantity.zero) low = 0;
     const pad = Math.max((high - low) * .12, (quantity.least || 1e-3 * Math.max(Math.abs(low), Math.abs(high), 1e-6)) / 2), before = this.ranges[quantity.key];

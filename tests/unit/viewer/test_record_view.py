@@ -108,7 +108,7 @@ def test_what_a_law_shares_is_in_the_strips_too(tmp_path: Path) -> None:
 
     assert names == ["omega", "E", "v"]
     assert whole[0][1][4 * 9 + 2 :] == (None,) * 27, "the law is on hold"
-    for t, values in (point for point in whole if point[0] > 0.3):
+    for t, values, _ in (point for point in whole if point[0] > 0.3):
         row = shared.loc[: t + 1e-9].iloc[-1]
         expected = [row.get((name, inverter)) for name in names for inverter in record.info.inverters]
         assert values[4 * 9 + 2 :] == tuple(None if value is None or isnan(value) else value for value in expected)

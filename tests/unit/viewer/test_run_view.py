@@ -9,6 +9,7 @@ import pytest
 
 from gridpeers.netem.ledger import LinkCounts
 from gridpeers.scenarios.emulation.link_data import LinkStatus
+from gridpeers.scenarios.live.feeder_map import FeederMap, MapInverter, MapSwitch
 from gridpeers.scenarios.live.run_monitor import PlantStatus
 from gridpeers.viewer.run_view import FROZEN, Cursor, RunView
 from gridpeers.viewer.strips import LENGTH, STEP
@@ -117,6 +118,46 @@ def test_strips_keep_the_last_seconds_in_per_unit(view: RunView) -> None:
     assert (f1, f2, V1) == (60.0, 60.0, round(277.0 / V_nom, 4))
     assert (round(3e4 / rated, 4), round(6e4 / rated, 4)) == (P1, P2)
     assert (MPSI, MQSI) == (0.3333, 0.0), "(16) of loads 1 : 2 and equal vars"
+
+
+def test_strips_keep_the_extremes_between_their_points(view: RunView) -> None:
+    """A peak of one row is in the next point, whichever message it comes in, and costs nothing where there is none."""
+    for t, f in ((0.0, 60.0), (0.01, 60.79), (0.02, 60.24), (0.05, 60.1), (0.06, 59.2), (0.07, 60.05), (0.1, 60.0)):
+        message = msgspec.structs.replace(telemetry(t), rows=((t, f, *row(t)[2:]),))
+        view.telemetry(message, t)
+
+    points = view.frame(Cursor(), 0.1)[0].points
+
+    assert [(point[0], point[1][0], point[2]) for point in points] == [
+        (0.0, 60.0, {}),
+        (0.05, 60.1, {0: (60.1, 60.79)}),
+        (0.1, 60.0, {0: (59.2, 60.05)}),
+    ]
+
+
+def test_buses_without_a_source_are_de_energised(view: RunView) -> None:
+    """A bus has a path to the substation or to an inverter on the network; the page gets them when they change."""
+    view.feeder_map = FeederMap(
+        buses=tuple((name, 0.0, 0.0) for name in "abcdef"),
+        branches=((0, 1, 3), (2, 3, 3)),
+        switches=(MapSwitch("s", "", 1, 2, True), MapSwitch("open", "", 3, 4, False)),
+        inverters=(MapInverter("inv1", 3, "GFM", ""), MapInverter("inv2", 4, "GFL", "")),
+        source=0,
+    )
+    pacing = Pacing(steps=1, late=0, p50=0.0, p95=0.0, p99=0.0, worst=0.0, slipped=0.0)
+    status = PlantStatus(phase="running", t=1.0, speed=1.0, pacing=pacing, switches={"s": True})
+    view.plant_status(status)
+    view.telemetry(telemetry(1.0), 1.0)
+    frame, cursor = view.frame(Cursor(), 1.0)
+    assert frame.dead == (5,)
+
+    off = (1.1, 60.0, 0.0, 0.0, 0.0, 0.0, 277.0, *row(1.1)[7:])
+    view.telemetry(msgspec.structs.replace(telemetry(1.1), rows=(off,)), 1.1)
+    again, _ = view.frame(cursor, 1.1)
+    view.plant_status(msgspec.structs.replace(status, switches={"s": False}))
+    apart, _ = view.frame(cursor, 1.1)
+
+    assert (again.dead, apart.dead) == (None, (2, 3, 5))
 
 
 def test_an_inverter_off_the_network_has_no_line(view: RunView) -> None:
