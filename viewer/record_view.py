@@ -86,6 +86,7 @@ class RecordView:
     def frame(self, t: float, since: float = -1.0) -> Frame:
         agents = self._moments.at(t)
         view = RunView(self.record.info.run, AGE_STEP)
+        view.feeder_map = self.map
         for config in self._configs.values():
             view.config(config)
         view.presence(plant=True, agents=self._present(t, agents), now=t)
@@ -128,13 +129,13 @@ class RecordView:
         states = self.record.index.messages(State, None, points[0][0] - longest, points[-1][0])
         coming = deque(sorted(states, key=lambda state: state.t))
         last: dict[str, State] = {}
-        for t, values in points:
+        for t, values, beyond in points:
             while coming and coming[0].t <= t + 1e-9:
                 state = coming.popleft()
                 last[state.sender] = state
             fresh = {name: state.shared for name, state in last.items() if t - state.t <= longest}
             shared = (fresh.get(name, {}).get(it.name) for it in self.shared for name in self.record.info.inverters)
-            yield t, (*values, *shared)
+            yield t, (*values, *shared), beyond
 
     def decision(self, agent: str, t: float) -> str:
         self._read_events()

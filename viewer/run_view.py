@@ -16,6 +16,7 @@ from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.scenarios.emulation.link_data import LinkStatus
 from gridpeers.scenarios.live.feeder_map import FeederMap
 from gridpeers.scenarios.live.run_monitor import SILENT, InverterStatus, PlantStatus, RunMonitor
+from gridpeers.viewer.dead_buses import dead_buses
 from gridpeers.viewer.link_states import AGE_STEP, LinkStates, LinkView
 from gridpeers.viewer.strips import Point, Strips
 from gridpeers.wire.messages import AgentStatus, PlantEvent, Telemetry
@@ -40,6 +41,7 @@ class Cursor(msgspec.Struct, frozen=True):
     links: int = 0
     switches: dict[str, bool] | None = None
     loads: dict[str, tuple[float, float]] | None = None
+    dead: tuple[int, ...] | None = None
 
 
 class Frame(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -59,6 +61,8 @@ class Frame(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     switches: dict[str, bool] | None = None
     loads: dict[str, tuple[float, float]] | None = None
     """Real (W) and reactive power (var) of each load that was set in this run, if any has changed."""
+    dead: tuple[int, ...] | None = None
+    """Numbers of the de-energised buses, if they have changed."""
 
 
 class RunView:
@@ -84,6 +88,8 @@ class RunView:
         self._status_at: dict[str, float] = {}
         self._islands: dict[str, str] = {}
         self._present: frozenset[str] = frozenset()
+        self._energised: tuple[FeederMap, dict[str, bool], frozenset[str]] | None = None
+        self._dead: tuple[int, ...] = ()
 
     @property
     def inverters(self) -> tuple[str, ...]:
@@ -146,6 +152,8 @@ class RunView:
             cursor = Cursor(run=self._run)
         live = self._liveness.at(now)
         snapshot = self._monitor.snapshot(self._present, now, current=live.word == "live")
+        if live.word == "live":
+            self._note_dead(snapshot.inverters)
         points = tuple(self._strips.since(cursor.t))
         f_nom = next((config.f_nom for config in self._configs.values()), 0.0)
         frame = Frame(
@@ -162,6 +170,7 @@ class RunView:
             links={name: links for name, (version, links) in self._into.items() if version > cursor.links},
             switches=self._switches if self._switches != cursor.switches else None,
             loads=self._loads if self._loads != cursor.loads else None,
+            dead=self._dead if self._dead != cursor.dead else None,
         )
         later = Cursor(
             run=self._run,
@@ -170,8 +179,16 @@ class RunView:
             links=self._version,
             switches=self._switches,
             loads=self._loads,
+            dead=self._dead,
         )
         return frame, later
+
+    def _note_dead(self, inverters: Collection[InverterStatus]) -> None:
+        """Find the de-energised buses anew, if a switch or an inverter has changed."""
+        on = frozenset(one.name for one in inverters if one.P or one.Q)
+        if self.feeder_map is not None and self._energised != (now := (self.feeder_map, self._switches, on)):
+            self._energised = now
+            self._dead = dead_buses(*now)
 
     def _begin_again(self) -> None:
         self._run += 1

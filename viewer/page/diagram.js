@@ -15,11 +15,38 @@ const pairOf = (a, b) => a < b ? `${a}|${b}` : `${b}|${a}`;
 export class Diagram {
   // on(kind, subject): a click; look(event, kind, subject): the pointer is above something, or above nothing
   constructor(svg, on, look) {
-    this.svg = svg; this.on = on; this.look = look; this.map = null; this.inverters = new Map(); this.switches = new Map(); this.loads = new Map(); this.pairs = new Map();
+    this.svg = svg; this.look = look; this.map = null; this.inverters = new Map(); this.switches = new Map(); this.loads = new Map(); this.pairs = new Map();
+    this.marked = []; this.over = null; this.dead = [];
     this.keys = new DiagramKeys(svg, on, look);
     new ResizeObserver(() => this.layout()).observe(svg.parentElement);
+    for (const kind of ["pointermove", "pointerdown"]) svg.addEventListener(kind, event => this.point(event, this.target(event)));
+    svg.addEventListener("pointerleave", event => this.point(event, null));
+    // a click takes no focus, so that the keys of the time go on; the tab key does
+    svg.addEventListener("mousedown", event => { event.preventDefault(); document.activeElement?.blur?.(); });
+    svg.addEventListener("click", event => {
+      const element = event.detail ? this.target(event) : event.target.closest("[data-kind]");  // 0: not by a pointer
+      if (element) on(element.dataset.kind, element.dataset.subject);
+    });
   }
-  setMap(map, colourOf) { this.map = map; this.colourOf = colourOf; this.layout(); }
+  // The element that a pointer means: the mark whose centre is nearest, measured by its size, else the nearest link.
+  target(event) {
+    const box = this.svg.getBoundingClientRect(), x = event.clientX - box.left, y = event.clientY - box.top;
+    let found = null, least = 1;
+    const offer = (element, distance) => { if (distance < least) { found = element; least = distance; } };
+    for (const mark of this.marked) offer(mark.g, Math.hypot(x - mark.x, y - mark.y) / mark.reach);
+    if (found) return found;
+    least = event.pointerType === "touch" ? 14 : 7;
+    for (const { hit, way } of this.pairs.values()) for (const [px, py] of way) offer(hit, Math.hypot(x - px, y - py));
+    return found;
+  }
+  point(event, element) {
+    if (this.over !== element) { this.over?.removeAttribute("data-over"); element?.setAttribute("data-over", ""); this.over = element; set(this.svg, "class", element ? "over" : ""); }
+    this.look(event, element?.dataset.kind ?? "", element?.dataset.subject ?? "");
+  }
+  setMap(map, colourOf) {
+    this.map = map; this.colourOf = colourOf; this.layout();
+    const pan = this.svg.closest(".pan"); pan.scrollLeft = (pan.scrollWidth - pan.clientWidth) / 2;
+  }
 
   layout() {
     const map = this.map, W = this.svg.parentElement.clientWidth, H = this.svg.parentElement.clientHeight;
@@ -33,30 +60,26 @@ export class Diagram {
     if (map.to_scale) sx = sy = Math.min(sx, sy);
     const ox = (W - sx * (x1 - x0)) / 2, oy = (H - sy * (y1 - y0)) / 2;
     const at = map.buses.map(([, x, y]) => [ox + sx * (x - x0), H - oy - sy * (y - y0)]);
-    const wires = make("g", {}, this.svg), thin = map.buses.length > 400 ? .6 : 1;
-    const byPhases = new Map();
-    for (const [a, b, phases] of map.branches) byPhases.set(phases, (byPhases.get(phases) || "") + `M${at[a].map(r1)}L${at[b].map(r1)}`);
-    for (const [phases, d] of byPhases) make("path", { d, class: "branch", "stroke-width": thin * [1, 1, 1.7, 2.8][phases] }, wires);
+    this.wires = make("g", {}, this.svg); this.at = at; this.marked = []; this.over = null;
+    this.wire(new Set(this.dead));
     this.links = this.keys.group(make("g", { class: "links" }, this.svg), "Links");
     const marks = this.keys.group(make("g", {}, this.svg), "Switches"), small = this.keys.group(make("g", {}, this.svg), "Loads");
     this.marks = make("g", { class: "links" }, this.svg);
     this.loads.clear(); this.shownLoads = "";
     for (const load of map.loads || []) {
       const [x, y] = at[load.bus], size = few ? 3.5 : 2.5, g = make("g", { class: "load", "data-load": load.name }, small);
-      make("rect", { class: "grab", x: x - size - 1.5, y: y + 1, width: 2 * size + 3, height: 2 * size + 4 }, g);
       make("path", { d: `M${r1(x - size)} ${r1(y + 3)}h${2 * size}l${-size} ${r1(1.7 * size)}z` }, g);
-      this.hear(g, "load", load.name); this.loads.set(load.name, { g, load });
+      this.mark(g, "load", load.name, x, y + 3 + .85 * size, size + 2.5); this.loads.set(load.name, { g, load });
     }
     this.switches.clear();
     for (const s of map.switches) {
       const [a, b] = [at[s.a], at[s.b]], x = (a[0] + b[0]) / 2, y = (a[1] + b[1]) / 2;
       const g = make("g", { class: "switch", "data-switch": s.name }, marks);
       make("line", { x1: a[0], y1: a[1], x2: b[0], y2: b[1] }, g);
-      make("rect", { class: "grab", x: x - 11, y: y - 11, width: 22, height: 22 }, g);
       make("rect", { x: x - 4.5, y: y - 4.5, width: 9, height: 9, rx: 1.5 }, g);
       const text = map.switches.length <= 40 ? make("text", { x: x + 8, y: y + 13 }, g) : null;
       if (text) text.textContent = s.alias || s.name;
-      this.hear(g, "switch", s.name); this.switches.set(s.name, { g, x, y, text, title: s.alias ? `${s.alias} (${s.name})` : s.name });
+      this.mark(g, "switch", s.name, x, y, 11); this.switches.set(s.name, { g, x, y, text, title: s.alias ? `${s.alias} (${s.name})` : s.name });
     }
     if (map.source >= 0) { const [x, y] = at[map.source]; make("path", { class: "substation", d: `M${x} ${y - 9}l9 9l-9 9l-9-9z` }, marks); }
     const nodes = this.keys.group(make("g", {}, this.svg), "Inverters"), r = few ? 9 : map.inverters.length > 60 ? 5 : 6.5, taken = new Map();
@@ -70,8 +93,8 @@ export class Diagram {
       make("circle", { class: "halo", r: r + 5 }, g);
       if (row.kind === "GFM") make("rect", { class: "body", x: -r, y: -r, width: 2 * r, height: 2 * r, rx: 3, style: `fill:${fill}` }, g);
       else make("circle", { class: "body", r, style: `fill:${fill}` }, g);
-      this.hear(g, "agent", row.name);
-      this.inverters.set(row.name, { g, kind: row.kind, value: null, x, y });
+      this.mark(g, "agent", row.name, x, y, r + 4);
+      this.inverters.set(row.name, { g, kind: row.kind, bus: row.bus, value: null, x, y });
     }
     if (few) this.label(r, W, H);
     this.pairs.clear();
@@ -110,19 +133,25 @@ export class Diagram {
     }
   }
 
-  hear(element, kind, subject) {
-    this.keys.add(element, kind, subject);
-    // a click takes no focus, so that the keys of the time go on; the tab key does
-    element.addEventListener("mousedown", event => { event.preventDefault(); document.activeElement?.blur?.(); });
-    element.addEventListener("click", () => this.on(kind, subject));
-    element.addEventListener("pointermove", event => this.look(event, kind, subject));
-    element.addEventListener("pointerleave", event => this.look(event, "", ""));
+  mark(g, kind, subject, x, y, reach) { this.keys.add(g, kind, subject); this.marked.push({ g, x, y, reach }); }
+
+  // the branches, of which those between de-energised buses look so
+  wire(dead) {
+    const thin = this.map.buses.length > 400 ? .6 : 1, drawn = new Map();
+    for (const [a, b, phases] of this.map.branches) {
+      const look = `${dead.has(a) && dead.has(b) ? "dead " : ""}branch|${phases}`;
+      drawn.set(look, (drawn.get(look) || "") + `M${this.at[a].map(r1)}L${this.at[b].map(r1)}`);
+    }
+    this.wires.replaceChildren();
+    for (const [look, d] of drawn) { const [name, phases] = look.split("|"); make("path", { d, class: name, "stroke-width": thin * [1, 1, 1.7, 2.8][phases] }, this.wires); }
   }
 
-  // links: pair key -> { a, b, kind, rate, text }; switches: name -> closed; states: name -> { absent, V, off }; loads: name -> [P, Q] of those that were set
-  update(links, switches, states, pending, lit, loads = {}) {
-    this.last = [links, switches, states, pending, lit, loads];
+  // links: pair key -> { a, b, kind, rate, text }; switches: name -> closed; states: name -> { absent, V, off }; loads: name -> [P, Q] of those that were set; dead: numbers of de-energised buses
+  update(links, switches, states, pending, lit, loads, dead) {
+    this.last = [links, switches, states, pending, lit, loads, dead];
     if (!this.links) return;
+    const isDead = new Set(dead);
+    if (String(dead) !== String(this.dead)) { this.dead = dead; this.wire(isDead); }
     const had = this.keys.focused(), before = this.pairs.size;
     let news = false;
     set(this.links, "class", links.size > 120 ? "links many" : "links");
@@ -132,10 +161,11 @@ export class Diagram {
       if (!from || !to) continue;
       if (!drawn) {
         const dx = to.x - from.x, dy = to.y - from.y, bend = .11, mx = (from.x + to.x) / 2 - bend * dy, my = (from.y + to.y) / 2 + bend * dx;
-        const d = `M${r1(from.x)} ${r1(from.y)}Q${r1(mx)} ${r1(my)} ${r1(to.x)} ${r1(to.y)}`;
+        const d = `M${r1(from.x)} ${r1(from.y)}Q${r1(mx)} ${r1(my)} ${r1(to.x)} ${r1(to.y)}`, n = Math.ceil(Math.hypot(dx, dy) / 2) + 2;
         const hit = make("path", { class: "hit", d, "data-link": key }, this.links), path = make("path", { d }, this.links);
-        this.hear(hit, "link", key);
-        drawn = { hit, path, mark: null, x: (from.x + 2 * mx + to.x) / 4, y: (from.y + 2 * my + to.y) / 4 };
+        const on = (p, q, r, s) => (1 - s) ** 2 * p + 2 * s * (1 - s) * q + s * s * r, way = [...Array(n + 1).keys()].map(k => [on(from.x, mx, to.x, k / n), on(from.y, my, to.y, k / n)]);
+        this.keys.add(hit, "link", key);
+        drawn = { hit, path, way, mark: null, x: (from.x + 2 * mx + to.x) / 4, y: (from.y + 2 * my + to.y) / 4 };
         this.pairs.set(key, drawn);
         news = true;
       }
@@ -161,18 +191,18 @@ export class Diagram {
       const closed = switches[name] ?? true;
       set(drawn.g, "class", `switch ${closed ? "closed" : "open"}${pending.has(name) ? " pending" : ""}`); set(drawn.g, "aria-label", `switch ${drawn.title}, ${closed ? "closed" : "open"}`);
     }
-    const shown = JSON.stringify([loads, [...pending.keys()]]);
+    const shown = JSON.stringify([loads, [...pending.keys()], dead]);
     if (shown !== this.shownLoads) for (const [name, { g, load }] of this.loads) {
-      set(g, "class", `load${loads[name] ? " set" : ""}${pending.has(`load ${name}`) ? " pending" : ""}`);
-      set(g, "aria-label", `load ${name}, ${loadWords(load, loads[name])}`);
+      set(g, "class", `load${loads[name] ? " set" : ""}${pending.has(`load ${name}`) ? " pending" : ""}${isDead.has(load.bus) ? " dead" : ""}`);
+      set(g, "aria-label", `load ${name}, ${loadWords(load, loads[name])}${isDead.has(load.bus) ? ", de-energised" : ""}`);
     }
     this.shownLoads = shown;
     for (const [name, drawn] of this.inverters) {
       const state = states.get(name) || { absent: true };
-      const off = !!state.off;
-      set(drawn.g, "class", `inverter${state.absent ? " absent" : ""}${off ? " off-voltage" : ""}${pending.has(name) ? " pending" : ""}${name === lit ? " lit" : ""}`);
-      set(drawn.g, "aria-label", `inverter ${name}, ${drawn.kind}${state.absent ? ", no agent" : ""}${off ? ", voltage beyond 0.95 to 1.05 pu" : ""}`);
-      if (drawn.value) { const text = state.V === null || state.V === undefined ? "" : `${state.V.toFixed(3)} pu`; if (drawn.value.textContent !== text) drawn.value.textContent = text; }
+      const dark = isDead.has(drawn.bus), off = !!state.off && !dark;
+      set(drawn.g, "class", `inverter${state.absent ? " absent" : ""}${dark ? " dead" : ""}${off ? " off-voltage" : ""}${pending.has(name) ? " pending" : ""}${name === lit ? " lit" : ""}`);
+      set(drawn.g, "aria-label", `inverter ${name}, ${drawn.kind}${state.absent ? ", no agent" : ""}${dark ? ", de-energised" : ""}${off ? ", voltage beyond 0.95 to 1.05 pu" : ""}`);
+      if (drawn.value) { const text = dark ? "de-energised" : state.V === null || state.V === undefined ? "" : `${state.V.toFixed(3)} pu`; if (drawn.value.textContent !== text) drawn.value.textContent = text; }
     }
   }
 }

@@ -52,7 +52,7 @@ function some(names) { return names.length > MOST ? `${names.slice(0, MOST).join
 const STATES = { used: "heard", ageing: "ageing", impaired: "late or lossy", cut: "cut", old: "not heard", unused: "not used", apart: "in another island" };
 export function linkWords(link) { return `link ${link.a} to ${link.b}, ${STATES[link.kind] || link.kind}${link.kind === "impaired" && link.text ? `: ${link.text}` : ""}`; }
 
-export function diagramText(map, pairs, switches, inverters, islands, loads) {
+export function diagramText(map, pairs, switches, inverters, islands, loads, dead) {
   if (!map) return "";
   const absent = inverters.filter(one => one.note === "no agent").map(one => one.name), open = map.switches.filter(s => !(switches[s.name] ?? s.closed)).map(s => s.alias || s.name);
   const by = kind => [...pairs.values()].filter(pair => pair.kind === kind).map(pair => `${pair.a}–${pair.b}${pair.kind === "impaired" && pair.text ? ` (${pair.text})` : ""}`);
@@ -61,6 +61,7 @@ export function diagramText(map, pairs, switches, inverters, islands, loads) {
   return [
     `${inverters.length} inverters, ${absent.length ? `without an agent: ${some(absent)}` : "all with an agent"}`,
     islands.length ? `${islands.length === 1 ? "island" : "islands"}: ${some(islands)}` : "",
+    dead.length ? `de-energised: ${dead.length === 1 ? "bus" : `${dead.length} buses:`} ${some(dead.map(number => map.buses[number]?.[0]))}` : "",
     map.switches.length ? `${map.switches.length} switches, ${open.length ? `${open.length} open (${some(open)})` : "all closed"}` : "",
     `${pairs.size} links, ${links.length ? links.join("; ") : "all heard"}`,
     set.length ? `loads set: ${some(set)}` : "",

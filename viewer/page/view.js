@@ -7,7 +7,7 @@ import { Player } from "./player.js";
 import { Strips } from "./strips.js";
 
 const silence = () => 1000 * (S.hello?.silent_s ?? 1); // ms without a word after which the numbers are old
-const S = { hello: null, map: null, frame: null, links: new Map(), switches: {}, loads: {}, events: [], inverters: new Map(), pending: new Map(), lit: "", tip: null, heard: 0, socket: null, chosen: "" };
+const S = { hello: null, map: null, frame: null, links: new Map(), switches: {}, loads: {}, dead: [], events: [], inverters: new Map(), pending: new Map(), lit: "", tip: null, heard: 0, socket: null, chosen: "" };
 window.gridpeersView = S;
 
 const diagram = new Diagram($("diagram"), click, look), strips = new Strips($("canvases")), loadDialog = new LoadDialog(act);
@@ -91,6 +91,7 @@ function takeFrame(frame) {
   if (frame.links) { for (const [dst, links] of Object.entries(frame.links)) S.links.set(dst, links); S.pairs = pairs(); }
   if (frame.switches) { S.switches = frame.switches; for (const name of Object.keys(frame.switches)) S.pending.delete(name); }
   if (frame.loads) { S.loads = frame.loads; for (const key of [...S.pending.keys()]) if (key.startsWith("load ")) S.pending.delete(key); }
+  if (frame.dead) S.dead = frame.dead;
   S.inverters = new Map(frame.inverters.map(one => [one.name, one]));
   for (const event of frame.events || []) {
     S.events.push(event);
@@ -131,8 +132,8 @@ function draw() {
   S.pairs ||= pairs();
   const states = new Map(inverters.map(one => [one.name, { absent: one.note === "no agent", V: one.V, off: one.off_voltage }]));
   for (const [key, kind] of S.pending) if (kind === "stop" && states.get(key)?.absent || kind === "start" && states.get(key)?.absent === false) S.pending.delete(key);
-  diagram.update(S.pairs, S.switches, states, S.pending, S.lit, S.loads);
-  put($("diagram-text"), `${current ? "" : "Not of now, but as it was last. "}${diagramText(S.map, S.pairs, S.switches, frame.inverters, islands, S.loads)}`);
+  diagram.update(S.pairs, S.switches, states, S.pending, S.lit, S.loads, S.dead);
+  put($("diagram-text"), `${current ? "" : "Not of now, but as it was last. "}${diagramText(S.map, S.pairs, S.switches, frame.inverters, islands, S.loads, S.dead)}`);
   const silent = frame.live.since || (lost ? (performance.now() - S.heard) / 1000 : 0);
   // most frames have statuses alone: the strips, which take most of the time, stay as they are
   const now = [strips.latest, strips.end, strips.points.length, S.lit, current ? 0 : silent.toFixed(1), S.events.length, innerWidth, devicePixelRatio, colours.join()].join("|");

@@ -147,6 +147,48 @@ def test_a_record_is_seen_at_any_time(desk: Desk, browser: Browser, records: Pat
     page.wait_for_selector('body[data-live="lost"]')
 
 
+UNREACHED = """() => {
+    const diagram = document.querySelector("#diagram"), found = [];
+    const means = (x, y, kind, subject) => {
+        const over = document.elementFromPoint(x, y);
+        if (!diagram.contains(over)) return false;
+        over.dispatchEvent(new PointerEvent("pointermove", { clientX: x, clientY: y, bubbles: true }));
+        return gridpeersView.tip?.kind === kind && gridpeersView.tip?.subject === subject;
+    };
+    for (const target of diagram.querySelectorAll("[data-kind]")) {
+        const points = [], { kind, subject } = target.dataset, box = target.getBoundingClientRect();
+        if (kind === "link") for (let at = 0; at < target.getTotalLength(); at += 2) {
+            const { x, y } = target.getPointAtLength(at).matrixTransform(target.getScreenCTM());
+            points.push([x, y]);
+        }
+        else for (let x = box.left; x < box.right; x += 2)
+            for (let y = box.top; y < box.bottom; y += 2) points.push([x, y]);
+        if (!points.some(([x, y]) => means(x, y, kind, subject))) found.push(`${kind} ${subject}`);
+    }
+    return [diagram.querySelectorAll("[data-kind]").length, found];
+}"""
+"""Return the number of targets of the diagram, and those that the pointer reaches nowhere."""
+
+
+def test_every_target_of_the_diagram_can_be_reached(desk: Desk, browser: Browser, records: Path) -> None:
+    """At 1400 px the pointer reaches each of them, however they overlap; a phone shows the page without its edges."""
+    view = desk.open_bare("view", str(records / "run"), "--case", "one", "--port", "0")
+    page = page_of(browser, view.expect(r"open (http://\S+) in a browser")[1])
+    page.set_viewport_size({"width": 1400, "height": 1200})
+    shows(page, 1.0)
+    page.wait_for_selector('[data-link="inv1|inv2"] + .link.cut', state="attached")
+
+    targets, unreached = page.evaluate(UNREACHED)
+
+    assert targets > 100
+    assert unreached == []
+    assert page.locator("#diagram .branch.dead").count() == 0
+    page.set_viewport_size({"width": 390, "height": 844})
+    page.wait_for_function("() => document.querySelector('#diagram').getAttribute('viewBox') === '0 0 620 430'")
+    assert page.evaluate("() => document.documentElement.scrollWidth") == 390
+    assert page.evaluate("() => document.querySelector('.pan').scrollWidth") == 620
+
+
 def test_a_run_that_has_ended_is_offered_as_a_record(desk: Desk, browser: Browser) -> None:
     """Its page, opened at its begin, follows it, and has its slider after its end."""
     few = 'graph = "full"\nwithout_agent = ["inv3", "inv5", "inv6", "inv7", "inv8", "inv9"]\n'
