@@ -35,13 +35,13 @@ OWN = tuple(f"own_{name}" for name in Own._fields if name != "name")
 OF_NEIGHBOUR = tuple(name for name in Neighbour._fields if name not in ("name", "shared"))
 
 NEIGHBOUR = re.compile(r"neighbour_([1-9][0-9]{0,3})_(?:shared_)?(\w+)")
-"""Name of an input of a neighbour: its place, and what it is."""
+"""Name of an input of a neighbour: its place and its field."""
 
 
 def fmu_problems(path: Path, parameters: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Return what keeps an FMU from carrying a law, each with the key of the scenario that it concerns."""
+    """Return the problems of an FMU as a law, each with the key of the scenario that it concerns."""
     if not path.is_file():
-        return [("fmu", f"there is no file {path.name}; write its path, seen from the scenario")]
+        return [("fmu", f"there is no file {path.name}; give its path relative to the scenario file")]
     try:
         import fmpy
     except ModuleNotFoundError:
@@ -85,12 +85,12 @@ def fmu_problems(path: Path, parameters: Mapping[str, Any]) -> list[tuple[str, s
 
 
 def shared_by_fmu(path: Path) -> tuple[SharedQuantity, ...]:
-    """Return the quantities that an FMU shares: its outputs shared_NAME; none if it cannot be read."""
+    """Return the quantities that an FMU shares, its outputs shared_NAME; none if it cannot be read."""
     try:
         import fmpy
 
         outputs = variables(fmpy.read_model_description(str(path)), "output")
-    except Exception:  # a file may be anything; `fmu_problems` tells it
+    except Exception:  # a file may be anything; `fmu_problems` reports it
         return ()
     return tuple(
         SharedQuantity(
@@ -129,7 +129,7 @@ class FmuLaw(ProgramLaw):
 
 
 class LoadedFmu(Law):
-    """An FMU in this process, unpacked in a folder, as a law; whatever fmpy or the FMU raises comes through."""
+    """An FMU in this process, unpacked in a folder, as a law; errors of fmpy and the FMU pass through."""
 
     def __init__(self, path: Path, folder: Path) -> None:
         super().__init__()

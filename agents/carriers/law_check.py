@@ -1,4 +1,4 @@
-"""Check, before a run, that there is a law, that it takes its parameters, and that it can be made."""
+"""Check before a run that the law exists, accepts its parameters, and can be made."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from gridpeers.wire.wording import is_no_path
 
 PAPER = LawChoice().use
 
-OF_PLANT = ("t", "f", "P", "Q", "V", "P_set", "V_set")  # a record has these beside what laws share
+OF_PLANT = ("t", "f", "P", "Q", "V", "P_set", "V_set")  # quantities of a record beside shared ones
 
 
 def law_problems(table: Mapping[str, Any]) -> list[Problem]:
-    """Return all that is wrong with the table `law` of a scenario, at its keys, or at "" for the whole."""
+    """Return all problems of the table `law` of a scenario, each at its key, or at "" for the whole table."""
     given = [key for key in CARRIERS if key in table]
     if len(given) != 1:
         text = f"needs one of use, command, fmu; got {' and '.join(given) or 'none'}"
@@ -33,11 +33,11 @@ def law_problems(table: Mapping[str, Any]) -> list[Problem]:
     found += [Problem(key, text) for key, value in rest.items() if (text := scalar_objection(value))]
     for key in ("use", "fmu", "folder"):
         if is_no_path(getattr(choice, key)):
-            found.append(Problem(key, "can be no name of a module, folder or file"))
+            found.append(Problem(key, "cannot be the name of a module, folder or file"))
     if "command" in table and not any(it.path == "command" for it in found):
         found += [Problem("command", text) for text in _command_problems(choice.command)]
     wrong = {problem.path for problem in found}
-    if wrong & {*CARRIERS, "folder"}:  # there is no law to ask
+    if wrong & {*CARRIERS, "folder"}:  # the law is not known
         return found
     parameters = {key: value for key, value in rest.items() if key not in wrong}
     checks = {"use": _class_problems, "command": _program_problems, "fmu": _fmu_problems}
@@ -53,9 +53,9 @@ def _command_problems(command: tuple[str, ...]) -> list[str]:
     if not command:
         return ["is empty; write the program first"]
     if is_no_path(command[0]):
-        return ["begins with what can be no name of a program"]
+        return ["begins with a text that cannot be the name of a program"]
     wrong = any("\0" in word or not (word.isprintable() or word.isascii()) for word in command)
-    return ["has a character in it that no command can have"] if wrong else []
+    return ["has a character that a command cannot have"] if wrong else []
 
 
 def _class_problems(choice: LawChoice, parameters: Mapping[str, Any]) -> list[Problem]:
@@ -83,7 +83,7 @@ def _program_problems(choice: LawChoice, parameters: Mapping[str, Any]) -> list[
     if shutil.which(str(place.resolve())) or ("/" not in program and shutil.which(program)):
         return read_parameters(Law, limits_in(parameters))[1]
     if place.is_file():
-        return [Problem("command", f"{program} cannot be executed; chmod +x it, or name its interpreter first")]
+        return [Problem("command", f"{program} is not executable; chmod +x it, or name its interpreter first")]
     return [Problem("command", f"there is no program {program}, neither beside the scenario nor on the PATH")]
 
 

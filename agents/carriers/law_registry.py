@@ -1,4 +1,4 @@
-"""The registry of laws: what a scenario may name in `law`, how a law is made, and its end."""
+"""The registry of laws, which the key `law` of a scenario names; how a law is made and ended."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from gridpeers.wire.plugins.registry import PluginError, Registry
 from gridpeers.wire.schema.table_schema import Plausible, Range, shared_fields
 
 CARRIERS = ("use", "command", "fmu")
-"""Keys of a scenario's table `law`, one of which says what the law is."""
+"""Keys of a scenario's table `law`; one of them names the law."""
 
 KEYS = (*CARRIERS, "shared", "folder", "time_limit_s")
 
@@ -60,7 +60,7 @@ def make_law(control: Control) -> Law:
 
 
 def shared_by(choice: LawChoice) -> tuple[SharedQuantity, ...]:
-    """Return the quantities that a law declares, whatever carries it; none of a law that is not here."""
+    """Return the quantities that a law of any carrier declares; none if the law is missing here."""
     if choice.command:
         return choice.shared
     if choice.fmu:
@@ -69,7 +69,7 @@ def shared_by(choice: LawChoice) -> tuple[SharedQuantity, ...]:
         return shared_by_fmu(Path(choice.folder) / choice.fmu)
     try:
         fields = shared_fields(LAWS.resolve(choice.use, choice.folder))
-    except PluginError:  # told where the scenario is checked
+    except PluginError:  # the check of the scenario reports it
         return ()
     found = []
     for field in fields:
@@ -80,7 +80,7 @@ def shared_by(choice: LawChoice) -> tuple[SharedQuantity, ...]:
 
 
 def close_laws(laws: Iterable[Law]) -> None:
-    """End some laws; programs are all asked before the first is waited for."""
+    """End some laws; all programs are asked to end before the first wait."""
     ended = tuple(laws)
     for law in ended:
         if end_input := getattr(law, "end_input", None):  # only a program has one

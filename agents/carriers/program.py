@@ -26,17 +26,17 @@ from gridpeers.wire.codec import decode_foreign
 from gridpeers.wire.wording import printable
 
 LEAVING = 1.0
-"""Time (s) that a program has to end once its input has."""
+"""Time (s) for a program to end after its input has ended."""
 
 _GUARD = 'read -r _; sleep "$1"; test -z "$2" || rm -rf -- "$2"; kill -KILL 0'
-"""Leads the group. Its own input ends with the process that started it, also by SIGKILL; then it ends the group."""
+"""Leader of the group. Its input ends with the process that started it, even by SIGKILL; then it ends the group."""
 
 
 class ProcessGroup:
-    """A program with pipes to its standard input and output, and all that it starts itself; OSError if it cannot start.
+    """A program with pipes to its standard input and output, and all processes that it starts.
 
-    The group ends whole: with whoever started it too, however that ended. Then the folder `litter` is removed; else it
-    is the starter's to remove.
+    Raise OSError if it cannot start. The whole group ends, also when the process that started it dies; the folder
+    `litter` is then removed. Otherwise its maker removes it.
     """
 
     def __init__(self, command: Sequence[str], folder: str, litter: str = "") -> None:
@@ -85,13 +85,13 @@ class ProcessGroup:
 
 
 LONGEST_LINE = 100_000
-"""Bytes of an answer beyond which it is none."""
+"""Most bytes of an answer."""
 
 EXAMPLE = '{"P_set": 0.5, "V_set": 1.0}'
 
 
 class ProgramAnswer(msgspec.Struct, frozen=True, kw_only=True):
-    """Answer to a step; that to a start says no more than `error`."""
+    """Answer to a step; an answer to a start has `error` alone."""
 
     P_set: float | None = None
     V_set: float | None = None
@@ -104,7 +104,7 @@ _decode = msgspec.json.Decoder(ProgramAnswer).decode
 
 
 class ProgramLaw(Law):
-    """A law carried by a program; `name` is what people call it, `litter` a folder that is removed if the agent dies.
+    """A law carried by a program; `name` is for messages, and `litter` is a folder to remove if the agent dies.
 
     Raise ValueError if the program cannot be started, or a limit among the parameters is wrong.
     """
@@ -122,10 +122,8 @@ class ProgramLaw(Law):
         try:
             self._group = ProcessGroup(command, choice.folder, litter)
         except OSError as error:
-            text = (
-                f"{choice.command[0]}: {error.strerror}; write the path of a program that can be run, and in the first"
-            )
-            raise ValueError(f"law program {text} line of a script the path of its interpreter") from None
+            text = f"{choice.command[0]}: {error.strerror}; give the path of an executable program, and name the "
+            raise ValueError(f"law program {text}interpreter in the first line of a script") from None
         assert self._group.program.stdin is not None
         os.set_blocking(self._group.program.stdin.fileno(), False)
         self._patience = FIRST * choice.time_limit
@@ -149,7 +147,7 @@ class ProgramLaw(Law):
             self._group.end_input()
 
     def close(self) -> None:
-        """End the program: its input ends, and what stays of it, or of what it started, is killed."""
+        """End the input of the program; kill it, and the processes that it started, if they stay."""
         if self._group is None:
             return
         self.end_input()
@@ -160,10 +158,10 @@ class ProgramLaw(Law):
         self._group = None
 
     def _ask(self, line: dict[str, Any], t: float) -> ProgramAnswer:
-        """Send a line and return the answer; raise LawError if there is none in time, or something else."""
+        """Send a line and return the answer; raise LawError without a valid answer in time."""
         what = f"{line['type']} at t = {t:.6g} s"
         if self._group is None:
-            raise LawError(f"{self._name} has ended before the {what}")
+            raise LawError(f"{self._name} ended before the {what}")
         try:
             self._put(msgspec.json.encode(line) + b"\n", what)
             reply = self._line(what)
@@ -173,14 +171,14 @@ class ProgramLaw(Law):
             decoded = decode_foreign(_decode, reply)
         except msgspec.DecodeError:
             shown = printable(reply.decode(errors="replace"), 100)
-            raise LawError(f"{self._name} answered the {what} with {shown!r}, which is none; e.g. {EXAMPLE}") from None
+            raise LawError(f"{self._name} answered the {what} with {shown!r}; answer e.g. {EXAMPLE}") from None
         if decoded.error:
             raise LawError(f"{self._name} says: {printable(decoded.error, 300)} ({what})")
         self._patience = self._choice.time_limit
         return decoded
 
     def _put(self, line: bytes, what: str) -> None:
-        """Write a line to the program; one that does not read fills the pipe, and then would block."""
+        """Write a line to the program; a program that does not read fills the pipe, and a write would block."""
         assert self._group is not None
         program = self._group.program
         assert program.stdin is not None
@@ -190,7 +188,7 @@ class ProgramLaw(Law):
             if self._rest or (piece := os.read(out, 65_536)):
                 shown = printable((self._rest or piece).decode(errors="replace"), 100)
                 self._group.kill()
-                raise LawError(f"{self._name} printed {shown!r} before the {what}; print one line for each that comes")
+                raise LawError(f"{self._name} printed {shown!r} before the {what}; print one line for each line read")
             raise LawError(self._ended(what))
         while line:
             if not _ready(file, select.POLLOUT, end - monotonic()):
@@ -204,9 +202,9 @@ class ProgramLaw(Law):
         end, file = monotonic() + self._patience, self._group.program.stdout.fileno()
         while b"\n" not in self._rest:
             if not _ready(file, select.POLLIN, end - monotonic()):
-                if self._group.program.poll() is not None:  # what it has started may hold its output open
+                if self._group.program.poll() is not None:  # a process that it started may hold its output open
                     raise LawError(self._ended(what))
-                self._group.kill()  # it is of no use any more, and may not hear that its input has ended
+                self._group.kill()  # it may not notice the end of its input
                 raise LawError(f"{self._name} did not answer the {what} within {self._patience:g} s")
             piece = os.read(file, 65_536)
             if not piece:
@@ -220,7 +218,7 @@ class ProgramLaw(Law):
     def _ended(self, what: str) -> str:
         assert self._group is not None
         code = self._group.wait(LEAVING)
-        self._group.kill()  # what it has started may still run
+        self._group.kill()  # processes that it started may still run
         if code is None:
             return f"{self._name} closed its input or its output at the {what}"
         return f"{self._name} ended at the {what} with " + (f"exit code {code}" if code >= 0 else f"signal {-code}")

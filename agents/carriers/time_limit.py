@@ -1,4 +1,4 @@
-"""Calls of anybody's code in Python that may hang: they are interrupted, and have failed."""
+"""Interrupt calls of foreign Python code that take too long; such a call has failed."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from gridpeers.wire.driver.machine import POSIX
 from gridpeers.wire.plugins.registry import ANYTHING, named
 
 FIRST = 10.0
-"""Times the time limit that a law may take to be made, or for its first answer: it may have to be loaded."""
+"""Factor on the time limit for the making of a law, or for its first answer, because code is loaded then."""
 
 BLOCKED = 10.0
-"""Times the time limit that a call may last in real time, while it waits and does not compute."""
+"""Factor on the time limit for a call in real time, while it waits and does not compute."""
 
 
 class _OverError(BaseException):
-    """The time is over; no Exception, so that a law that suppresses all of these is interrupted all the same."""
+    """The time is over. It is no Exception, so a law that suppresses every Exception is interrupted too."""
 
 
 @contextmanager
 def limited(what: str, seconds: float, limit: str) -> Iterator[None]:
-    """Interrupt what is inside when it takes longer than so many seconds of processor time, and raise LawError.
+    """Interrupt the block after some seconds of processor time, and raise LawError.
 
-    Of real time it may take `BLOCKED` times as many: what else a machine does must not decide what a run in simulated
-    time gives. It is interrupted by SIGALRM: in the main thread of a process alone, and not while C code does not
-    return; Windows has no such signal. The error names `what` is inside, and the `limit` as a scenario calls it.
+    In real time the limit is `BLOCKED` times as long: other load on the machine must not decide the result of a run in
+    simulated time. SIGALRM interrupts it, in the main thread of a process alone, and not while C code does not return;
+    Windows has no such signal. The error names the block by `what`, and the `limit` as a scenario calls it.
     """
     if not POSIX or threading.current_thread() is not threading.main_thread():
         yield
@@ -72,7 +72,7 @@ def limited(what: str, seconds: float, limit: str) -> Iterator[None]:
 
 
 def make_limited(law: type[Law], parameters: Mapping[str, Any], time_limit: float) -> TimeLimited:
-    """Return a law of a class, each call of which may last only so long; raise ValueError if it cannot be made."""
+    """Return a law of a class with a time limit on each call; raise ValueError if it cannot be made."""
     seconds = FIRST * time_limit
     try:
         with limited("its __init__", seconds, f"{seconds:g} s, ten times time_limit_s"):
@@ -80,12 +80,12 @@ def make_limited(law: type[Law], parameters: Mapping[str, Any], time_limit: floa
         return TimeLimited(made, time_limit)
     except LawError as error:
         raise ValueError(f"cannot be made: {error}") from error
-    except ANYTHING as error:  # its __init__ is anybody's code
+    except ANYTHING as error:  # its __init__ is foreign code
         raise ValueError(f"cannot be made: {named(error)}") from error
 
 
 class TimeLimited(Law):
-    """A law, each call of which may take only so long (s of processor time); see `limited`."""
+    """A law with a time limit (s of processor time) on each call; see `limited`."""
 
     def __init__(self, law: Law, time_limit: float) -> None:
         super().__init__(**{name: getattr(law, name) for name in LIMITS})
@@ -101,7 +101,7 @@ class TimeLimited(Law):
             return self.carried.step(own, neighbours, T)
 
     def close(self) -> None:
-        """End the law; the run is over, so that one that fails in it is but named in the log."""
+        """End the law; the run is over, so a failure goes to the log alone."""
         try:
             with limited("it", self._time_limit, self._limit):
                 self.carried.close()

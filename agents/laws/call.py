@@ -1,4 +1,4 @@
-"""Call a law: whatever it raises or returns, the agent gets set-points or one clear sentence. Pure."""
+"""Call a law: for each exception or result, the agent gets set-points or one clear sentence. Pure."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from gridpeers.wire.wording import printable, suggestion
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,31}")
 
 _ADDRESS = re.compile(r" at 0x[0-9a-f]+")
-"""Address of an object in memory: it differs in every run and helps no reader."""
+"""Address of an object in memory, which differs in every run."""
 
 
 class LawError(RuntimeError):
-    """A law that raised, took too long, or returned no decision."""
+    """A law raised an exception, took too long, or returned no decision."""
 
 
 def start_law(law: Law, own: Own) -> None:
@@ -67,14 +67,14 @@ def decide(law: Law, own: Own, neighbours: Sequence[Neighbour], T: float) -> Set
         )
     except LawError:
         raise
-    except ANYTHING as error:  # the result of a law is foreign code too: its bool(), float() or items() may raise
+    except ANYTHING as error:  # the result is foreign code too: its bool(), float() or items() may raise
         raise LawError(f"step at t = {own.t:.6g} s returned {_shown(result)}, which raised {named(error)}") from error
 
 
 def failed_at(law: Law, error: LawError, folder: str) -> str:
-    """Return where a law in Python failed, as " (mine.py:12)"; empty for a program or an FMU, which have no line here.
+    """Return the place where a law in Python failed, as " (mine.py:12)"; empty for a program or an FMU.
 
-    A file in `folder`, that of the scenario, is named from there.
+    A file in the scenario's `folder` is named relative to it.
     """
     carried = getattr(law, "carried", law)
     if type(carried).__module__.startswith("gridpeers.agents.carriers."):
@@ -111,12 +111,14 @@ def _checked(shared: Any, t: float) -> Mapping[str, float]:
             raise LawError(f"step at t = {t:.6g} s shares {_shown(name)}; a name has up to 32 letters, digits and _")
         checked[name] = _number(f'shared["{name}"]', value, t)
         if abs(checked[name]) > SHARED_LIMIT:
-            raise LawError(f"step at t = {t:.6g} s shares {name} = {value:g}; at most {SHARED_LIMIT:g} may travel")
+            raise LawError(
+                f"step at t = {t:.6g} s shares {name} = {value:g}; the largest magnitude is {SHARED_LIMIT:g}"
+            )
     return checked
 
 
 def objection_to(shared: Mapping[str, float], declared: Mapping[str, SharedQuantity]) -> str:
-    """Return the first value that is beyond the range that a law declares, and the range; "" if none is."""
+    """Return the first value beyond its declared range, and the range; empty if all are within."""
     for name, value in shared.items():
         it = declared.get(name)
         if it is not None and not it.low <= value <= it.high:
@@ -125,7 +127,7 @@ def objection_to(shared: Mapping[str, float], declared: Mapping[str, SharedQuant
 
 
 def misnamed(shared: Mapping[str, float], declared: Mapping[str, SharedQuantity]) -> str:
-    """Return the first value that is none of those that a law declares, if it declares any, and what may be meant."""
+    """Return the first value that the law does not declare, with a suggestion; empty if it declares none."""
     wrong = next((name for name in shared if name not in declared), "") if declared else ""
     return wrong and f"{wrong}, which it does not declare; {suggestion(wrong, declared, 'quantities')}"
 

@@ -46,7 +46,7 @@ class _Correction:
 
 
 class Centralised(Law):
-    """PI control of frequency and mean voltage at one inverter, whose corrections all others take over."""
+    """PI control of frequency and mean voltage at one inverter; all others apply its corrections."""
 
     source = "Guerrero et al., IEEE Trans. Ind. Electron. 58(1), 2011"
 
@@ -56,9 +56,9 @@ class Centralised(Law):
     k_pE: Annotated[float, Range(0, 100), "Proportional gain of voltage."] = 0.2
     k_iE: Annotated[float, Unit("1/s"), Range(0, 1e3), "Integral gain of voltage."] = 2.0
 
-    omega: Annotated[float, SHARED, Unit("pu"), "Correction of frequency, of the centre."]
-    E: Annotated[float, SHARED, Unit("pu"), "Correction of voltage, of the centre."]
-    v: Annotated[float, SHARED, Unit("pu"), "Terminal voltage, of all others."]
+    omega: Annotated[float, SHARED, Unit("pu"), "Correction of frequency, from the centre."]
+    E: Annotated[float, SHARED, Unit("pu"), "Correction of voltage, from the centre."]
+    v: Annotated[float, SHARED, Unit("pu"), "Terminal voltage, from all others."]
 
     def __init__(self, **parameters: Any) -> None:
         super().__init__(**parameters)

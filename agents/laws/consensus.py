@@ -116,7 +116,7 @@ def V_change(z: float, z_bar: float, d: float, v: float, leader: bool, gains: Ga
 class Consensus(Law):
     """The paper's law, (12)-(15): leaders restore frequency and voltage, all agree on shares of load and vars.
 
-    Its parameters are those of `Gains`, which a scenario sets, under its `[degraded_communication]`.
+    A scenario sets its parameters in `[gains]` and `[degraded_communication]`.
     """
 
     source = (

@@ -27,7 +27,7 @@ from gridpeers.wire.schema.table_schema import Range, Unit
 
 
 class EventTriggered(Consensus):
-    """The paper's consensus, with the triggering condition of Seyboth et al. in front of every broadcast."""
+    """The paper's consensus with event-based broadcasting: an agent sends after a sufficient change."""
 
     source = "Seyboth, Dimarogonas, Johansson, Automatica 49(1), 2013"
 

@@ -32,7 +32,7 @@ from gridpeers.wire.schema.table_schema import Range, Unit
 
 
 class FiniteTime(Law):
-    """Consensus by differences to a power below one, as of Wang and Xiao, with leaders that restore to nominal."""
+    """Consensus by differences to a power below one (Wang and Xiao), with leaders that restore nominal values."""
 
     source = "Wang, Xiao, IEEE Trans. Autom. Control 55(4), 2010; Zuo et al., IEEE Trans. Ind. Electron. 63(10), 2016"
 

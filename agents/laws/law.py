@@ -18,7 +18,7 @@ from gridpeers.wire.schema.table_reading import parameter_values
 from gridpeers.wire.schema.table_schema import Below, Range, Unit
 
 NOTHING_SHARED: Mapping[str, float] = MappingProxyType({})
-"""Default of `shared`: no further values."""
+"""Default of `shared`: no value."""
 
 
 class Own(NamedTuple):
@@ -27,7 +27,7 @@ class Own(NamedTuple):
     name: str
     """Name of the inverter."""
     leader: bool
-    """Whether it is grid-forming: g_i = 1 in (12)-(15)."""
+    """Whether it is grid-forming (g_i = 1 in the paper's equations (12)-(15))."""
     t: float
     """Run time of the measurement (s)."""
     P: float
@@ -39,11 +39,11 @@ class Own(NamedTuple):
     e: float
     """Measured frequency error (f - f_nom)/f_nom (pu)."""
     z: float
-    """m_q q, q measured, as in (14) and (15) (pu)."""
+    """m_q times the measured reactive power, as in (14) and (15) (pu)."""
     P_set: float
-    """Own set-point of real power (pu): the law's last result, or the plant's set-point at `start`."""
+    """Set-point of real power (pu): the last decision; at `start`, the set-point that the plant holds."""
     V_set: float
-    """Own set-point of voltage (pu)."""
+    """Set-point of voltage (pu), likewise."""
     m_p: float
     """P-f droop (pu frequency per pu power)."""
     m_q: float
@@ -55,7 +55,7 @@ class Own(NamedTuple):
     f_nom: float
     """Nominal frequency (Hz)."""
     P_saturated: int = 0
-    """1 if the inverter delivers less than P_set and cannot deliver more, -1 if more and not less, else 0."""
+    """1: it delivers less than P_set and cannot deliver more; -1: more, and cannot deliver less; else 0."""
     V_saturated: int = 0
     """The same for V_set."""
 
@@ -70,7 +70,7 @@ class Neighbour(NamedTuple):
     age: float
     """Age of the state (s of run time)."""
     weight: float
-    """Weight from 0 to 1 that the agent gives the state for its age; see `[degraded_communication]`."""
+    """Weight from 0 to 1 of a state of that age, by `[degraded_communication]`; 1 by default."""
     P_set: float
     """Its set-point of real power (pu)."""
     V_set: float
@@ -84,25 +84,27 @@ class Neighbour(NamedTuple):
     P_rated: float
     """Its rating (W)."""
     shared: Mapping[str, float] = NOTHING_SHARED
-    """Further values that its law shares."""
+    """Shared variables of its law, by name."""
 
 
 class Term(NamedTuple):
+    """One part of the change of a set-point."""
+
     name: str
-    """A word or two, such as "frequency error"."""
+    """One or two words, such as "frequency error"."""
     value: float
-    """Its part of the step (pu)."""
+    """Part of the change (pu)."""
     neighbour: str = ""
-    """Name of the neighbour whose state it comes from; empty if it comes from the own inverter."""
+    """Neighbour whose state causes it; empty for the own inverter."""
 
 
 class Terms(NamedTuple):
-    """A decision in terms, before its limits: each tuple adds up to the change of a set-point."""
+    """A decision as the terms of its change, before the limits."""
 
     P_set: Sequence[Term] = ()
-    """Terms of the change of P_set (pu of own rating)."""
+    """Terms that add up to the change of P_set (pu of own rating)."""
     V_set: Sequence[Term] = ()
-    """Terms of the change of V_set (pu of own nominal)."""
+    """Terms that add up to the change of V_set (pu of own nominal)."""
     shared: Mapping[str, float] = NOTHING_SHARED
     """As in `SetPoints`."""
     send: bool = True
@@ -110,16 +112,18 @@ class Terms(NamedTuple):
 
 
 class SetPoints(NamedTuple):
+    """A decision: the set-points of the next control period, and the message to the neighbours."""
+
     P_set: float
     """Set-point of real power (pu of own rating); the agent limits it to P_set_min, P_set_max."""
     V_set: float
     """Set-point of voltage (pu of own nominal); the agent limits it to V_set_min, V_set_max."""
     shared: Mapping[str, float] = NOTHING_SHARED
-    """Further values for the neighbours, at most 16, each by a name of letters, digits and "_"."""
+    """Shared variables for the neighbours: at most 16, with names of letters, digits and "_"."""
     send: bool = True
-    """Whether the neighbours get the state. If not, they keep the last one that they heard."""
+    """Whether the neighbours get this state; otherwise they keep the last one."""
     terms: Callable[[], Terms] | None = None
-    """Splits this change into its terms, for a law too fast to do so in each period; only `gridpeers why` calls it."""
+    """Function that splits this change into terms; only `gridpeers why` calls it."""
 
 
 class Law:
@@ -129,7 +133,7 @@ class Law:
     """
 
     source: ClassVar[str] = ""
-    """Publication that the law is from."""
+    """Publication of the law."""
 
     P_set_min: Annotated[
         float, Unit("pu"), Range(-100, 100), Below("P_set_max", or_equal=True), "Lower limit of P_set."
@@ -145,18 +149,18 @@ class Law:
             setattr(self, name, value)
 
     def start(self, own: Own) -> None:
-        """Start, or restart, from the set-points that the plant holds, and clear the law's memory."""
+        """Clear the memory, and start from the set-points that the plant holds, `own.P_set` and `own.V_set`."""
 
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints | Terms:
-        """Decide the set-points of one control period T (s), as such or as the terms of their change.
+        """Return the set-points of the next control period T (s), or the terms of their change.
 
-        The neighbours are those whose states count, in the order of the inverters. An agent adds up the terms, and
-        `gridpeers why` shows them; a decision without terms is one term.
+        `neighbours` are those whose states count, in the order of the inverters. The agent adds up terms, and
+        `gridpeers why` shows them; set-points without terms are one term.
         """
         raise NotImplementedError
 
     def close(self) -> None:
-        """Release whatever the law has opened."""
+        """Release the files and processes of the law, at the end of the run."""
 
 
 LIMITS = ("P_set_min", "P_set_max", "V_set_min", "V_set_max")

@@ -24,7 +24,7 @@ from gridpeers.agents.laws.law import Neighbour, Own, SetPoints, Term, Terms
 from gridpeers.wire.schema.table_schema import Range, Unit
 
 SLOWER = 10.0
-"""How much slower trust comes back than it goes."""
+"""Ratio of the times in which trust returns and in which it falls."""
 
 
 class _Memory(NamedTuple):
@@ -33,28 +33,34 @@ class _Memory(NamedTuple):
     t: float
     """Run time (s) of the last step with it."""
     P_set: float
-    """What counted of its P_set (pu)."""
+    """P_set that counted (pu)."""
     Q: float
-    """What counted of its Q (pu)."""
+    """Q that counted (pu)."""
     trust: float
     """From 0 to 1."""
 
 
 class Resilient(Consensus):
-    """The paper's law with W-MSR and checks of plausibility, for neighbours that may lie."""
+    """The paper's law with trimmed means (W-MSR) and checks of plausibility, against neighbours that lie."""
 
     source = "LeBlanc et al., IEEE J. Sel. Areas Commun. 31(4), 2013"
 
-    F: Annotated[int, Range(0, 100), "Liars among the neighbours of an agent that are borne; 0 trims nothing."] = 1
-    tolerance: Annotated[float, Unit("pu"), Range(0, 100), "Beyond what an inverter can do: implausible. 0: off."] = 0.0
-    rate: Annotated[float, Unit("pu/s"), Range(0, 1e6), "Fastest change of what counts of a neighbour. 0: any."] = 0.0
-    T_out: Annotated[float, Unit("s"), Range(0, 1e3), "Time in which an implausible one is distrusted. 0: none."] = 0.0
+    F: Annotated[int, Range(0, 100), "Largest number of liars among the neighbours of an agent; 0 trims none."] = 1
+    tolerance: Annotated[
+        float, Unit("pu"), Range(0, 100), "A state beyond the limits by more than this is implausible; 0: off."
+    ] = 0.0
+    rate: Annotated[
+        float, Unit("pu/s"), Range(0, 1e6), "Fastest change of a neighbour's values that counts; 0: any."
+    ] = 0.0
+    T_out: Annotated[
+        float, Unit("s"), Range(0, 1e3), "Time in which trust in an implausible neighbour falls; 0: off."
+    ] = 0.0
 
     def __init__(self, **parameters: Any) -> None:
         super().__init__(**parameters)
         if self.T_out and not self.tolerance:
             raise ValueError(
-                f"has T_out = {self.T_out:g} s and no tolerance, so that nobody is ever implausible; give "
+                f"has T_out = {self.T_out:g} s without a tolerance, so no state is ever implausible; give "
                 "tolerance, e.g. 0.1 (pu), or leave T_out out"
             )
         self._memory: dict[str, _Memory] = {}
@@ -95,7 +101,7 @@ class Resilient(Consensus):
     def _believed(
         self, own: Own, neighbours: Sequence[Neighbour], T: float
     ) -> tuple[list[Neighbour], dict[str, _Memory]]:
-        """Return the neighbours that are plausible, as far as they are believed, and what to remember of all."""
+        """Return the plausible neighbours with the values that count, and the memory of all."""
         if not (self.tolerance or self.rate):
             return list(neighbours), self._memory
         believed, memory = [], dict(self._memory)
@@ -123,7 +129,7 @@ class Resilient(Consensus):
         return believed, memory
 
     def _is_plausible(self, own: Own, n: Neighbour) -> bool:
-        """Return whether an inverter in the own island can be as a neighbour says."""
+        """Return whether an inverter in the own island can have a neighbour's state."""
         if not self.tolerance:
             return True
         low, high = self.P_set_min - self.tolerance, self.P_set_max + self.tolerance
@@ -132,7 +138,7 @@ class Resilient(Consensus):
 
 
 def _left_out(neighbours: Sequence[Neighbour], believed: Sequence[Neighbour], rest: Sequence[Neighbour]) -> list[Term]:
-    """Return a term of 0 for each neighbour that does not count, by the reason."""
+    """Return a term of 0 for each neighbour that does not count, named after the reason."""
     plausible, counts = {n.name for n in believed}, {n.name for n in rest}
     trimmed = [Term("trimmed", 0.0, n.name) for n in believed if n.name not in counts]
     return trimmed + [Term("implausible", 0.0, n.name) for n in neighbours if n.name not in plausible]

@@ -236,7 +236,7 @@ def _check(path: str, key: PluginKey, registry: Registry[Any], problems: Problem
     table = table_of(key)
     names = [(name, table.get(name, "")) for name in ("use", "folder")]
     found = [(name, "must be a text in quotes") for name, value in names if not isinstance(value, str)]
-    found = found or [(name, "can be no name of a module or folder") for name, value in names if is_no_path(value)]
+    found = found or [(name, "cannot be the name of a module or folder") for name, value in names if is_no_path(value)]
     if not found and not table.get("use"):
         found.append(("", f'names no {registry.kind}; write e.g. {{ use = "mine:Name" }}'))
     found = found or [(name, text) for name, value in table.items() if (text := scalar_objection(value))]

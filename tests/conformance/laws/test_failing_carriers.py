@@ -130,13 +130,13 @@ READY = 'echo \'{"type": "ready"}\'; read -r _'
     ("while :; do echo too much >&2; done", SHORT, r"did not answer the start at t = 0 s within 0.5 s"),
     ("sleep 600 & exit 3", ENDS, r"ended at the start at t = 0 s with exit code 3"),
     ("head -c 200000 /dev/zero | tr '\\0' x; sleep 600", LONG, r"answered the start at .* with more than 100000 bytes"),
-    (f"{READY}; echo hello; read -r _", LONG, r"answered the step at t = 0 s with 'hello', which is none; e.g. "),
+    (f"{READY}; echo hello; read -r _", LONG, r"answered the step at t = 0 s with 'hello'; answer e.g. "),
     (f"{READY}; echo '{{\"error\": \"no idea\"}}'; read -r _", LONG, r"says: no idea \(step at t = 0 s\)"),
-    ("printf '{}\n{}\n'; read -r _", LONG, r"printed '.*' before the step at t = 0 s; print one line for each that c"),
+    ("printf '{}\n{}\n'; read -r _", LONG, r"printed '.*' before the step at t = 0 s; print one line for each"),
     (f"{READY}; exit 7", LONG, r"ended at the step at t = 0 s with exit code 7"),
 ])  # fmt: skip
-def test_a_program_that_does_not_answer_as_it_should_is_told_in_one_line(script: str, limit: float, said: str) -> None:
-    """Half a line, endless complaints, an end that leaves another program, a line without end; rubbish, an error."""
+def test_a_program_with_a_wrong_answer_fails_with_one_line(script: str, limit: float, said: str) -> None:
+    """Half a line, endless output, an early end with a child, a line without end, no JSON, an error, two lines."""
     choice = LawChoice(command=("sh", "-c", f"exec 2>/dev/null; read -r _; {script}"), time_limit=limit)
     with pytest.raises(LawError, match=said):
         two_steps(ProgramLaw(choice))
@@ -148,5 +148,5 @@ def test_a_law_that_was_closed_says_so(tmp_path: Path) -> None:
     law.close()
     law.close()
 
-    with pytest.raises(LawError, match="cat has ended before the start at t = 0 s"):
+    with pytest.raises(LawError, match="cat ended before the start at t = 0 s"):
         law.start(OWN)

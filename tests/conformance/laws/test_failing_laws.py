@@ -166,7 +166,7 @@ def test_a_program_that_the_system_cannot_run_is_refused(text: str, tmp_path: Pa
     file.write_text(text)
     file.chmod(0o755)
 
-    with pytest.raises(ValueError, match=r"law program \./law: .* in the first line of a script the path of its inter"):
+    with pytest.raises(ValueError, match=r"law program \./law: .* name the interpreter in the first line"):
         ProgramLaw(LawChoice(command=("./law",), folder=str(tmp_path)))
 
 

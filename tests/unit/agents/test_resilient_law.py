@@ -155,7 +155,7 @@ def test_a_neighbour_that_was_only_ever_implausible_is_held_back_if_it_is_distru
 
 def test_distrust_without_a_tolerance_is_refused() -> None:
     """Nobody would ever be implausible, so that T_out did nothing."""
-    with pytest.raises(ValueError, match=r"has T_out = 0\.5 s and no tolerance, so that nobody is ever implausible"):
+    with pytest.raises(ValueError, match=r"has T_out = 0\.5 s without a tolerance, so no state is ever implausible"):
         Resilient(T_out=0.5, rate=1.0)
 
 

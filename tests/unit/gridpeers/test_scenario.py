@@ -98,7 +98,7 @@ def test_a_scenario_without_events_runs_and_has_no_windows() -> None:
 
 @pytest.mark.parametrize(("changes", "said"), [
     ({"gains.k_p": {3, "b"}}, "replace: gains.k_p: must be a number, got [3,"),
-    ({"case.IV.law": {"command": [LONG]}}, "case.IV.law.command: begins with what can be no name of a program"),
+    ({"case.IV.law": {"command": [LONG]}}, "case.IV.law.command: begins with a text that cannot be the name"),
     ({"case.IV.graph": {"use": "mine:star", "k": 10**30}}, "case.IV.graph.k: a whole number has at most 64 bits"),
     ({"case.IV.link": [{"on": "* <-> *", "mine:Jam": {"folder": LONG}}]}, "must be the path of a folder"),
     ({"metrics": [{"use": "mine:low", "band": float("nan")}]}, "metrics[0].band: must be a finite number, got nan"),
