@@ -54,12 +54,12 @@ class DegradedCommunication(msgspec.Struct, frozen=True, forbid_unknown_fields=T
     """
 
     stale: Literal["hold", "skip", "age-weighted"] = "hold"
-    """Weight of a neighbour's state that is not new: in full ("hold"), none ("skip"), or less the
-    older it is compared with the usual age on its link ("age-weighted")."""
+    """Weight of a neighbour's state that is not new: 1 ("hold"), 0 ("skip"), or smaller the older it is beyond the
+    usual age on its link ("age-weighted")."""
     T_age: Annotated[float, Unit("s"), Plausible("a time in which a state ages", 1e-3, 60.0, above_zero=True)] = 0.2
     """Time (s) in which the weight of an ageing state falls to 1/e, for "age-weighted"."""
     max_age: Annotated[float, Unit("s"), Plausible("the greatest age of a state", 0.0, 60.0)] = 0.0
-    """Age (s) beyond which a neighbour does not count at all. 0: none in simulated time, 0.25 s in real time."""
+    """Age (s) of a state beyond which it does not count. 0: no limit in simulated time, 0.25 s in real time."""
     weights: Literal["paper", "degree-normalised"] = "paper"
     """Weights c_ij of the neighbours: 1 ("paper"), or 1 over their number ("degree-normalised")."""
     kappa_c: Annotated[float, Unit("1/s"), Plausible("gain kappa_c", 1e-3, 1e4, above_zero=True)] = 12.0
@@ -75,14 +75,14 @@ class DegradedCommunication(msgspec.Struct, frozen=True, forbid_unknown_fields=T
     """Time (s) of no progress towards its droop characteristic after which an inverter counts as saturated, for
     "conditional"."""
     islands: Literal["switches", "frequency", "ignored"] = "switches"
-    """How an agent knows which neighbours are in another island, to leave them out: from the positions of switches
-    ("switches"), from the drift of their angles ("frequency"), or not at all ("ignored"). It always knows whether it is
+    """How an agent detects neighbours in another island, to leave them out: by the positions of switches ("switches"),
+    by the drift of their angles ("frequency"), or not at all ("ignored"). It always knows whether it is
     grid-connected."""
     slip_max: Annotated[
         float, Unit("cycles"), Plausible("the greatest slip within an island", 1e-4, 0.5, above_zero=True)
     ] = 0.01
-    """Slip (cycles) against the own inverter beyond which a neighbour counts as in another island, for "frequency";
-    larger than the angles between inverters of one island ever swing. > 0."""
+    """Drift (cycles) of a neighbour's angle beyond which it counts as in another island, for "frequency"; set it above
+    the swings of angles within an island."""
 
 
 Secondary = Literal["none", "GFM", "all"] | tuple[str, ...]

@@ -26,7 +26,7 @@ from gridpeers.netem.draws import Chain, Stream
 from gridpeers.wire.schema.table_schema import Below, Plausible, Problem, Unit, in_percent
 
 LONGEST_DELAY = 10.0
-"""Delays above this (s) are taken for milliseconds by problem: control over such a link is not what netem is for."""
+"""Longest plausible delay (s); a larger number is probably in milliseconds."""
 
 DELAY = Plausible("a delay", 0.0, LONGEST_DELAY)
 
@@ -37,7 +37,7 @@ Sampler = Callable[[int], float]
 
 class DelayModel(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="model"):
     fifo: bool = False
-    """Whether messages keep their order: one that would overtake arrives together with the one before it."""
+    """true: messages keep their order; one that would overtake arrives together with the one before it."""
 
     def sampler(self, stream: Stream) -> Sampler:
         """Return the delays (s) of one link by message number."""
@@ -65,7 +65,7 @@ class RandomDelay(DelayModel, frozen=True, kw_only=True):
 
 
 class Constant(DelayModel, frozen=True, kw_only=True, tag="constant"):
-    """Delay d for every message; in a file `delay = 0.1` says the same."""
+    """Delay d for every message; in a file `delay = 0.1` means the same."""
 
     delay_s: Annotated[float, Unit("s"), DELAY]
     """d (s)."""
@@ -150,11 +150,11 @@ class Trace(DelayModel, frozen=True, kw_only=True, tag="trace"):
     """
 
     file: str = ""
-    """Path of the CSV file, seen from the scenario's."""
+    """Path of the CSV file, relative to the scenario."""
     delays_s: tuple[float, ...] = ()
     """The delays (s), in the order of the messages."""
     spread: bool = True
-    """Whether each link starts at a place of its own, drawn once; else all links have the same delay at once."""
+    """true: each link starts at a random row of its own; false: all links have the same delay at once."""
 
     def sampler(self, stream: Stream) -> Sampler:
         delays = self.delays_s

@@ -1,4 +1,4 @@
-"""Lies of an agent: what others hear in place of its state. Pure.
+"""Lies of an agent: the false values that others hear in place of its state. Pure.
 
 Every lie is a valid message, within the bounds of its fields. It keeps the number, the time and the island of the true
 state, so that no check of form, order or age stops it.
@@ -41,13 +41,13 @@ Before = Callable[[float], State]
 
 class Lie(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="model"):
     in_name_of: Annotated[str, Example('"inv5"')] = ""
-    """Another inverter, in whose name it lies: that one's states arrive falsified, its own are true. Empty: in its own.
-    Certificates keep such a lie out (docs/understand/guarantees.md)."""
+    """Another inverter, in whose name it lies: that one's states arrive false, its own are true. Empty: its own name.
+    Certificates exclude such a lie (docs/understand/guarantees.md)."""
     plant: bool = False
-    """Whether the plant hears the lie as well, so that the inverter follows it; else only its neighbours hear it."""
+    """true: the plant hears the lie as well, and the inverter follows it; false: only its neighbours hear it."""
 
     def told(self, state: State, since: float, before: Before, draw: Callable[[str], Stream]) -> State:
-        """Return what is heard in place of a state, by a lie that began at `since` (s of run time).
+        """Return the false state that others hear, by a lie that began at `since` (s of run time).
 
         `before` gives the sender's earlier states, `draw` the random numbers for a quantity.
         """
@@ -97,7 +97,7 @@ class Scale(Lie, frozen=True, kw_only=True, tag="scale"):
 
 class _OfQuantities(Lie, frozen=True, kw_only=True):
     of: tuple[Quantity, ...] = QUANTITIES
-    """What the lie is about."""
+    """Quantities that the lie changes."""
 
     def relations(self) -> list[Problem]:
         return [] if self.of else [Problem("of", 'names nothing; write of = ["P_set"], or leave it out for all')]
@@ -138,7 +138,7 @@ class Random(Lie, frozen=True, kw_only=True, tag="random"):
     Q_var: Annotated[float, Unit("var"), _WIDTH] = 0.0
     """Half width for the reactive power (var)."""
     two_faced: bool = False
-    """Whether every neighbour hears another number; else all hear the same."""
+    """true: every neighbour hears a different number; false: all hear the same."""
 
     def told(self, state: State, since: float, before: Before, draw: Callable[[str], Stream]) -> State:
         widths = zip(QUANTITIES, (self.P_set_W, self.V_set_V, self.Q_var), strict=True)
@@ -208,4 +208,4 @@ def _from(state: State, earlier: State, of: tuple[Quantity, ...]) -> State:
 
 
 def _no_lie(nothing: bool, keys: str) -> list[Problem]:
-    return [Problem("", f"is no lie, as it changes nothing; give {keys}")] if nothing else []
+    return [Problem("", f"changes nothing; give {keys}")] if nothing else []

@@ -69,7 +69,7 @@ def _chosen(cumulated: tuple[float, ...], u: float) -> int:
 
 
 class Bernoulli(LossModel, frozen=True, kw_only=True, tag="bernoulli"):
-    """Loss with probability p; in a file `loss = 0.02` says the same."""
+    """Loss with probability p; in a file `loss = 0.02` means the same."""
 
     p: Annotated[float, probability("of a loss")]
     """Probability of loss."""

@@ -1,4 +1,4 @@
-"""What a medium does: links that are down, a line of finite rate with its queue, slots, copies, and flipped bits."""
+"""Faults of a medium: links that are down, a line of finite rate with its queue, slots, copies, flipped bits."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ LONGEST_FLAP = 600.0
 
 
 class Cut(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Nothing passes as long as the entry holds; in a file `cut = true` says the same."""
+    """Nothing passes while the entry holds; in a file `cut = true` means the same."""
 
     hold: bool = False
-    """False: messages are lost, reason "cut". True: they are kept, and all go on when the cut ends."""
+    """false: messages are lost, reason "cut"; true: they wait, and all arrive when the cut ends."""
 
     def down_until(self, t: float, from_s: float, to_s: float) -> float | None:
-        """Return until when the link is down at t (s of run time), None if it is up."""
+        """Return the time (s of run time) until which the link is down at t, None if it is up."""
         return to_s if from_s <= t < to_s else None
 
 
 class Flap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Up for up_s, down for down_s, and so on, beginning with up at the entry's from_s."""
+    """Up for up_s, down for down_s, and so on; the entry begins with up at from_s."""
 
     up_s: Annotated[float, Unit("s"), Plausible("the up time of a flap", 0.0, LONGEST_FLAP, above_zero=True)]
-    """How long the link is up (s)."""
+    """Time (s) for which the link is up."""
     down_s: Annotated[float, Unit("s"), Plausible("the down time of a flap", 0.0, LONGEST_FLAP, above_zero=True)]
-    """How long it is down (s)."""
+    """Time (s) for which it is down."""
     hold: bool = False
-    """False: messages are lost while it is down, reason "flap". True: they are kept, and go on when it is up."""
+    """false: messages are lost while it is down, reason "flap"; true: they wait, and arrive when it is up."""
 
     def down_until(self, t: float, from_s: float, to_s: float) -> float | None:
         if not from_s <= t < to_s:
@@ -51,7 +51,7 @@ class Flap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 class Rate(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    r"""First in, first out, what does not fit is dropped at the tail, reason "queue".
+    r"""A line of finite rate, first in, first out; a message that does not fit its queue is dropped, reason "queue".
 
     A message of b bytes that comes at time t, when the line is busy until T, finds :math:`q = \max(0, (T - t) R)` bytes
     not yet sent. It goes if q is 0 or if q + b fits the queue, and is through at :math:`\max(t, T) + b / R`.
@@ -62,7 +62,7 @@ class Rate(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     ]
     """R (bytes per second). A line of 9.6 kbit/s has 1200."""
     queue_bytes: Annotated[int, Unit("bytes"), Plausible("a queue", 1, 1e9)] = 10_000
-    """Most bytes that may wait, the message being sent included; an idle line takes any message."""
+    """Longest queue (bytes), with the message being sent; an idle line takes any message."""
 
     def through(self, ready: float, busy_until: float, size: int) -> float | None:
         """Return when the message's last byte is sent (s, as the others), None if the queue is full.
@@ -86,13 +86,13 @@ class Slots(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """Slot n lasts from offset_s + n period_s for length_s; a message outside waits for the next one.
 
     Times are run time, so that links with different offsets share a medium. A slot has room for any number of messages;
-    give a rate as well where it has not.
+    give a rate as well to limit it.
     """
 
     period_s: Annotated[float, Unit("s"), Plausible("the period of slots", 0.0, 10.0, above_zero=True)]
-    """Distance of the slots' beginnings (s)."""
+    """Time (s) from the start of a slot to the start of the next."""
     offset_s: Annotated[float, Unit("s"), Plausible("the offset of slots", 0.0, 10.0), Below("period_s")] = 0.0
-    """Beginning of the first slot (s), below period_s."""
+    """Start of the first slot (s), below period_s."""
     length_s: Annotated[
         float,
         Unit("s"),
@@ -121,25 +121,25 @@ _WHETHER, _WHICH, _PER_COPY = 0, 1, 2
 
 
 class Duplicate(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """With probability p a copy follows, a fixed time later; in a file `duplicate = 0.01` says: at once."""
+    """A copy follows with probability p, a fixed time later; in a file `duplicate = 0.01` means at once."""
 
     p: Annotated[float, probability("of a duplicate")]
     """Probability that a delivered message has a copy."""
     extra_delay_s: Annotated[float, Unit("s"), DELAY] = 0.0
-    """How much later the copy arrives (s)."""
+    """Added delay of the copy (s)."""
 
     def sampler(self, stream: Stream) -> Callable[[int], bool]:
         return partial(stream.chance, self.p)
 
 
 class Corrupt(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """With probability p a bit of a copy is flipped, each bit alike; in a file `corrupt = 0.001` says the same."""
+    """One random bit of a copy flips with probability p; in a file `corrupt = 0.001` means the same."""
 
     p: Annotated[float, probability("of a corruption")]
     """Probability that an arriving copy of a message is corrupted."""
     checksum: bool = False
-    """True: the link notices it by its checksum (CRC-32 finds every single bit) and drops the copy, reason "checksum".
-    False: the copy is handed on, and the receiver finds it by the message's own CRC-32: a reject, of kind "corrupt"."""
+    """true: the link detects it by a checksum (CRC-32 finds every single bit) and drops the copy, reason "checksum".
+    false: the receiver detects it by the message's own CRC-32 and rejects the copy, kind "corrupt"."""
 
     def sampler(self, stream: Stream) -> Callable[[int, int, int], int | None]:
         uniform, below, p = stream.uniform, stream.below, self.p

@@ -105,7 +105,7 @@ Judge = Callable[[int, float, int], float | None]
 
 
 def judge_of(plugin: Plugin, src: str, dst: str, stream: Stream, tell: Callable[[str], None]) -> Judge:
-    """Return the judge of a fault on one link; one that fails is told in a sentence, and does nothing from then on."""
+    """Return the judge of a fault on one link; one that fails is reported, and does nothing from then on."""
     try:
         fault = made(FAULTS, plugin)
     except ValueError as error:
@@ -128,7 +128,8 @@ def judge_of(plugin: Plugin, src: str, dst: str, stream: Stream, tell: Callable[
         except ANYTHING as error:  # a fault is anybody's code
             why = f"raised {named(error)}"
         failed = True
-        tell(f"link fault {plugin.use} on {src} -> {dst} {why} at t = {t:.6g} s, message {seq}; it does nothing since")
+        when = f"at t = {t:.6g} s, message {seq}"
+        tell(f"link fault {plugin.use} on {src} -> {dst} {why} {when}; it does nothing from then on")
         return 0.0
 
     return judge

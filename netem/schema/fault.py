@@ -151,16 +151,16 @@ def _written_own(plugin: Plugin) -> tuple[str, dict[str, Any]]:
 
 
 class Fault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
-    """Faults of some links for a time. A message is judged by the entries that hold at the time it was sent."""
+    """Faults of some links for a time. The time at which a message was sent decides which entries apply to it."""
 
     on: Annotated[str, Example('"inv4 <-> inv7"')]
-    """Which links, e.g. "inv4 <-> inv7"; see `gridpeers.netem.schema.pattern`."""
+    """Links, e.g. "inv4 <-> inv7" (docs/reference/link-faults.md)."""
     from_s: RunTime = 0.0
-    """From when (s of run time)."""
+    """Start (s of run time)."""
     to_s: EndTime = None
-    """Until when (s); without it, to the end of the run."""
+    """End (s); without it, the end of the run."""
     profile: str = ""
-    """Name of a profile; keys given beside it take the place of the profile's."""
+    """Name of a profile; keys beside it replace its keys."""
     delay: Annotated[AnyDelay | float | None, Shorthand(Constant, "delay_s")] = None
     """Delay; a number is a constant one (s)."""
     loss: Annotated[AnyLoss | float | None, Shorthand(Bernoulli, "p")] = None
@@ -174,7 +174,7 @@ class Fault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     slots: Slots | None = None
     """Time slots."""
     cut: Cut | bool | None = None
-    """Whether the link is down."""
+    """true: the link is down."""
     flap: Flap | None = None
     """Up and down in turn."""
     own: Annotated[tuple[Plugin, ...], OtherKeys(_is_own, _read_own, _written_own)] = ()

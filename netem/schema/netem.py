@@ -1,4 +1,4 @@
-"""All entries of a scenario about links and nodes, and their problems."""
+"""The entries of a scenario on links and nodes, and their problems."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ class Skew(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     """An agent's own clock: it shows factor * t + offset_s at run time t."""
 
     factor: Annotated[float, Plausible("the rate of a clock", 0.5, 2.0, hint=_in_ppm)] = 1.0
-    """How fast it goes: 1.0001 gains 100 ppm, as a cheap crystal may."""
+    """Rate of the clock: 1.0001 gains 100 ppm, as a cheap crystal may."""
     offset_s: Annotated[float, Unit("s"), Plausible("the offset of a clock", -3600.0, 3600.0)] = 0.0
-    """By how much it is ahead at t = 0 (s); negative is behind."""
+    """Lead of the clock at t = 0 (s); negative is a lag."""
 
 
 class NodeFault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
@@ -36,19 +36,19 @@ class NodeFault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     name: Annotated[str, Example('"inv3"')]
     """The inverter."""
     from_s: RunTime = 0.0
-    """From when (s of run time)."""
+    """Start (s of run time)."""
     to_s: EndTime = None
-    """Until when (s); without it, to the end of the run."""
+    """End (s); without it, the end of the run."""
     kill: bool = False
-    """Whether its process ends at from_s, without a word and for good."""
+    """true: its process is killed at from_s, and does not return."""
     pause: bool = False
-    """Whether its process stands still from from_s to to_s; messages to it wait."""
+    """true: its process stops from from_s to to_s; messages to it wait."""
     slow_s: Annotated[float, Unit("s"), Plausible("a computing delay", 0.0, LONGEST_DELAY)] = 0.0
-    """By how much longer it computes each tick (s), its state being sent that much later."""
+    """Added computing time of each tick (s); its state is sent that much later."""
     skew: Skew | None = None
-    """How wrong its clock is."""
+    """Error of its clock."""
     lies: AnyLie | None = None
-    """What others hear in place of its states from from_s to to_s."""
+    """False values that others hear in place of its states, from from_s to to_s."""
 
     def problems(self, names: Sequence[str] | None) -> list[Problem]:
         """Return the problems of the values; without names of agents any name may be one."""
@@ -60,28 +60,30 @@ class NodeFault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         if self.lies is not None:
             found += self._wrong_lies(self.lies, names)
         if self.kill and (self.pause or self.to_s is not None):
-            found.append(Problem("kill", "a killed agent stays so; for a while, write pause = true with to_s"))
+            found.append(
+                Problem("kill", "a killed agent does not return; for a limited time, write pause = true with to_s")
+            )
         elif self.pause and self.to_s is None:
-            found.append(Problem("pause", "a pause has an end; give to_s, or write kill = true"))
+            found.append(Problem("pause", "a pause needs an end; give to_s, or write kill = true"))
         return found
 
     def _wrong_lies(self, lie: AnyLie, names: Sequence[str] | None) -> list[Problem]:
         other, found = lie.in_name_of, []
         if other == self.name:
-            found.append(Problem("lies.in_name_of", f"{other} needs no lie to speak in its own name; leave it out"))
+            found.append(Problem("lies.in_name_of", f"{other} is the liar itself; leave it out"))
         elif other and names is not None and other not in names:
             text = f'no agent "{other}"; {suggestion(other, names, "agents")}'
             found.append(Problem("lies.in_name_of", text))
         if self.kill or self.pause:
-            found.append(Problem("lies", "an agent that is killed or paused says nothing; write an entry for each"))
+            found.append(Problem("lies", "a killed or paused agent sends nothing; write an entry for each"))
         return found
 
 
 class Netem(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
-    """Faults of the links and nodes of a run. Every agent gets all of them, and uses those of the links to it."""
+    """Faults of the links and nodes of a run. Every agent gets all of them, and applies those of its incoming links."""
 
     seed: Annotated[int, NO_KEY] = 1
-    """Seed of everything drawn at random."""
+    """Seed of all random draws."""
     links: tuple[Fault, ...] = msgspec.field(default=(), name="link")
     """Entries `[[link]]`."""
     partitions: tuple[Partition, ...] = msgspec.field(default=(), name="partition")

@@ -17,7 +17,7 @@ from gridpeers.wire.wording import suggestion
 
 
 class Partition(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
-    """Cuts, both ways, every link between two groups. Agents in no group form one more group.
+    """Cut of every link between two groups, in both directions. Agents in no group form one more group.
 
     The plant keeps all its links unless a group names it.
     """
@@ -25,16 +25,16 @@ class Partition(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     groups: Annotated[tuple[tuple[str, ...], ...], Example('[["inv1", "inv2"], ["MG2"]]')] = ()
     """Groups of inverters or microgrids, e.g. [["inv1", "inv2"], ["MG2"]]."""
     by: Literal["", "microgrid", "island", "halves"] = ""
-    """Instead of groups: each microgrid one, each electrical island one, or the first half of the inverters' table
-    and the second."""
+    """Instead of groups: one for each microgrid, one for each electrical island, or the first and the second half of
+    the inverters' table."""
     alone: str = ""
-    """Instead of groups: this inverter's agent, from everybody else."""
+    """Instead of groups: the agent of this inverter, apart from all others."""
     from_s: RunTime = 0.0
-    """From when (s of run time)."""
+    """Start (s of run time)."""
     to_s: EndTime = None
-    """Until when (s); without it, to the end of the run."""
+    """End (s); without it, the end of the run."""
     hold: bool = False
-    """Whether messages between groups are kept and go on when the partition ends; else they are lost."""
+    """true: messages between groups wait, and arrive after the partition ends; false: they are lost."""
 
     def group(self, name: str, microgrids: Mapping[str, str]) -> str | None:
         """Return the group of an agent; None for the plant, unless a group names it."""
@@ -110,14 +110,14 @@ class Partition(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         for i, group in enumerate(self.groups):
             for name in group:
                 if name not in lower and name.lower() not in lower:
-                    text = f'nobody is called "{name}"; {suggestion(name, known, "names")}'
+                    text = f'no agent or microgrid "{name}"; {suggestion(name, known, "names")}'
                     found.append(Problem(f"groups[{i}]", text))
                 elif name in seen:
-                    text = f'"{name}" is in groups[{seen[name]}] already; nobody is on both sides'
+                    text = f'"{name}" is in groups[{seen[name]}] already; an agent is in one group only'
                     found.append(Problem(f"groups[{i}]", text))
                 seen.setdefault(name, i)
         if not found and self.by != "island":
             parts = {self.group(name, microgrids) for name in (*names, PLANT)} - {None}
             if len(parts) < 2:
-                found.append(Problem("", "parts nobody: all agents are in one group"))
+                found.append(Problem("", "separates no agents: all are in one group"))
         return found

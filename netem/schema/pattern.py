@@ -55,7 +55,7 @@ class Pattern(NamedTuple):
 
 @lru_cache(maxsize=1024)
 def parse(text: str) -> Pattern:
-    """Read a pattern; if it is none, raise ValueError with what one looks like.
+    """Read a pattern; ValueError shows the right form.
 
     Examples
     --------
@@ -79,7 +79,7 @@ def _side(text: str, whole: str) -> EndSet:
         names = (text,)
     if not all(re.fullmatch(r"\*|[A-Za-z0-9_.-]+", name) for name in names):
         rule = "write an inverter, a microgrid, plant, *, or several as {inv1, inv2}"
-        raise ValueError(f'"{text}" in "{whole}" is no name; {rule}')
+        raise ValueError(f'"{text}" in "{whole}" is not a name; {rule}')
     return EndSet(names)
 
 
@@ -91,7 +91,7 @@ def objections(text: str, names: Iterable[str] | None, microgrids: Mapping[str, 
     >>> objections("inv1 -> inv2", ["inv1", "inv2"], {})
     []
     >>> objections("a -> inv1", ["inv1"], {})
-    ['"a -> inv1" matches nothing: nobody is called "a"; the names are inv1, plant, *']
+    ['"a -> inv1" matches no link: there is no "a"; the names are inv1, plant, *']
     """
     try:
         pattern = parse(text)
@@ -106,16 +106,15 @@ def objections(text: str, names: Iterable[str] | None, microgrids: Mapping[str, 
     lower = {group.lower() for group in groups}
     if unknown := [name for name in named if name not in known and name.lower() not in lower]:
         return [
-            f'"{text}" matches nothing: nobody is called "{name}"; {suggestion(name, known, "names")}'
-            for name in unknown
+            f'"{text}" matches no link: there is no "{name}"; {suggestion(name, known, "names")}' for name in unknown
         ]
     if any(pattern.matches(src, dst, microgrids) for src, dst in links_among(agents)):
         return []
     name = next((name for name in (PLANT, *agents) if pattern.left.holds(name, microgrids)), "")
     if not name:
-        return [f'"{text}" matches nothing: there is no inverter']
+        return [f'"{text}" matches no link: there is no inverter']
     return [
-        f'"{text}" matches nothing: both ends are {name} alone, which has no link to itself; write two different ends, '
+        f'"{text}" matches no link: both ends are {name}; write two different ends, '
         f'e.g. "{name} <-> {PLANT if agents == [name] else ANY}"'
     ]
 

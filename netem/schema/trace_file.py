@@ -24,7 +24,7 @@ def read_delays(path: Path) -> tuple[tuple[float, ...], list[str]]:
     """Return the delays (s) of a CSV file with a column `delay_s`, one message a row, and its problems by row."""
     try:
         if not path.is_file():  # a device or a pipe may never end
-            return (), [f'there is no file "{path}"; the path is seen from the scenario']
+            return (), [f'there is no file "{path}"; the path is relative to the scenario']
         return _rows(path.read_bytes(), path.name)
     except OSError as error:
         return (), [f"{path}: cannot be read: {error.strerror}"]
@@ -61,7 +61,7 @@ def _rows(data: bytes, file: str) -> tuple[tuple[float, ...], list[str]]:
 
 
 def with_traces(netem: Netem, folder: Path) -> tuple[Netem, list[Problem]]:
-    """Return the same with the delays of every trace, whose paths are seen from `folder`, and their problems."""
+    """Return the same with the delays of every trace, whose paths are relative to `folder`, and their problems."""
     found: list[Problem] = []
     faults = list(netem.links)
     for i, fault in enumerate(faults):

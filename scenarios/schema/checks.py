@@ -48,7 +48,7 @@ def check_names(scenario: ScenarioModel, problems: Problems) -> None:
     for i, label in enumerate(labels):
         if label in labels[:i]:
             problems.add(
-                f"event[{i}].label", f'there is an event "{label}" already; labels name windows of measurement'
+                f"event[{i}].label", f'event "{label}" exists already; a label names one window of measurement'
             )
         elif label == "history_sha256":
             problems.add(f"event[{i}].label", "this name is taken by a key of metrics.json; choose another")
@@ -94,7 +94,7 @@ def check_start(scenario: ScenarioModel, feeder: Tables, problems: Problems) -> 
 def check_cases(scenario: ScenarioModel, inverters: tuple[str, ...], problems: Problems) -> None:
     for name, case in scenario.cases.items():
         if name in _RUN_FOLDER:
-            problems.add(f"case.{name}", f"a case's folder stands beside {', '.join(_RUN_FOLDER)}; name it otherwise")
+            problems.add(f"case.{name}", f"a case names a folder beside {', '.join(_RUN_FOLDER)}; choose another name")
         if inverters:
             _check_links(f"case.{name}.without", case.without, inverters, problems)
         path = f"case.{name}.links"
@@ -131,8 +131,8 @@ def check_events(scenario: ScenarioModel, problems: Problems) -> None:
 _MOVES = {
     "open": (False, "is open already", "close it before"),
     "close": (True, "is closed already", "open it before"),
-    "leave": (False, "is not there", "let it join before"),
-    "join": (True, "is there already", "let it leave before"),
+    "leave": (False, "is not in the run", "let it join before"),
+    "join": (True, "is in the run already", "let it leave before"),
 }
 """Keys of an event that move switches or agents: the state after it, words for that state before it, and the remedy."""
 
@@ -185,12 +185,12 @@ def check_limits(scenario: ScenarioModel, feeder: Tables, problems: Problems) ->
             following = ", ".join(other.name for other in rows.values() if other.kind == "GFL")
             problems.add(
                 path,
-                f"{name} is grid-forming and gives what the network takes; only a grid-following inverter can be "
+                f"{name} is grid-forming, so the network decides its power; only a grid-following inverter can be "
                 f"limited: {following or 'there is none'}",
             )
         elif not math.isfinite(kW) or kW < 0.0 or kW > most * (1.0 + 1e-9):
             hint = f"; it is in kW: write {kW / 1e3:g}" if kW > most and kW / 1e3 <= most else ""
-            problems.add(path, f"{name} can have from 0 to {most:g} kW available, got {kW:g} kW{hint}")
+            problems.add(path, f"the available power of {name} is from 0 to {most:g} kW, got {kW:g} kW{hint}")
 
 
 def check_changes(scenario: ScenarioModel, feeder: Tables, problems: Problems) -> None:
@@ -210,7 +210,9 @@ def check_changes(scenario: ScenarioModel, feeder: Tables, problems: Problems) -
             problems.add(f"{path}.{key}", f"a {kind} has no {what}; {name} takes those of [plant.{kind.lower()}]")
         if table.parameters and not problems.unknown(f"{path}.parameters", "parameter set", table.parameters, sets):
             for key in foreign(sets[table.parameters], kind):
-                problems.add(f"{path}.parameters", f'set "{table.parameters}" has {key}, which a {kind} has not')
+                problems.add(
+                    f"{path}.parameters", f'set "{table.parameters}" has {key}, which is no parameter of a {kind}'
+                )
     for row in rows.values():
         _check_own(row, scenario, feeder, problems)
 
@@ -258,7 +260,9 @@ def _check_own(row: InverterRow, scenario: ScenarioModel, feeder: Tables, proble
         problems.add(path, f"its model {parameters.model} has no {key}; leave it out, or name another model")
     for key, text in contradictions(type(parameters), parameters):
         if not problems.touch(f"{table}.{key}"):
-            problems.add(f"{path}.{key}", f"{text}; both together are those of [{table}], of its set and of its table")
+            problems.add(
+                f"{path}.{key}", f"{text}; the values come from [{table}], its published set and its own table"
+            )
 
 
 def _check_links(path: str, links: tuple[tuple[str, str], ...], inverters: tuple[str, ...], problems: Problems) -> None:
@@ -288,7 +292,7 @@ def check_times(scenario: ScenarioModel, problems: Problems) -> None:
         if path in read and event.t_s >= time.end_s > 0:  # a missing end is 0
             problems.add(
                 path,
-                f'event "{event.label}" at {event.t_s:g} s does not come before the end at {time.end_s:g} s; '
+                f'event "{event.label}" at {event.t_s:g} s is not before the end at {time.end_s:g} s; '
                 "move it, or raise end_s",
             )
     for i, (first, second) in enumerate(pairwise(scenario.events)):
@@ -299,13 +303,13 @@ def check_times(scenario: ScenarioModel, problems: Problems) -> None:
             problems.add(
                 path,
                 f'event "{second.label}" at {second.t_s:g} s is written after "{first.label}" at {first.t_s:g} s; '
-                "write events in the order of time, and what happens at once as one event",
+                "write events in the order of time, and changes at one time as one event",
             )
         elif not problems.touch("time.record_s") and gap < 1.5 * time.record_s:
             problems.add(
                 path,
-                f'event "{second.label}" follows "{first.label}" by {gap:g} s, so that no recorded row lies between '
-                f"them to measure; write them as one event, or lower record_s = {time.record_s:g} s",
+                f'event "{second.label}" follows "{first.label}" after {gap:g} s, with no recorded row between them to '
+                f"measure; write them as one event, or lower record_s = {time.record_s:g} s",
             )
 
 
@@ -328,6 +332,6 @@ def check_step(scenario: ScenarioModel, feeder: Tables | None, problems: Problem
         return
     problems.add(
         "time.h_s",
-        f"{h:g} s is too long a step for {name}_s = {least:g} s of [{table}], which it would not resolve; "
+        f"{h:g} s is too long a step to resolve {name}_s = {least:g} s of [{table}]; "
         f"at most {most:g} s, {part:g} of the shortest time constant",
     )

@@ -88,13 +88,13 @@ def check_agentless(scenario: ScenarioModel, feeder: Tables, problems: Problems)
             problems.add(where, f'"{min(twice)}" is named at the top of the file already; name it once')
         if without and without >= {row.name for row in feeder.inverters}:
             problems.add(
-                where, 'no inverter is left that has an agent; leave one, and for droop alone write secondary = "none"'
+                where, 'no inverter has an agent; leave one with an agent, and for droop alone write secondary = "none"'
             )
         for name in sorted(without & moved.keys()):
             problems.add(where, f'event "{moved[name]}" lets the agent of {name} leave or join, so it must have one')
         for node in (*scenario.netem.nodes, *rule.netem.nodes):
             if node.name in without:
-                problems.add(where, f"an entry [[node]] is about the agent of {node.name}, so it must have one")
+                problems.add(where, f"an entry [[node]] names {node.name}, so it must have an agent")
         where = f"{path}.secondary"
         if isinstance(rule.secondary, str) or problems.touch(where):
             continue
@@ -102,7 +102,7 @@ def check_agentless(scenario: ScenarioModel, feeder: Tables, problems: Problems)
             problems.add(where, 'names no inverter; write secondary = "none"')
         _check_names(where, rule.secondary, names, problems)
         for name in (name for name in rule.secondary if name in without):
-            problems.add(where, f"{name} has no agent that could run the law; take it out of without_agent, or of here")
+            problems.add(where, f"{name} has no agent to run the law; remove it from without_agent, or from here")
 
 
 def _check_names(path: str, given: Sequence[str], known: Sequence[str], problems: Problems) -> None:
@@ -116,7 +116,7 @@ def _check_names(path: str, given: Sequence[str], known: Sequence[str], problems
 LISTS = tuple(field for field in fields_of(Netem) if NO_KEY not in field.marks)
 """Fields of the lists of entries: `[[link]]`, `[[partition]]`, `[[node]]`."""
 
-_KEPT_OUT = 'certificates keep it out, and this scenario has security = "mtls"; leave one of them out'
+_KEPT_OUT = 'certificates exclude this lie, and the scenario has security = "mtls"; leave one of them out'
 
 
 def netem_of(scenario: ScenarioModel, case: str) -> Netem:
@@ -180,7 +180,7 @@ def check_netem(scenario: ScenarioModel, feeder: Tables | None, problems: Proble
         for i, node in enumerate(netem.nodes):
             ticks = node.from_s / T_c
             if node.kill and (ticks < 0.5 or abs(ticks - round(ticks)) > 1e-6):
-                text = f"{node.from_s:g} s is no multiple of T_c_s = {T_c:g} s after 0: agents die at ticks; "
+                text = f"{node.from_s:g} s is not a multiple of T_c_s = {T_c:g} s after 0: agents die at ticks; "
                 nodes.append(Problem(f"node[{i}].from_s", f"{text}write {max(1, round(ticks)) * T_c:g}"))
             if node.skew is not None and (node.from_s or node.to_s is not None):
                 text = "a clock is skewed for the whole run; leave out from_s and to_s"

@@ -160,7 +160,7 @@ def _check_named(
             problems.add(f"{path}.name", f"a name in {where}")
             continue
         if not isinstance(off, bool):
-            problems.add(f"{path}.off", "must be true or false; true takes the check out of the verdict")
+            problems.add(f"{path}.off", "must be true or false; true removes the check from the verdict")
         plugin = _check(path, key if isinstance(key, str) else table, registry, problems)
         if plugin is None:
             continue
@@ -171,7 +171,7 @@ def _check_named(
         elif name in names:
             problems.add(path, f'there is a {kind} "{name}" in this list already; give one of them another name')
         elif off is True and name not in always:
-            problems.add(f"{path}.off", f'no run has a check "{name}" unless it is named; leave this entry out')
+            problems.add(f"{path}.off", f'the check "{name}" is off unless a scenario names it; leave this entry out')
         names.append(name)
 
 
@@ -185,10 +185,12 @@ def _check_laws(scenario: ScenarioModel, problems: Problems) -> None:
             continue
         law = law_of(scenario, name)
         if law.name != PAPER and case.gains not in (scenario.gains, Gains()):
-            text = f'[gains] are those of the law "{PAPER}", and this case has {law.name}; write them into [{path}]'
+            text = f'[gains] belong to the law "{PAPER}", and this case has {law.name}; write them into [{path}]'
             problems.add(f"case.{name}.gains", text)
         if law.name != PAPER and case.degraded_communication.weights != "paper":
-            text = f'weights other than "paper" are the law "{PAPER}"\'s, and this case has {law.name}; leave them out'
+            text = (
+                f'weights other than "paper" belong to the law "{PAPER}", and this case has {law.name}; leave them out'
+            )
             problems.add(f"case.{name}.degraded_communication.weights", text)
 
 

@@ -101,7 +101,7 @@ def supply_notes(scenario: ScenarioModel, feeder: Tables) -> tuple[str, ...]:
         when = f'event "{event.label}" at {event.t_s:g} s' if event else "the start"
         if event and (what := _what(state.new, state.inverters, loaded)):
             notes.append(
-                f"{when} de-energises {what}: no substation and no grid-forming inverter is connected to them any more"
+                f"{when} de-energises {what}: neither the substation nor a grid-forming inverter is connected to them"
             )
         for part in state.islands:
             there = [row for row in rows if row.node in part]
@@ -111,7 +111,7 @@ def supply_notes(scenario: ScenarioModel, feeder: Tables) -> tuple[str, ...]:
                 names = ", ".join(row.name for row in there if row.name in state.inverters)
                 notes.append(
                     f"{when} leaves {load / 1e3:.0f} kW of load to an island of {names}, rated "
-                    f"{rated / 1e3:.0f} kW together: more than they can feed"
+                    f"{rated / 1e3:.0f} kW together, which is too little"
                 )
     return tuple(notes)
 

@@ -109,7 +109,7 @@ def test_of_part_of_a_record_only_that_part_is_said_to_be_the_same(run: Result, 
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (("--without", "inv4 -> inv77"), 'nobody is called "inv77"'),
+        (("--without", "inv4 -> inv77"), 'there is no "inv77"'),
         (("--without", "inv4"), '"inv4" names no links'),
         (("--law", "dappi"), 'did you mean "dapi"'),
         (("--set", "gains.kp=1"), 'did you mean "k_p"'),

@@ -172,11 +172,11 @@ def test_a_program_that_the_system_cannot_run_is_refused(text: str, tmp_path: Pa
 
 def test_gains_of_the_papers_law_in_a_case_of_another_are_refused() -> None:
     """They would do nothing, and nobody would know."""
-    with pytest.raises(gp.ScenarioError, match=r'\[gains\] are those of the law "consensus", and this case has dapi'):
+    with pytest.raises(gp.ScenarioError, match=r'\[gains\] belong to the law "consensus", and this case has dapi'):
         gp.load("islanding").replace({"case.IV.law": "dapi", "case.IV.gains": {"k_p": 0.001}}).check()
     weights = {"weights": "degree-normalised"}
     with pytest.raises(
-        gp.ScenarioError, match=r'case.IV.degraded_communication.weights: weights other than "paper" are the law'
+        gp.ScenarioError, match=r'case.IV.degraded_communication.weights: weights other than "paper" belong to the law'
     ):
         gp.load("islanding").replace({"case.IV.law": "dapi", "case.IV.degraded_communication": weights}).check()
 

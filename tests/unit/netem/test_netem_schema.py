@@ -71,12 +71,12 @@ def test_a_scenarios_entries_are_read_as_written() -> None:
 @pytest.mark.parametrize(
     ("text", "path", "words"),
     [
-        (_lying('model = "offset"'), "node[0].lies", ["is no lie", "P_set_W"]),
+        (_lying('model = "offset"'), "node[0].lies", ["changes nothing", "P_set_W"]),
         (_lying('model = "scale", Q = 1e9'), "node[0].lies.Q", ["-1e+06 to 1e+06"]),
         (_lying('model = "replay", delay_s = 2000'), "node[0].lies.delay_s", ["2 (2000 ms)"]),
         (_lying('model = "freeze", of = ["f"]'), "node[0].lies.of", ['a list with one of "P_set", "V_set", "Q"']),
-        (_lying('model = "freeze", in_name_of = "inv3"'), "node[0].lies.in_name_of", ["own name"]),
-        (_lying('model = "freeze"') + "\nkill = true", "node[0].lies", ["says nothing"]),
+        (_lying('model = "freeze", in_name_of = "inv3"'), "node[0].lies.in_name_of", ["inv3 is the liar"]),
+        (_lying('model = "freeze"') + "\nkill = true", "node[0].lies", ["sends nothing"]),
         (
             _lying('model = "freeze", in_name_of = "inv1"') + "\n" + _lying('model = "freeze", in_name_of = "inv1"', 4),
             "node[1].lies.in_name_of",

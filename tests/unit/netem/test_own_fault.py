@@ -94,7 +94,7 @@ def test_it_adds_to_a_delay_and_leaves_other_faults_their_fates(folder: str) -> 
         ("Late", "link fault my_faults:Late on inv1 -> inv2 raised RuntimeError: no idea at t = 0.06 s, message 3; it"),
         (
             "Leaves",
-            "my_faults:Leaves on inv1 -> inv2 raised SystemExit: 3 at t = 0 s, message 0; it does nothing since",
+            "my_faults:Leaves on inv1 -> inv2 raised SystemExit: 3 at t = 0 s, message 0; it does nothing from then on",
         ),
         ("Early", "my_faults:Early on inv1 -> inv2 returned -0.1; return a delay from 0 to 3600 s, or None to drop at"),
     ],

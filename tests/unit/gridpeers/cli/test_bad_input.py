@@ -68,7 +68,7 @@ UNUSABLE = [
     ("link set inv1 inv4 --jitter 0.2", "--jitter: is around a delay; give --delay too"),
     ("link set inv1 inv4 --profile lt", '--profile: there is no profile "lt"; did you mean "lte"?'),
     ("link set inv1 inv4 --loss 0.1 --for -1", "--for: a time of the run must be above 0, got -1 s"),
-    ("link cut plant plant", 'LINKS: "plant <-> plant" matches nothing: both ends are plant alone'),
+    ("link cut plant plant", 'LINKS: "plant <-> plant" matches no link: both ends are plant;'),
     ("link cut inv1", 'LINKS: "inv1" names no links; write "inv4 <-> inv7"'),
     ("link cut inv1 inv4 inv7", 'LINKS: "inv1 inv4 inv7" is neither two names nor one pattern'),
     ("link heal inv1 -", "LINKS: the shell took the arrow for a redirection; put the pattern in quotes"),

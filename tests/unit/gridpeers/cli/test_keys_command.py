@@ -114,7 +114,7 @@ OPEN = (
         (["run", "islanding", "--keys", "lab"], 'lab: no certificate was issued to "inv9"'),
         (["run", "islanding", "--keys", "lab", "--driver", "inprocess"], "--keys: needs --driver processes"),
         (["run", "islanding", "--keys", "lab", "--processes", "3"], "--processes: agents of one process have one"),
-        (["run", "mtls.toml"], 'security = "mtls": say --keys DIR'),
+        (["run", "mtls.toml"], 'security = "mtls": give --keys DIR'),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )

@@ -193,17 +193,17 @@ def test_trip_settings_are_judged_at_the_nominal_frequency(tmp_path: Path) -> No
         ('"all"', '["inv1", "inv44"]', 'case.IV.secondary: no inverter "inv44"; did you mean "inv4"?'),
         ('"all"', '["inv1", "inv1"]', 'case.IV.secondary: "inv1" is named twice; name it once'),
         ('"all"', "[]", 'case.IV.secondary: names no inverter; write secondary = "none"'),
-        ('"all"', '["inv1"]\nwithout_agent = ["inv1"]', "case.IV.secondary: inv1 has no agent that could run the law"),
+        ('"all"', '["inv1"]\nwithout_agent = ["inv1"]', "case.IV.secondary: inv1 has no agent to run the law"),
         ('"all"', '"all"\nwithout_agent = ["inv0"]', 'case.IV.without_agent: no inverter "inv0"'),
         (
             '"all"',
             '"all"\nwithout_agent = ["inv1","inv2","inv3","inv4","inv5","inv6","inv7","inv8","inv9"]',
-            "case.IV.without_agent: no inverter is left that has an agent",
+            "case.IV.without_agent: no inverter has an agent",
         ),
         (
             '"all"',
             '"all"\nwithout_agent = ["inv2"]\n[[case.IV.node]]\nname = "inv2"\nslow_s = 0.01',
-            "case.IV.without_agent: an entry [[node]] is about the agent of inv2, so it must have one",
+            "case.IV.without_agent: an entry [[node]] names inv2, so it must have an agent",
         ),
         (
             '"all"',
@@ -265,9 +265,13 @@ def test_in_a_live_run_people_move_the_agents(tmp_path: Path) -> None:
         (
             'leave = ["inv2"]',
             'leave = ["inv10", "inv2"]',
-            r'event\[1\].leave: "inv10" is not there at 2 s; leave it out',
+            r'event\[1\].leave: "inv10" is not in the run at 2 s; leave it out',
         ),
-        ('join = ["inv2"]', 'leave = ["inv2"]', r'event\[2\].leave: "inv2" is not there at 3 s; .* let it join before'),
+        (
+            'join = ["inv2"]',
+            'leave = ["inv2"]',
+            r'event\[2\].leave: "inv2" is not in the run at 3 s; .* let it join before',
+        ),
         ("t_s = 2.0", "t_s = 2.01", r"event\[1\].t_s: 2.01 s is not a multiple of T_c_s = 0.02 s, .* nearest is 2"),
     ],
 )

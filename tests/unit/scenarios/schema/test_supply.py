@@ -69,7 +69,7 @@ def test_an_island_is_noted_with_the_load_that_it_has_then(tmp_path: Path) -> No
     assert light == ()
     assert len(notes) == 2
     assert notes[0].startswith('event "step" at 1.5 s leaves 5')
-    assert "more than they can feed" in notes[0]
+    assert "which is too little" in notes[0]
 
 
 ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
@@ -121,8 +121,7 @@ def test_an_island_with_more_load_than_rating_is_told(tmp_path: Path, folder: Pa
     notes = supply_notes(*load_scenario(written(tmp_path, MINE)))
 
     assert notes[0] == (
-        'event "event1" at 1 s leaves 3431 kW of load to an island of inv1, rated 600 kW together: '
-        "more than they can feed"
+        'event "event1" at 1 s leaves 3431 kW of load to an island of inv1, rated 600 kW together, which is too little'
     )
 
 
@@ -164,5 +163,5 @@ def test_nobody_lies_in_anothers_name_behind_certificates(tmp_path: Path) -> Non
     """With `security = "mtls"` such an entry is a problem at its key."""
     (tmp_path / "liars.toml").write_text('security = "mtls"\n' + LIARS, encoding="utf-8")
 
-    with pytest.raises(ScenarioError, match=r"case\.II\.node\[0\]\.lies\.in_name_of: certificates keep it out"):
+    with pytest.raises(ScenarioError, match=r"case\.II\.node\[0\]\.lies\.in_name_of: certificates exclude this lie"):
         load_scenario(tmp_path / "liars.toml")
