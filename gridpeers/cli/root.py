@@ -15,44 +15,48 @@ from gridpeers.wire.plugins.registry import PluginError, Registry
 
 _PAPER = "gridpeers.papers.singhal2022"
 
-_OWN = (
-    ("run", "run_command:run", "Run a scenario and show its results, beside published ones."),
-    ("list", "show:list_", "List the scenarios that come with gridpeers."),
-    ("check", "show:check", "Check a scenario file and its feeder for problems."),
-    ("doc", "show:doc", "Print a reference page that is made from the code."),
-    ("docs", "", "Show the documentation in the browser, offline."),
-    ("sweep", "sweep_command:sweep", "Run a scenario many times over values of its keys."),
-    ("chaos", "", "Disturb a scenario at random; judge and shrink what fails."),
-    ("predict", "", "Predict from theory how a scenario will go."),
-    ("compare", "show:compare", "Compare two runs: scenarios, metrics, and one figure of both."),
-    ("export", "show:export", "Write a run's tables as CSV, Parquet, MATLAB or Excel files."),
-    ("replay", "", "Replay a recorded run, or show what would have been."),
-    ("init", "init:init", "Make a project of your own, or an islanding of your feeder."),
-    (
-        "reproduce",
-        f"{_PAPER}.reproduce.reproduce_command:reproduce",
-        "Run all experiments of the paper, and write one report.",
+_OWN: dict[str, tuple[tuple[str, str, str], ...]] = {
+    "Start": (
+        ("run", "run_command:run", "Run a scenario and print its results."),
+        ("list", "show:list_", "List the scenarios that come with gridpeers."),
+        ("init", "init:init", "Make a project of your own, or an islanding of your feeder."),
+        ("check", "show:check", "Check a scenario file and its feeder for problems."),
+        ("doc", "show:doc", "Print a reference page that is made from the code."),
+        ("docs", "", "Show the documentation in the browser, offline."),
     ),
-    ("experiment", f"{_PAPER}.experiment_command:experiment", "Run an experiment on late, lossy or broken links."),
-    ("plant", "start_commands:plant", "Run the plant of a scenario in this terminal, in real time."),
-    ("agent", "live_commands:agent", "Run the agent of an inverter, or of several, in this terminal."),
-    ("up", "start_commands:up", "Run the plant and all its agents at once, in real time."),
-    ("down", "live_commands:down", "End a run: its agents leave, its plant ends."),
-    ("status", "live_commands:status", "Look once at a run: time, pacing, agents, latest events."),
-    ("watch", "live_commands:watch", "Watch a run as a live table, until Ctrl-C."),
-    ("stop", "live_commands:stop", "Have an agent leave properly: its inverter is switched off."),
-    ("event", "live_commands:event", "Open or close a switch of a running plant."),
-    ("load", "live_commands:load", "Set a load of a running plant."),
-    ("link", "link:link", "Hurt and heal links while a run goes on."),
-    ("keys", "keys_command:app", "Make, issue and revoke the certificates of a site."),
-    ("feeder", "feeder_commands:app", "Import, check and solve feeders."),
-    ("trace", "", "Write a run's messages as a Perfetto trace."),
-    ("why", "", "Explain why an agent decided as it did."),
-    ("view", "", "Show a run in the browser: feeder, links, strips and agents."),
-)
+    "Study": (
+        ("sweep", "sweep_command:sweep", "Run a scenario many times over values of its keys."),
+        ("compare", "show:compare", "Compare two runs: scenarios, metrics, and one figure of both."),
+        ("export", "show:export", "Write a run's tables as CSV, Parquet, MATLAB or Excel files."),
+        ("predict", "", "Predict from theory how a scenario will go."),
+        ("chaos", "", "Disturb a scenario at random; judge and shrink what fails."),
+        ("experiment", f"{_PAPER}.experiment_command:experiment", "Run an experiment on late, lossy or broken links."),
+        ("reproduce", f"{_PAPER}.reproduce.reproduce_command:reproduce", "Reproduce the paper, and write one report."),
+    ),
+    "Live": (
+        ("up", "start_commands:up", "Run the plant and all its agents at once, in real time."),
+        ("plant", "start_commands:plant", "Run the plant of a scenario in this terminal, in real time."),
+        ("agent", "live_commands:agent", "Run the agent of an inverter, or of several, in this terminal."),
+        ("link", "link:link", "Hurt and heal links while a run goes on."),
+        ("event", "live_commands:event", "Open or close a switch of a running plant."),
+        ("load", "live_commands:load", "Set a load of a running plant."),
+        ("stop", "live_commands:stop", "Have an agent leave properly: its inverter is switched off."),
+        ("down", "live_commands:down", "End a run: its agents leave, its plant ends."),
+        ("keys", "keys_command:app", "Make, issue and revoke the certificates of a site."),
+    ),
+    "Inspect": (
+        ("status", "live_commands:status", "Look once at a run: time, pacing, agents, latest events."),
+        ("watch", "live_commands:watch", "Watch a run as a live table, until Ctrl-C."),
+        ("view", "", "Show a run in the browser: feeder, links, strips and agents."),
+        ("why", "", "Explain why an agent decided as it did."),
+        ("replay", "", "Replay a recorded run, or show what would have been."),
+        ("trace", "", "Write a run's messages as a Perfetto trace."),
+    ),
+    "Feeder": (("feeder", "feeder_commands:app", "Import, check and solve feeders."),),
+}
 """Commands in the order of the help: name, function (none where a room brings it), first sentence of its docstring."""
 
-SUMMARIES = {name: summary for name, _, summary in _OWN}
+SUMMARIES = {name: summary for group in _OWN.values() for name, _, summary in group}
 
 COMMANDS: Registry[Callable[..., None]] = Registry(
     "command",
@@ -60,7 +64,8 @@ COMMANDS: Registry[Callable[..., None]] = Registry(
     lambda it: "" if callable(it) else "it is no function",
     own={
         name: reference if "." in reference else f"gridpeers.cli.commands.{reference}"
-        for name, reference, _ in _OWN
+        for group in _OWN.values()
+        for name, reference, _ in group
         if reference
     },
 )
@@ -86,14 +91,14 @@ class LazyCommands(Commands):
         return self.commands.get(cmd_name)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """Write the names and what each command does."""
-        with formatter.section("Commands"):
-            formatter.write_dl(
-                [
-                    (name, SUMMARIES.get(name) or self.get_command(ctx, name).get_short_help_str(60))
-                    for name in self.list_commands(ctx)
-                ]
-            )
+        """Write the names and what each command does, in groups; commands that others bring come last."""
+        there = self.list_commands(ctx)
+        groups = {title: [name for name, *_ in of if name in there] for title, of in _OWN.items()}
+        for title, names in (groups | {"Plug-ins": [name for name in there if name not in SUMMARIES]}).items():
+            if names:
+                texts = (SUMMARIES.get(name) or self.get_command(ctx, name).get_short_help_str(60) for name in names)
+                with formatter.section(title):
+                    formatter.write_dl(list(zip(names, texts, strict=True)))
 
 
 def _broken(why: str) -> Callable[..., None]:

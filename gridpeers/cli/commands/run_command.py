@@ -62,7 +62,7 @@ def run(
         Path | None, option("DIR", "Folder for the results, new or empty; runs/SCENARIO/TIME when left out.")
     ] = None,
 ) -> None:
-    """Run a scenario and show its results, beside published ones.
+    """Run a scenario and print its results.
 
     Example:  gridpeers run islanding --case IV --driver inprocess
     """

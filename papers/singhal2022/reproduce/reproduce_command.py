@@ -41,7 +41,7 @@ def reproduce(
         Path | None, option("DIR", "Folder for the report, new or empty; runs/reproduce/TIME when left out.")
     ] = None,
 ) -> None:
-    """Run all experiments of the paper, and write one report.
+    """Reproduce the paper, and write one report.
 
     Every table, figure and claim of ours stands beside the paper's.
 
