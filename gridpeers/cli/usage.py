@@ -179,7 +179,8 @@ class Commands(TyperGroup):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # noqa: D102
         if not args[0].startswith("-") and self.get_command(ctx, args[0]) is None:
-            fail(f'no command "{args[0]}"; {suggestion(args[0], self.list_commands(ctx), "commands")}')
+            near, found, _ = suggestion(args[0], self.list_commands(ctx), "commands").partition("? ")
+            fail(f'no command "{args[0]}"; {near}?' if found else f'no command "{args[0]}"; {near}')
         return super().resolve_command(ctx, args)
 
 
@@ -199,6 +200,9 @@ def _in_one_line() -> Iterator[None]:
 
 def _line(error: Any) -> str:
     """Return a problem in one line, in typer's words, with the command that shows what would be right."""
+    param = getattr(error, "param", None)
+    if type(error).__name__ == "MissingParameter" and param is not None and param.metavar == "SCENARIO":
+        return f"SCENARIO is missing: e.g. islanding, plug-n-play or partition; {command_line('list')} shows all"
     message = " ".join(error.format_message().split()).rstrip(".").replace("Value error, ", "")
     words: list[str] = []
     ctx = error.ctx

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from gridpeers.runs.result import Result, Results, shown_in_notebooks
+from gridpeers.runs.result import Result, Results, html, shown_in_notebooks
 from gridpeers.runs.running import read
 from gridpeers.scenarios.schema.scenario_errors import ScenarioError
 from gridpeers.scenarios.schema.scenario_writing import to_toml
@@ -113,6 +113,9 @@ class Comparison:
             for name, run in zip(self.names, pair, strict=True):
                 if len(failed := run.failures):
                     yield f"FAILED  {name}, case {case or run.case}: {failed['agent'][0]}: {failed['why'][0]}"
+
+    def _repr_html_(self) -> str:
+        return html(repr(self), self.plot(), self.changes, self.table)
 
     def __repr__(self) -> str:
         return f"<Comparison of {' and '.join(self.names)}: {counted(len(self._pairs), 'case')}>"

@@ -14,6 +14,23 @@ from gridpeers.scenarios.results.case_tables import EVENTS, LINKS, event_rows, l
 from gridpeers.scenarios.results.metric import unit_of
 from gridpeers.scenarios.results.recorded_events import LawFailure
 from gridpeers.wire.messages import PlantEvent
+from gridpeers.wire.wording import suggestion
+
+
+class HistoryFrame(pd.DataFrame):  # type: ignore[misc]  # pandas has no types here
+    """Rows of a run, whose KeyError names the inverters."""
+
+    @property
+    def _constructor(self) -> Any:
+        return pd.DataFrame
+
+    def __getitem__(self, key: Any) -> Any:
+        try:
+            return super().__getitem__(key)
+        except KeyError:
+            names = list(dict.fromkeys(self.columns.get_level_values(0)))
+            name = key[0] if isinstance(key, tuple) and key[0] not in names else key
+            raise KeyError(f'no inverter "{name}"; {suggestion(str(name), names, "inverters")}') from None
 
 
 def metrics_frame(windows: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:

@@ -5,8 +5,11 @@ from __future__ import annotations
 import re
 import shutil
 import sys
+from base64 import b64encode
 from collections.abc import Iterator, Mapping
 from functools import cached_property
+from html import escape
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -157,6 +160,9 @@ class Results(_FromFolder, Mapping[str, "Result"]):
     def __repr__(self) -> str:
         return f"<Results {self.spec.name}: cases {', '.join(self)}; {self.driver}>"
 
+    def _repr_html_(self) -> str:
+        return html(repr(self), self.plot(), self.metrics)
+
 
 class Result(_FromFolder):
     """Result of one case; `Scenario.run` and `gridpeers.read` return it. It reads a table at the first use."""
@@ -174,8 +180,14 @@ class Result(_FromFolder):
 
     @cached_property
     def history(self) -> pd.DataFrame:
-        """Terminal quantities over time: columns (inverter, quantity), index t (s), units in `attrs["units"]`."""
-        return self.record.frame()
+        """Terminal quantities over time: columns (inverter, quantity), index t (s), units in `attrs["units"]`.
+
+        KeyError names the inverters if there is none of a name.
+        """
+        frame = self.record.frame()
+        named = frames.HistoryFrame(frame)
+        named.attrs |= frame.attrs
+        return named
 
     def quantity(self, name: str) -> pd.DataFrame:
         """Return f, P, Q, V, P_set, V_set or a shared quantity over time: a column per inverter, index t (s).
@@ -289,6 +301,18 @@ class Result(_FromFolder):
 
     def __repr__(self) -> str:
         return f"<Result {self.spec.name} {self.case}: {self.driver}; history {self.sha256[:12]}>"
+
+    def _repr_html_(self) -> str:
+        return html(repr(self), self.plot(), self.metrics)
+
+
+def html(title: str, figure: Figure, *tables: pd.DataFrame) -> str:
+    """Return tables and a figure as a notebook shows them."""
+    picture = BytesIO()
+    figure.savefig(picture, format="png")
+    parts = (table.drop(columns="reasons", errors="ignore").to_html(na_rep="-") for table in tables)
+    source = f"data:image/png;base64,{b64encode(picture.getvalue()).decode()}"
+    return f"<p>{escape(title)}</p>{''.join(parts)}<img style='max-width:60em;width:100%' src='{source}'>"
 
 
 def _draw(drawing: Drawing, name: str) -> Figure:

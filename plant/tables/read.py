@@ -63,8 +63,8 @@ def read_feeder(feeder: str, load_set: str = "main") -> Tables:
     """
     folder = DATA / feeder if feeder in feeders() else Path(feeder)
     if not is_folder(folder):
-        there = ", ".join(feeders())
-        raise FeederError(feeder, (f'feeder "{feeder}": no such feeder and no such folder; there are {there}',))
+        near = suggestion(feeder, feeders(), "feeders that come with gridpeers")
+        raise FeederError(feeder, (f'feeder "{feeder}": no such feeder and no such folder; {near}',))
     paths = sorted([*folder.glob("*.csv"), *folder.glob(MANIFEST)])
     contents = tuple((path.name, path.read_bytes() if path.is_file() else b"") for path in paths)
     return _read_tables(folder, feeder, load_set, contents)

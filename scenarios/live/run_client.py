@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from time import monotonic
 
 from gridpeers.scenarios.drivers.free_endpoint import parse_endpoint
-from gridpeers.scenarios.live.run_address import RunAddress
+from gridpeers.scenarios.live.run_address import RUN, RunAddress
 from gridpeers.scenarios.live.run_monitor import RunTokens
 from gridpeers.wire.codec import RejectedError, decode
 from gridpeers.wire.driver.command_line import command_line
@@ -16,7 +16,7 @@ from gridpeers.wire.messages import PLANT, AgentStatus, Answer, AnyMessage, Link
 from gridpeers.wire.trust.key_folder import tls_refusal
 from gridpeers.wire.wording import InputError
 
-REMINDER = 2.0
+REMINDER = 1.0
 """Time (s) after which a wait is reported again, then after twice as long, and so on."""
 
 PROBE = 1.0
@@ -154,7 +154,8 @@ class RunClient:
                     self.renew()
             if waited >= reminder:
                 reminder *= 2.0
-                tell(f"no plant yet of {self.where}{self._runs_there}; {waited:.0f} of {wait:g} s waited")
+                start = command_line("up", "SCENARIO", *([] if self.where.run == RUN else ["--run", self.where.run]))
+                tell(f"no plant yet of {self.where}{self._runs_there}; {start} starts one; {wait - waited:.0f} s left")
 
     @property
     def _runs_there(self) -> str:

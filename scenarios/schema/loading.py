@@ -20,6 +20,7 @@ from gridpeers.scenarios.schema.plugin_keys import check_plugins, with_folders, 
 from gridpeers.scenarios.schema.scenario_errors import Problems, ScenarioError
 from gridpeers.scenarios.schema.scenario_model import AS_RUN, ScenarioModel
 from gridpeers.scenarios.schema.supply import check_loads, check_supply
+from gridpeers.wire.driver.command_line import command_line
 from gridpeers.wire.text_file import TextFileError, text_of
 from gridpeers.wire.wording import suggestion
 
@@ -94,6 +95,9 @@ def check_tables(
 
     Relative paths start at the folder of `path`, whose name is that of a scenario without one.
     """
+    if not data:
+        init = command_line("init", "my-study")
+        raise ScenarioError([f"{problems.file}: is empty; {init} makes a project with a scenario to start from"])
     scenario = read_tables(with_model_folders(data, path.parent), problems)
     if not scenario.name:
         scenario = replace(scenario, name=checks.name_of(path.stem))

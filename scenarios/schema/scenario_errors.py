@@ -22,6 +22,8 @@ _KEY = re.compile(r"""^\s*([A-Za-z0-9_\-."'\[\] ]+?)\s*=""")
 class ScenarioError(InputError):
     """A scenario that cannot be run; `problems` has a sentence each: file, line, key, value and what would be right."""
 
+    __module__ = "gridpeers"  # its public name, as tracebacks show it
+
     def __init__(self, problems: Iterable[str]) -> None:
         self.problems = tuple(map(printable, problems))
         super().__init__("\n".join(self.problems))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import re
 import shutil
 from pathlib import Path
 
@@ -72,6 +73,10 @@ def test_several_cases_are_results_by_case(scenario: gp.Scenario) -> None:
     assert len(runs.plot().axes) == len(runs["I"].plot().axes) == 4
     with pytest.raises(KeyError, match="no case"):
         runs["IV"]
+    with pytest.raises(KeyError, match=r'no inverter "inv99".* The inverters are inv1, inv2'):
+        runs["I"].history["inv99"]
+    for shown in (runs, runs["I"], gp.compare(runs["I"], runs["II"])):  # as notebooks do
+        assert re.search("<table.*MPSI.*</table><img .*data:image/png;base64,", shown._repr_html_(), re.DOTALL)
     with pytest.raises(ValueError, match=r'no figure "frequenzy".*did you mean "frequency"'):
         runs.plot("frequenzy")
 

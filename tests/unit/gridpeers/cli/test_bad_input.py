@@ -19,9 +19,10 @@ BAD_SCRIPT = "clear\nnew circuit.x basekv=4.16\nredirect missing.dss\nnew line.l
 MINE = "--listen tcp/127.0.0.1:0"  # a run of somebody may be at the default endpoint
 
 MISTYPED = [
-    ("rnu", 'no command "rnu"; did you mean "run"?'),
-    ("link sett", 'no command "sett"; did you mean "set"? The commands are set, cut, heal'),
-    ("run", "missing argument 'SCENARIO'"),
+    ("rnu", 'no command "rnu"; did you mean "run"?\n'),
+    ("link sett", 'no command "sett"; did you mean "set"?\n'),
+    ("link zebra", 'no command "zebra"; the commands are set, cut, heal'),
+    ("run", "SCENARIO is missing: e.g. islanding, plug-n-play or partition; gridpeers list shows all"),
     ("run x --driver inproces", "'inprocess'; gridpeers run -h shows what can be given"),
     ("run x --seed -1", "invalid value for '--seed'"),
     ("run x --spede 2", "--speed"),
@@ -32,7 +33,7 @@ MISTYPED = [
     ("event open", "SWITCH"),
     ("event toggle sw1_2", "'toggle' is not one of 'open', 'close'"),
     ("doc everything", "invalid value for 'TOPIC': 'everything' is not one of 'keys', 'messages'"),
-    ("plant", "missing argument 'SCENARIO'"),
+    ("plant", "SCENARIO is missing: e.g. islanding"),
     ("agent", "missing argument 'INVERTER'"),
 ]
 UNUSABLE = [
@@ -76,7 +77,7 @@ UNUSABLE = [
     ("feeder import nothere.glm", "there is no such file"),
     ("feeder import bad.txt", "a feeder is a .dss file (OpenDSS) or a .glm file (GridLAB-D)"),
     ("feeder import bad.dss", "3 problems"),
-    ("feeder check nothere", "no such feeder and no such folder"),
+    ("feeder check microgrid", 'no such feeder and no such folder; did you mean "microgrid123"?'),
     ("feeder solve microgrid123 --open sw9", 'switch "sw9": no such switch'),
     ("feeder solve microgrid123 --switch Line.l1", "switches, leave_out and f_nom are for .dss and .glm files"),
     ("feeder solve microgrid123 --load-set evnt2", 'load set "evnt2": no such set; there are event2, main'),
