@@ -1,1 +1,1 @@
-"""HELICS: a plant that a federate of others simulates (docs/how-to/cosimulation.md)."""
+"""HELICS: a plant that a foreign federate simulates (docs/how-to/cosimulation.md)."""

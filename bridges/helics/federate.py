@@ -1,4 +1,4 @@
-"""The HELICS federate of a run, as its plant sees it: topics, requests with a deadline, failures as one sentence.
+"""The HELICS federate of a run, for its plant: topics, requests with a deadline, failures in one sentence.
 
 A plant publishes its sensors of each record time t. A controller publishes set-points `ACT` later, when all values of
 t are there. The plant takes these set-points for the step after t (docs/how-to/cosimulation.md).
@@ -18,8 +18,8 @@ from gridpeers.plant.request_process import ProcessEndedError, RequestProcess
 from gridpeers.wire.wording import damaged
 
 ACT = 1e-6
-"""Time (s) by which a controller follows the plant: shorter than any step of a plant, and a thousand times HELICS's
-own resolution."""
+"""Time (s) between the plant's values and the set-points: shorter than any step of a plant, and a thousand times the
+resolution of HELICS."""
 
 Value = float | bool | str  # value of a topic
 
@@ -29,10 +29,10 @@ class Topic(NamedTuple):
 
     key: str
     type: Literal["double", "boolean", "string"]
-    unit: str  # unit as HELICS knows it: it converts from a publisher's other one. "" for none.
+    unit: str  # unit in HELICS, which converts from that of the publisher; "" for none
 
 
-SENSORS = (  # measurements that a plant publishes of every inverter, in the order of a recorded row
+SENSORS = (  # measurements of every inverter, in the order of a recorded row
     Topic("f", "double", "Hz"),
     Topic("P", "double", "W"),
     Topic("Q", "double", "var"),
@@ -40,7 +40,7 @@ SENSORS = (  # measurements that a plant publishes of every inverter, in the ord
 )
 
 HELD = (Topic("P_set_held", "double", "W"), Topic("V_set_held", "double", "V"))
-"""Set-points that an inverter follows, after its bounds; in the order of a recorded row, behind the sensors."""
+"""Set-points that an inverter follows after its limits, in the order of a recorded row, after the sensors."""
 
 WHERE = (Topic("grid_connected", "boolean", ""), Topic("island", "string", ""))
 """An inverter's island: whether the substation feeds it, and its name."""
@@ -65,19 +65,19 @@ def events(prefix: str) -> Topic:
 
 
 def number(value: Value) -> float:
-    """Return a value as a number; not-a-number for HELICS's mark of a double that is none, -1e49."""
+    """Return a value as a number; not-a-number for -1e49, HELICS's mark of a missing double."""
     return float(value) if abs(float(value)) < 1e40 else math.nan
 
 
 USER = "a HELICS federate"
-IMPORT = 60.0  # longest time (s) until the process has imported HELICS, on a machine that is busy
+IMPORT = 60.0  # longest time (s) for the import of HELICS on a busy machine
 FAREWELL = 3.0  # longest wait (s) for the process to leave the federation
 BEFORE = "before t = 0"
-LATER = 3.0  # time (s) for which the process is heard out once its own wait for the broker is over
+LATER = 3.0  # time (s) for the answer of the process after its own wait for the broker
 
 
 class HelicsError(RuntimeError):
-    """The federation, or this federate, cannot go on."""
+    """The federation, or this federate, cannot continue."""
 
 
 class HelicsFederate:
@@ -101,7 +101,7 @@ class HelicsFederate:
     def begin(self, publications: Sequence[Topic], subscriptions: Sequence[Topic]) -> dict[str, list[str]]:
         """Register topics, and wait until all federates are at t = 0.
 
-        Return the names of the `others`, and the keys of the subscriptions that nobody publishes (`missing`).
+        Return the names of the other federates (`others`), and the subscriptions without a publisher (`missing`).
         """
         settings = self._settings
         late = f"the federation at {settings.broker} did not begin within {settings.wait:g} s (are all started?)"
@@ -111,9 +111,9 @@ class HelicsFederate:
         return federation
 
     def step(self, publish: Mapping[str, Value], t: float) -> dict[str, Value]:
-        """Publish, go to `ACT` after a time (s), and return the values that came since the last step, by key.
+        """Publish, go to `ACT` after a time (s), and return the values since the last step, by key.
 
-        A publisher of which none came must not have left.
+        Raise HelicsError if a publisher without a new value has left.
         """
         late = f"{self._others} did not let time go on to {t:g} s within {self._deadline:g} s"
         request = {"do": "step", "publish": publish, "time": t + ACT}
@@ -132,12 +132,12 @@ class HelicsFederate:
         try:
             self._ask({"do": "end"}, "the federate did not leave", self._deadline)
         except HelicsError:
-            pass  # the run has its end already
+            pass  # the run has ended already
         finally:
             self.abort("")
 
     def abort(self, reason: str) -> None:
-        """End the process, unless it has ended; if it is in a federation still, the others get the reason."""
+        """End the process if it runs; the other federates get the reason."""
         if not self._process.closed:
             self._process.send({"do": "abort", "reason": f"{self._settings.name}: {reason}"})
             self._process.close(FAREWELL)
@@ -154,13 +154,15 @@ class HelicsFederate:
         return answer
 
     def _take(self, wait: float, late: str) -> dict[str, Any]:
-        """Return the next answer, or complain that it is late."""
+        """Return the next answer; raise HelicsError if it is late."""
         try:
             answer = self._process.answer(monotonic() + wait)
         except ProcessEndedError as how:
             last = self._process.printed()[-300:].strip().rpartition("\n")[2]
             name = self._settings.name
-            raise HelicsError(f"HELICS, {self._when}: our federate {name} {how}; {last or 'no word'}") from None
+            raise HelicsError(
+                f"HELICS, {self._when}: our federate {name} {how}; {last or 'it printed nothing'}"
+            ) from None
         if answer is None:
             key = "plant.helics.wait_s" if self._when == BEFORE else "processes.deadline_s"
             raise HelicsError(f"HELICS, {self._when}: {late}; end what hangs, or raise {key}")

@@ -1,15 +1,15 @@
 """One HELICS federate: the only file that knows the package `helics`.
 
-It is a process of its own, because HELICS writes to the terminal from its own threads, and because a wait inside its
-library cannot be ended from Python: a process can. `gridpeers.bridges.helics.federate` starts it as a script, so it
-imports nothing of ours. Each line of standard input is a JSON object with a request, each line of standard output its
-answer; what HELICS prints goes to standard error.
+It is a process of its own, because HELICS prints from its own threads, and because Python cannot end a wait inside its
+library. `gridpeers.bridges.helics.federate` starts it as a script, so it imports nothing of gridpeers. Each line of
+standard input is a JSON object with a request, and each line of standard output is its answer. The output of HELICS
+goes to standard error.
 
     {"do": "join", "name", "host", "port", "wait"}
     {"do": "begin", "publications": [[key, type, unit]], "subscriptions": [...]}
-    {"do": "step", "publish": {key: value}, "time"}     publish, go to a time (s), return the values that came
+    {"do": "step", "publish": {key: value}, "time"}     publish, go to a time (s), return the new values
     {"do": "end"}                                       leave the federation, end
-    {"do": "abort", "reason": text}                     end the federation at once; also in the middle of a wait
+    {"do": "abort", "reason": text}                     end the federation at once, also during a wait
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ import time
 from typing import Any
 
 GLOBAL_ERROR = 1  # HELICS's error code of a federation that we end
-FAREWELL = 0.3  # time (s) for the word of an abort to reach the others
+FAREWELL = 0.3  # time (s) in which an abort reaches the others
 NOBODY = "any"  # type of a topic that nobody publishes
 PROBE = 0.1  # time (s) between two attempts to reach a broker
-GONE = ("disconnected", "finalized", "error")  # states of a federate that publishes no more
+GONE = ("disconnected", "finalized", "error")  # states of a federate that has left
 
 
 class _RefusedError(Exception):
-    """A request that cannot be done, in words for a person."""
+    """A request that cannot be carried out."""
 
 
 class Federate:
@@ -61,7 +61,7 @@ class Federate:
         helics.helicsFederateInfoSetIntegerProperty(
             info, helics.HELICS_PROPERTY_INT_LOG_LEVEL, helics.HELICS_LOG_LEVEL_NO_PRINT
         )
-        # a value that comes between two requested times must not wake it: its times are those of the control period
+        # a value between two requested times must not wake it: its times are those of the control period
         helics.helicsFederateInfoSetFlagOption(info, helics.HELICS_FLAG_UNINTERRUPTIBLE, True)
         self.fed = helics.helicsCreateValueFederate(self.name, info)
         return {}
@@ -71,7 +71,7 @@ class Federate:
         for key, kind, unit in request["publications"]:
             code = getattr(helics, f"HELICS_DATA_TYPE_{kind.upper()}")
             self.publications[key] = helics.helicsFederateRegisterGlobalPublication(self.fed, key, code, unit), kind
-        # we tell ourselves which topics nobody publishes; said after the registration, it leaves the broker its warning
+        # HELICS itself would warn of each topic without a publisher; `missing` below names those that matter
         helics.helicsFederateSetFlagOption(self.fed, helics.HELICS_HANDLE_OPTION_CONNECTION_OPTIONAL, True)
         for key, kind, unit in request["subscriptions"]:
             self.subscriptions[key] = helics.helicsFederateRegisterSubscription(self.fed, key, unit), kind
@@ -81,7 +81,7 @@ class Federate:
         for name in others:
             if keys := self.subscriptions.keys() & set(self._names(name, "publications")):
                 self.publishers[name] = set(keys)
-        if not self.publishers:  # one that does not wait for our values may have left: nobody knows what was its own
+        if not self.publishers:  # a federate that does not wait for our values may have left: its topics are not known
             self.publishers = {name: set(self.subscriptions) for name in others}
         type_of = helics.helicsInputGetPublicationType
         missing = [key for key, (topic, _) in self.subscriptions.items() if type_of(topic) == NOBODY]
@@ -115,7 +115,7 @@ class Federate:
             return
         with contextlib.suppress(Exception):
             self.helics.helicsFederateGlobalError(self.fed, GLOBAL_ERROR, reason)
-            time.sleep(FAREWELL)  # HELICS has no sign that the others have heard it
+            time.sleep(FAREWELL)  # HELICS does not show that the others have received it
 
     def _publish(self, values: dict[str, Any]) -> None:
         helics = self.helics
@@ -129,7 +129,7 @@ class Federate:
             write[kind](topic, value)
 
     def _names(self, target: str, what: str) -> list[str]:
-        """Return the names in the answer to a query; none if HELICS has no answer, as of a federate that has left."""
+        """Return the names in the answer to a query; none without an answer, as for a federate that has left."""
         answer = self._query(target, what)
         return answer if isinstance(answer, list) else []
 
@@ -142,7 +142,7 @@ class Federate:
 
 
 def _reach(host: str, port: int, wait: float) -> None:
-    """Wait until something listens there: HELICS itself would say only much later that nothing does."""
+    """Wait until a process listens there; HELICS itself reports a missing broker much later."""
     until = time.monotonic() + wait
     while True:
         try:
@@ -173,7 +173,7 @@ def main() -> None:
     answer({"ready": True})
 
     def listen() -> None:
-        """Take requests; do at once what must not wait for the present one."""
+        """Queue requests, and carry out an abort at once."""
         for line in sys.stdin:
             request = json.loads(line)
             if request["do"] == "abort":

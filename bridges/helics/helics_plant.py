@@ -1,4 +1,4 @@
-"""The plant of a HELICS federation: a federate outside simulates it, and our agents control it."""
+"""The plant of a HELICS federation: a foreign federate simulates it, and agents of gridpeers control it."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ SHOWN = 4  # topics that an error names
 
 
 class HelicsPlant(RecordedPlant):
-    """The plant's side of our agents, and a controller in the federation.
+    """The plant for the agents, and a controller in the federation.
 
-    At record time t it asks for t + `ACT` and reads what was published until t; at a tick it publishes there the
-    agents' set-points. So a plant that steps from t on with what it finds at the end of its step has them in force from
-    t, as ours has. It gets its federate before all else: others give up to connect while a plant is compiled.
+    For record time t it asks for t + `ACT` and reads the values published until t; at a tick it then publishes the
+    set-points of the agents. A plant that reads set-points at the end of its step therefore has them in force from t.
+    The federate connects first, because other federates stop trying while a plant is compiled.
     """
 
     def __init__(self, config: PlantConfig, feeder: Tables) -> None:
@@ -54,8 +54,8 @@ class HelicsPlant(RecordedPlant):
         self._row_keys = self._keys(self.inverters, SENSORS, HELD)
         self._needed = self._keys(self.inverters, SENSORS)
         self._values: dict[str, Value] = {}
-        self._came: set[str] = set()  # topics that the outside plant has published
-        for row in feeder.inverters:  # held until somebody says otherwise
+        self._came: set[str] = set()  # topics that the foreign plant has published
+        for row in feeder.inverters:  # until the plant publishes others
             self._hold(row.name, settings.P_set0 * row.P_rated, settings.V_set0 * row.V_nom)
         self._rows: list[tuple[float, ...]] = []
         self._events: list[PlantEvent] = []
@@ -110,7 +110,7 @@ class HelicsPlant(RecordedPlant):
         return [topic.key for topic in topics(self._prefix, inverters, *groups)]
 
     def _hold(self, name: str, *set_points: float) -> None:
-        """Keep the set-points that an inverter was given as those that it follows."""
+        """Keep the published set-points as those that an inverter follows."""
         held = zip(self._keys([name], HELD), set_points, strict=True)
         self._values |= {key: value for key, value in held if key not in self._came}
 

@@ -19,19 +19,19 @@ _ADDRESS = re.compile(r"(tcp://)?([A-Za-z0-9_.-]+)(:(?P<port>\d{1,5}))?")
 
 
 class HelicsSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The federate of a run, and the broker of its federation."""
+    """The federate of a run, and its broker."""
 
     broker: Annotated[str, Example('"tcp://10.0.0.5:23404"')] = BROKER
-    """Address of the broker, of HELICS's core type ZMQ."""
+    """Address of the broker, of core type ZMQ."""
     name: str = "gridpeers"
-    """Name of the federate; no other of the federation has it."""
+    """Name of the federate, unique in its federation."""
     prefix: str = "grid"
     """First part of every topic: "grid" gives grid/inv1/P."""
     wait: Annotated[float, Unit("s"), Plausible("a wait for federates", 0.1, 3600.0)] = 180.0
-    """Longest wait (s of real time) for the other federates to begin: some are started by hand, or compile first."""
+    """Longest wait (s of real time) for the other federates to begin."""
 
     def relations(self) -> list[Problem]:
-        """Return what is wrong with the values.
+        """Return the problems of the values.
 
         >>> HelicsSettings(broker="tcp://127.0.0.1:99999").relations()[0].text
         'must be like tcp://127.0.0.1:23404, got "tcp://127.0.0.1:99999"'
@@ -52,7 +52,7 @@ def settings_of(settings: PlantSettings) -> HelicsSettings:
 
 
 class HelicsSimulator(Simulator):
-    """A HELICS federation, which has the plant."""
+    """A HELICS federation as the plant."""
 
     package = "helics"
     words = "a HELICS federate"
@@ -60,7 +60,7 @@ class HelicsSimulator(Simulator):
     table = HelicsSettings
 
     def start(self, config: PlantConfig, feeder: Tables) -> PlantLike:
-        from gridpeers.bridges.helics.helics_plant import HelicsPlant  # scenarios are checked without it
+        from gridpeers.bridges.helics.helics_plant import HelicsPlant  # the check of a scenario does not need it
 
         return HelicsPlant(config, feeder)
 

@@ -53,10 +53,10 @@ WIDTH = 100
 
 
 def predict(scenario: Scenario | str | Path, case: str, *, voltage: bool = True) -> Prediction:
-    """Predict how a case of an experiment will go, without running it; its text has the modes of vars with `voltage`.
+    """Predict a case of the paper's law by theory, without a run; `voltage` adds the modes of vars to its text.
 
-    Raise ScenarioError if there is no such case, or it runs another law than "consensus", of which theory knows
-    nothing, or an inverter's model has no linear response; BrokenRunError if the plant has no solution on droop alone.
+    Raise ScenarioError for an unknown case, another law than "consensus", or an inverter model without a linear
+    response; BrokenRunError if the plant has no solution on droop alone.
     """
     known = as_scenario(scenario)
     return predictions(with_cases(known.spec, [case]), known.feeder, voltage=voltage)[case]
@@ -91,6 +91,8 @@ def predictions(spec: ScenarioModel, feeder: Tables, *, voltage: bool) -> dict[s
 
 
 class Prediction:
+    """The prediction of theory for one case; `gridpeers.predict` returns it, and `print` shows it as text."""
+
     def __init__(
         self,
         title: str,
@@ -109,16 +111,16 @@ class Prediction:
     def modes(self) -> pd.Series:
         """Rates of the slow modes (1/s) and their causes: `links`, `lambda_2`, `kappa`, `sharing_rate`, ...
 
-        Empty where nobody runs a secondary law.
+        It is empty without secondary control.
         """
         found = asdict(modes(self._inverters)) if self._has_law else {}
         return pd.Series(found, name=self.title, dtype=float)
 
     @cached_property
     def delay_limits(self) -> pd.DataFrame:
-        """Longest delays (s) for which the case is stable: of the continuous equations, and of our law in its steps.
+        """Longest delays (s) for which the case is stable, of the continuous equations and of the law in its steps.
 
-        Infinite: any delay; nan: unstable without one.
+        Infinite: stable for any delay; nan: unstable without delay.
         """
         pairs = {
             name: (delay_limit_closed(self._inverters, kind), delay_limit(self._inverters, kind))
@@ -131,10 +133,10 @@ class Prediction:
 
     @cached_property
     def times(self) -> pd.DataFrame:
-        """Times (s) after each event until frequency and sharing are restored, a row per (window, island).
+        """Times (s) from each event until frequency and sharing are restored: a row per (window, island).
 
         Columns: `restore_s` (abs(f - f_nom) < 0.01 Hz for good), `share_s` (MPSI < 0.01 for good), `t_restore_s`
-        (both), nan where that never comes; `stable`; `note`.
+        (both), nan if never; `stable`; `note`.
         """
         numbers = ["restore_s", "share_s", "t_restore_s"]
         rows = [

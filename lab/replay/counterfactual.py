@@ -54,14 +54,23 @@ def counterfactual(
     since: float = 0.0,
     folder: str | Path | None = None,
 ) -> Counterfactual:
-    """Run a recorded run again, closed on our plant, with something changed from a run time (s) on.
+    """Run a recorded run again in closed loop with the plant, with changes from a run time on.
 
-    `without` names links to cut, as in scenarios: "inv4 -> inv7", "inv4 <-> inv7", "* -> inv2". A `law` is a name,
-    `module:Class`, or a class. `replace` has values of keys of agents and links, by path: `{"gains.k_p": 0.001}`.
-    The folder is new or empty; without one the files live as long as the result.
+    Raise RecordFileError and ReplayError as `replay` does, also for a wrong change or a time outside of the record, and
+    FolderError if the folder is not empty or cannot be written.
 
-    Raise RecordFileError and ReplayError as `replay`, also if a link, a law, a key or a value is wrong, or the time is
-    outside of the record; FolderError if there is something in the folder, or it cannot be written.
+    Parameters
+    ----------
+    without : str or list of str
+        Links to cut, as in scenarios: "inv4 -> inv7", "inv4 <-> inv7", "* -> inv2".
+    law : str or class
+        Another law, by name, as `module:Class`, or as a class.
+    replace : Mapping[str, Any], optional
+        Values of keys of agents and links, by path: `{"gains.k_p": 0.001}`.
+    since : float
+        Run time (s) from which the changes hold.
+    folder : str or Path, optional
+        New or empty folder for the run. Without it the files disappear with the result.
     """
     record = record_of(run)
     try:
@@ -96,7 +105,7 @@ def _temporary() -> Path:
 
 
 class Counterfactual:
-    """A recorded run and the run under changes, side by side; `gridpeers.counterfactual` makes it."""
+    """A recorded run and the run under changes, side by side; `gridpeers.counterfactual` returns it."""
 
     def __init__(
         self, record: RunRecord, rule: ChangedRule, was: RunFolder, would_be: RunFolder, tell: Progress | None
@@ -123,8 +132,8 @@ class Counterfactual:
         if changes and effect.part.difference is None:
             notes = [*notes, f"the change made no difference: every row up to {effect.part.t_end:.2f} s is as recorded"]
         self.difference, self.compared, self.notes = rows.part.difference, rows.part.count, tuple(notes)
-        """The first row of the plant before the change that differs from the record (there should be none); the number
-        of rows compared; sentences on effects that are left out, or that the change had none."""
+        """First row of the plant before the change that differs from the record (expected: none); number of compared
+        rows; sentences on effects that are left out, or on a change without effect."""
         _write(record, rule, rule.scenario, would_be.path, text, recorded, figures=True)
         text = _scenario_text(record, rule, rule.recorded, would_be=False)
         before = _as_recorded(record, text, was.path / rule.case, recorded.ended)

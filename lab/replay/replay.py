@@ -81,7 +81,7 @@ class ReplayedRun:
 
     @property
     def difference(self) -> ReplayDifference | None:
-        """The first difference of all in run time; None if the replay gives what was recorded, as far as it goes."""
+        """First difference in run time; None if the replay equals the record, as far as it goes."""
         found = [part.difference for part in self.parts if part.difference is not None]
         return min(found, key=lambda difference: difference.t, default=None)
 
@@ -92,10 +92,10 @@ class ReplayedRun:
 
 
 def replay(run: Result | RunRecord | str | Path, make_plant: MakePlant | None = start_plant) -> ReplayedRun:
-    """Give the cores of a recorded run, of any driver, their inputs again, and compare their decisions.
+    """Give plant and agents of a recorded run their inputs again, and compare their decisions with the record.
 
-    Without `make_plant`, which starts the plant, the physics is left out. Raise RecordFileError if the record cannot be
-    read; ReplayError if it lacks the inputs of the cores, or its law, graph or feeder is not here.
+    `make_plant` starts the plant; None leaves the physics out. Raise RecordFileError if the record cannot be read, and
+    ReplayError if it lacks the inputs, or if its law, graph or feeder is missing.
     """
     record = record_of(run)
     require_arrivals(record)

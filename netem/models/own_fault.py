@@ -26,22 +26,22 @@ DROPPED_BY_OWN = "fault"
 
 
 class LinkMessage(NamedTuple):
-    """The data of a message that a fault gets."""
+    """A message, as a fault gets it."""
 
     src: str
-    """Its sender: an inverter, or "plant"."""
+    """Sender: an inverter, or "plant"."""
     dst: str
-    """Its receiver."""
+    """Receiver."""
     seq: int
-    """Its number on this link, from 0; that of the tick."""
+    """Number on this link, from 0: that of the tick."""
     t: float
-    """When it was sent (s of run time)."""
+    """Run time (s) at which it was sent."""
     size: int
-    """Its length (bytes)."""
+    """Length (bytes)."""
 
 
 class MessageDraws:
-    """Random numbers of one message: the same for every driver, and of no other message, link or fault."""
+    """Random numbers of one message on one link for one fault, equal for every driver."""
 
     __slots__ = ("_seq", "_stream")
 
@@ -62,10 +62,10 @@ class MessageDraws:
 
 
 class LinkFault:
-    """Base of all user-defined faults; parameters are annotated attributes, and a wrong one raises ValueError.
+    """Base of all link faults of your own: derive from it, annotate the parameters, and write `judge`.
 
-    There is one object per link and entry. The result of `judge` should depend on the message and the draws alone:
-    a receiver that joins late has not seen the messages before.
+    Each entry has one object per link. `judge` should depend on the message and the draws alone, because a receiver
+    that joins late does not see the messages before. A wrong parameter raises ValueError.
     """
 
     def __init__(self, **parameters: Any) -> None:
@@ -73,7 +73,7 @@ class LinkFault:
             setattr(self, name, value)
 
     def judge(self, message: LinkMessage, draws: MessageDraws) -> float | None:
-        """Return the added delay of a message (s, at least 0), None if it is lost; only `draws` may be random."""
+        """Return the added delay of a message (s, at least 0), or None for a lost one; only `draws` is random."""
         raise NotImplementedError
 
 
@@ -109,7 +109,7 @@ def judge_of(plugin: Plugin, src: str, dst: str, stream: Stream, tell: Callable[
     try:
         fault = made(FAULTS, plugin)
     except ValueError as error:
-        tell(f"link fault {plugin.use} on {src} -> {dst} does nothing: {error}")
+        tell(f"link fault {plugin.use} on {src} -> {dst} has no effect: {error}")
         return lambda seq, t, size: 0.0
     failed = False
 

@@ -27,14 +27,17 @@ SHOWN_VIOLATIONS = 20  # Most violations that a verdict keeps; it counts all
 
 
 class NotJudgedError(Exception):
-    """A check cannot judge this run; the text is the reason, such as what the record lacks."""
+    """A check cannot judge this run; the text is the reason."""
 
 
 class Check:
-    """A check: its limits are annotated attributes, with unit, range and default (docs/how-to/plug-ins.md)."""
+    """Base of all checks of your own: annotate the limits, and write `__call__` (docs/how-to/plug-ins.md).
+
+    `__call__` gets a `CheckedCase` and yields its violations.
+    """
 
     def __call__(self, case: CheckedCase) -> Iterable[Violation]:
-        """Return the violations of a recorded case; raise NotJudgedError where it cannot be judged."""
+        """Yield the violations of a recorded case; raise NotJudgedError if it cannot be judged."""
         raise NotImplementedError
 
 
@@ -45,12 +48,12 @@ class Violation(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     t: float | None = None
     """Run time (s)."""
     agent: str = ""
-    """Agent or inverter; of a link its receiver. Empty for one of the whole network."""
+    """Agent or inverter; the receiver of a link; empty for the whole network."""
     value: float | None = None
     unit: str = ""
     """Unit of value and limit; empty for a pure number."""
     limit: float | None = None
-    """What would have passed."""
+    """Limit that it violates."""
 
     @property
     def sentence(self) -> str:
@@ -63,16 +66,16 @@ class Violation(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class CheckVerdict(msgspec.Struct, frozen=True, kw_only=True):
-    """The judgement of one check on one case."""
+    """The verdict of one check on one case."""
 
     check: str
     status: CheckStatus
     reason: str = ""
-    """Why it was not judged, is off, or what a check that failed has raised, also behind its violations."""
+    """Reason for "not judged" or "off", or the exception of a failed check."""
     violations: tuple[Violation, ...] = ()
-    """The first `SHOWN_VIOLATIONS`."""
+    """The first 20 violations."""
     count: int = 0
-    """Number of all violations."""
+    """Number of violations."""
 
     @property
     def sentence(self) -> str:

@@ -1,4 +1,4 @@
-"""A recorded case as metrics and checks see it: rows, windows, islands, events, and messages with decisions."""
+"""A recorded case, as metrics and checks get it: rows, windows, islands, events, messages and decisions."""
 
 from __future__ import annotations
 
@@ -65,19 +65,19 @@ class IslandWindow:
 
 @dataclass(frozen=True, kw_only=True)
 class CheckedCase:
-    """One recorded case; metrics and checks only read it."""
+    """A recorded case, as a check gets it; it is read-only."""
 
     scenario: ScenarioModel
-    """As run."""
+    """Scenario of the run, as typed values."""
     feeder: Tables
     case: str
     history: History
-    """All rows, as read-only arrays (rows, inverters)."""
+    """All rows, as read-only arrays of shape (rows, inverters)."""
     windows: Sequence[Window]
     events: Sequence[PlantEvent]
-    """Events of plant, roster and links, in the order of time: switches make the islands."""
+    """Events of plant, roster and links, in the order of time."""
     messages_saved: Mapping[str, float] = field(default_factory=dict)
-    """Share of states that the laws did not send, by window; empty if they sent all."""
+    """Share of states that the laws did not send, by window; empty if they sent all states."""
     folder: Path | None = None
     """Folder with the record run.mcap; None for a run in memory."""
 
@@ -108,12 +108,12 @@ class CheckedCase:
 
     @cached_property
     def communication(self) -> Any:
-        """What one pass over the record, of any size, finds of messages and decisions; `NotJudgedError` without one."""
+        """Findings of one pass over messages and decisions of the record; `NotJudgedError` without a record."""
         return self._read("communication")
 
     @cached_property
     def content(self) -> Any:
-        """States, decisions and accounts of links from the record; `NotJudgedError` where the run has none."""
+        """States, decisions and accounts of links from the record; `NotJudgedError` without them."""
         return self._read("content")
 
     def _read(self, reader: str) -> Any:
@@ -129,7 +129,7 @@ class CheckedCase:
 
     @cached_property
     def nameplates(self) -> Nameplates:
-        """Nameplates in the order of the columns; those without an agent do not share."""
+        """Nameplates in the order of the columns, with a flag for inverters without an agent, which do not share."""
         everybody = Nameplates.of_columns(self.history.inverters, self.feeder)
         return read_only(everybody.without(without_agent(self.scenario, self.case)))
 
@@ -142,12 +142,12 @@ class CheckedCase:
         return self.scenario.time.T_c_s
 
     def disturbed_at(self, window: Window) -> float:
-        """Return the time (s) from which on a window settles: the last switching or connection in it."""
+        """Return the time (s) of the last switching or connection in a window, from which it settles."""
         times = [e.t for e in self.events if e.kind in _RESTARTS and window.start - 1e-9 <= e.t < window.end]
         return max((window.start, *times))
 
     def rows_from(self, part: IslandWindow, after_s: float, since_s: float = 0.0) -> Flags:
-        """Return its rows that come `after_s` or later after the window's last disturbance, and after `since_s`."""
+        """Return the rows of a part from `after_s` after the last disturbance of its window, and after `since_s`."""
         late: Flags = part.history.t >= max(self.disturbed_at(part.window), since_s) + after_s - 1e-9
         return late
 
@@ -156,15 +156,15 @@ class CheckedCase:
         return island_intervals(self.scenario, self.feeder, self.history.inverters, self.events)
 
     def seen_by(self, window: Window) -> History:
-        """Return the rows that a window is cut from: a live run may go on after the scenario's end."""
+        """Return the rows from which a window is cut: a live run may go on after the end of the scenario."""
         end = self.scenario.time.end_s
         return read_only(self.history.until(end)) if window.end <= end < self.history.t[-1] else self.history
 
     @cached_property
     def parts(self) -> Mapping[Window, Sequence[IslandWindow]]:
-        """Each island with inverters at the end of each window, see `islands_at_end`.
+        """Islands with inverters at the end of each window (`islands_at_end`).
 
-        An island that came about within the window is judged from then on (`rows_from`).
+        An island that forms within the window is judged from then on (`rows_from`).
         """
         return {window: self._parts_of(window) for window in self.windows}
 
@@ -177,12 +177,12 @@ class CheckedCase:
 
     @property
     def unmeasured(self) -> list[str]:
-        """The events whose windows have no numbers."""
+        """Labels of the events whose windows cannot be measured."""
         measured = {window.label for window in self.windows}
         return [event.label for event in self.scenario.events if event.label not in measured]
 
     def killed(self, history: History) -> Flags:
-        """Return which inverters of a history have an agent that the scenario has killed, by row; shape (T, N)."""
+        """Return by row, as an array (rows, inverters), the inverters whose agent the scenario has killed."""
         names = history.inverters
         found: Flags = np.zeros(history.P.shape, bool)
         for node in netem_of(self.scenario, self.case).nodes:
@@ -191,7 +191,7 @@ class CheckedCase:
         return found
 
     def at_limit(self, part: IslandWindow) -> Flags:
-        """Return which inverters of an island deliver all power that an event limits them to, by row; shape (T, N)."""
+        """Return by row, as an array (rows, inverters), the inverters of an island at the limit of an event."""
         names = part.history.inverters
         found: Flags = np.zeros(part.history.P.shape, bool)
         for limit in limits_of(self.scenario, self.case):  # in the order of time: a later one replaces an earlier one

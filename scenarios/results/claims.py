@@ -37,21 +37,21 @@ class Published:
     case: str
     event: str
     island: str = ""
-    """First inverter of the island that it is about; "" for the whole microgrid."""
+    """First inverter of the island; empty for the whole microgrid."""
     quantity: Quantity
     paper: float
     """The number that the publication prints."""
     digits: int
-    """Decimals that it prints."""
+    """Printed decimals."""
     limit: float | None = None
-    """Largest difference that passes, in its unit; None where nothing is judged by it."""
+    """Largest difference that passes, in its unit; None without a tolerance."""
 
     @property
     def where(self) -> str:
         return f"case {self.case}, {self.event}" + (f", island of {self.island}" if self.island else "")
 
     def within(self, ours: float) -> bool | None:
-        """Return whether our number is near enough to exactly the printed one; None where that is not judged."""
+        """Return whether our number is within the limit of the printed one; None without a limit."""
         return None if self.limit is None else abs(ours - self.paper) <= self.limit
 
 
@@ -63,25 +63,25 @@ CLAIMS: Registry[Any] = Registry(
 
 @dataclass(frozen=True, kw_only=True)
 class Benchmark:
-    """A publication's numbers and claims on one experiment, which the key `paper` of a scenario names: data, pure.
+    """A publication's numbers and claims on one experiment, which the key `paper` of a scenario names.
 
-    It is added from outside, by decorator, by entry point (group "gridpeers.benchmarks") or as `module:Name`.
+    An entry point (group "gridpeers.benchmarks") or `module:Name` adds one.
     """
 
     numbers: tuple[Published, ...] = ()
     claims: tuple[Claim, ...] = ()
     summary: Callable[[Findings], Sequence[str]] = lambda _: ()
-    """Return our distance from it, in a few lines below the claims."""
+    """Function that returns a few lines on the distance to the publication, below the claims."""
 
     def lines(self, findings: Findings) -> list[str]:
-        """Return the summary of a run; one that raises an exception is a line that says why."""
+        """Return the summary of a run; an exception becomes a line with the reason."""
         try:
             return [printable(str(line), 1000) for line in self.summary(findings)]
         except ANYTHING as error:  # a benchmark is a user's code
             return [f"The benchmark's summary failed: {named(error)}"]
 
     def number(self, case: str, event: str, quantity: str, island: str = "") -> Published | None:
-        """Return the published number at a place of our results, or None where there is none."""
+        """Return the published number for a place in our results, or None."""
         place = (case, event, quantity, island)
         return next((one for one in self.numbers if (one.case, one.event, one.quantity, one.island) == place), None)
 
@@ -117,17 +117,17 @@ class Claim:
     """Place in the publication."""
     judge: Judge
     measures: tuple[Measure, ...]
-    """Steady values that it is judged by: it does not pass while one of them is not steady, or no number."""
+    """Measures that must be steady numbers for it to pass."""
     cases: tuple[str, ...] = ()
-    """Cases that must have been run."""
+    """Cases that it needs."""
     events: tuple[str, ...] = ()
-    """Events that must have been measured in them."""
+    """Events that it needs in these cases."""
     lacking: Callable[[Findings], str] = lambda _: ""
-    """Return what the run lacks, e.g. an island: the claim fails then, also a known miss. "" where nothing lacks."""
+    """Function that returns a missing part of the run, e.g. an island, with which it fails; else an empty text."""
     figure: str = ""
-    """Figure of the report that shows it; "" for a claim about a table."""
+    """Figure of the report that shows it; empty for a claim on a table."""
     known_miss: str = ""
-    """Known reason why it cannot hold here; "" for none. It is shown as a miss then, and does not fail the run."""
+    """Known reason why it cannot hold here: it is then a MISS, which does not fail the run."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -139,7 +139,7 @@ class Verdict:
 
 
 def judge(findings: Findings, claims: Sequence[Claim]) -> tuple[Verdict, ...]:
-    """Judge claims by the findings; one that raises an exception fails, and its verdict says why."""
+    """Judge claims by the findings; an exception is a FAIL with its reason."""
     verdicts = []
     for claim in claims:
         try:

@@ -1,4 +1,4 @@
-"""The measures of a run: claims, tables, reports and metrics.json are made from them alone."""
+"""The measures of a run, from which claims, tables, reports and metrics.json are made."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SteadyValues = Mapping[str, Mapping[str, Steady]]
 
 @dataclass(frozen=True, kw_only=True)
 class Findings:
-    """The measures of one run."""
+    """The measures of one run, as a claim gets them."""
 
     results: SteadyValues
     """Steady values by case and event."""
@@ -37,22 +37,22 @@ class Findings:
     settled: Mapping[str, Mapping[str, Settling]] = field(default_factory=dict)
     """Settling by case and event."""
     islands: Mapping[str, Mapping[str, Mapping[str, Steady]]] = field(default_factory=dict)
-    """Steady values of each island at the end of a window, by case, event and its first inverter; only of several."""
+    """Steady values of each island at the end of a window, by case, event and first inverter; if there are several."""
     available: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    """Available power at the end, by case and inverter (pu of rating); only where it was changed."""
+    """Available power at the end, by case and inverter (pu of rating), where it was changed."""
     without_agent: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    """Inverters that have no agent, by case; only where there are any. The sharing indices leave them out."""
+    """Inverters without an agent, by case; the sharing indices leave them out."""
     messages_saved: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    """Share of states that the laws did not send, by case and event; only where they left any out."""
+    """Share of states that the laws did not send, by case and event; empty if they sent all states."""
     own: Mapping[str, Mapping[str, Measured]] = field(default_factory=dict)
-    """The scenario's own metrics, by case and event."""
+    """Metrics of the scenario, by case and event, with `values` and `reasons` by name."""
 
     def apart(self, case: str, event: str) -> Mapping[str, Steady]:
-        """Return the islands at the end of a window if there are several: each shares for itself."""
+        """Return the islands at the end of a window, if there are several."""
         return self.islands.get(case, {}).get(event, {})
 
     def parts(self, case: str, event: str) -> dict[str, Steady]:
-        """Return the steady values of a window by "", and those of its islands, if several, by ", island of NAME"."""
+        """Return the steady values of a window under "", and those of several islands under ", island of NAME"."""
         islands = {f", island of {name}": steady for name, steady in self.apart(case, event).items()}
         return {"": self.results[case][event]} | islands
 
@@ -60,7 +60,7 @@ class Findings:
         return float(getattr(self._steady(cell), cell.quantity))
 
     def reason(self, cell: Published) -> str:
-        """Return the reason if our number there is no steady value; "" where it is one."""
+        """Return why our number there is no steady value; empty if it is one."""
         return self._steady(cell).reasons.get(cell.quantity, "")
 
     def _steady(self, cell: Published) -> Steady:
@@ -69,11 +69,11 @@ class Findings:
         return self.results[cell.case][cell.event]
 
     def within(self, cell: Published) -> bool | None:
-        """Return whether our number there is near enough to the paper's, and steady; None where it is not judged."""
+        """Return whether our number there is steady and within the tolerance; None without a tolerance."""
         return cell.within(float("nan") if self.reason(cell) else self.value(cell))
 
     def unsteady(self, cases: Sequence[str], events: Sequence[str], measures: Sequence[str]) -> list[str]:
-        """Return the reasons of those measures that are not steady, with their places; islands each for itself."""
+        """Return a reason with its place for each measure that is not steady, island by island."""
         return [
             f"case {case}, {event}{where}: {label(name, self.f_nom)} {steady.reasons[name]}"
             for case in cases

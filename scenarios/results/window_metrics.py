@@ -21,12 +21,12 @@ LATE = 0.5  # Length (s) of the end of a window over which extremes are looked f
 
 @dataclass(frozen=True, kw_only=True)
 class WindowData(History):
-    """Rows between an event and the next, as read-only arrays (rows, inverters), and the inverters that they are of."""
+    """Rows from an event to the next one, as a metric gets them: read-only arrays of shape (rows, inverters)."""
 
     case: str
     window: Window
     whole: History
-    """All rows of the case, those before the event too."""
+    """All rows of the case."""
     nameplates: Nameplates
     f_nom: float
     """Nominal frequency (Hz)."""
@@ -35,7 +35,7 @@ class WindowData(History):
     messages_saved: float = 0.0
     """Share of states that the laws did not send in the window."""
     islands: Mapping[str, Steady] = field(default_factory=dict)
-    """Steady values of each island at the end of the window, by its first inverter; empty where there is but one."""
+    """Steady values of each island at the end of the window, by its first inverter; empty for one island."""
 
     @classmethod
     def cut(cls, whole: History, window: Window, **about: Any) -> WindowData:
@@ -57,7 +57,7 @@ class WindowData(History):
 
     @cached_property
     def history(self) -> pd.DataFrame:
-        """Rows of the window as a table: columns (inverter, quantity), index t (s); each metric has its own."""
+        """Rows of the window as a table: columns (inverter, quantity), index t (s); a copy for each metric."""
         return self.frame()
 
     @property
@@ -68,7 +68,7 @@ class WindowData(History):
 
     @property
     def late_voltages(self) -> Floats:
-        """Voltages (pu) of the inverters on the network in the last half second of the window, in one row."""
+        """Voltages (pu) of the inverters on the network in the last half second of the window, as a flat array."""
         on = self.present & self.late[:, None]
         voltages: Floats = (self.V / self.nameplates.V_nom)[on]
         return voltages

@@ -28,6 +28,7 @@ ReadFeeder = Callable[[str, str], Tables]
 
 
 def catalogue() -> tuple[str, ...]:
+    """Return the names of the scenarios of the catalogue."""
     return names_in(CATALOGUE)
 
 

@@ -94,7 +94,7 @@ class Registry(Generic[T]):
         return tuple(dict.fromkeys((*self.own, *self._added, *entry_points_of(self.group))))
 
     def register(self, name: str) -> Callable[[T], T]:
-        """Return a decorator that adds an object under a name, for this process; a name is never taken over."""
+        """Return a decorator that gives a part its name in this process; a PluginError refuses a taken name."""
         if not isinstance(name, str) or not name.strip() or ":" in name:
             raise PluginError(
                 f'{name!r:.60} is no name of a {self.kind}; give the decorator a text without ":", e.g. "mine"'

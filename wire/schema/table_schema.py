@@ -31,16 +31,16 @@ from gridpeers.wire.wording import printable
 
 @dataclass(frozen=True)
 class Unit:
-    """Unit of a number, e.g. `Unit("1/s")`; without one it is a pure number or no number."""
+    """Unit of a parameter, e.g. `Unit("1/s")`; a pure number or a text has none."""
 
     text: str
     in_key: bool = True
-    """Whether the key of a file ends in the unit, where the unit can be a part of a key."""
+    """Whether the key of a file ends in the unit, if the unit can be a part of a key."""
 
 
 @dataclass(frozen=True)
 class Range:
-    """Least and greatest value of a parameter, both allowed."""
+    """Least and greatest allowed value of a parameter."""
 
     low: float = -math.inf
     high: float = math.inf
@@ -65,23 +65,23 @@ class Range:
 
 @dataclass(frozen=True)
 class Plausible:
-    """Numbers that make sense, bounds included."""
+    """Plausible range of a parameter; the message on a value outside suggests the value that was meant."""
 
     what: str
-    """Name of the quantity, with its article: the subject of the sentence."""
+    """Name of the quantity with its article, such as "a dead band"."""
     low: float
-    """Lowest value; with `above_zero` that of plausible ones, and zero and less is an error of its own."""
+    """Lowest plausible value; with `above_zero`, zero and less is an error of its own."""
     high: float
     above_zero: bool = False
     hint: str | Callable[[float], str] = ""
-    """End of the sentence about a value that is not plausible, or a function from the value to it."""
+    """End of the message on an implausible value, or a function from the value to it."""
 
     @property
     def span(self) -> str:
         return f"{self.low:g} to {self.high:g}"
 
     def objection(self, value: float, unit: str = "") -> str:
-        """Return why a number cannot be right and what would be.
+        """Return why a number is implausible, with a suggestion.
 
         Examples
         --------
@@ -226,7 +226,7 @@ NO_KEY = Flag("no key")
 """Annotation of a field that no file gives."""
 
 SHARED = Flag("shared")
-"""Annotation of a field of a law that is no parameter: a value that the law shares (`shared_fields`)."""
+"""Annotation of a shared variable of a law, which is no parameter (`shared_fields`)."""
 
 INHERITED = Flag("inherited")
 """Annotation of a table that takes what it leaves out from the table of the same name at the top of the file."""

@@ -99,7 +99,7 @@ def test_it_adds_to_a_delay_and_leaves_other_faults_their_fates(folder: str) -> 
         ("Early", "my_faults:Early on inv1 -> inv2 returned -0.1; return a delay from 0 to 3600 s, or None to drop at"),
     ],
 )
-def test_one_that_fails_does_nothing_from_then_on_and_is_told_once(folder: str, name: str, said: str) -> None:
+def test_a_fault_that_fails_is_ignored_from_then_on_and_reported_once(folder: str, name: str, said: str) -> None:
     """The messages go on as if it were not there; the report of the link has the sentence."""
     receiver = Receiver("inv2", Netem(links=(fault(folder, name),)), {"inv1": "MG1", "inv2": "MG1"})
     for seq in range(6):
