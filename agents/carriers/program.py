@@ -158,7 +158,6 @@ class ProgramLaw(Law):
         self._group = None
 
     def _ask(self, line: dict[str, Any], t: float) -> ProgramAnswer:
-        """Send a line and return the answer; raise LawError without a valid answer in time."""
         what = f"{line['type']} at t = {t:.6g} s"
         if self._group is None:
             raise LawError(f"{self._name} ended before the {what}")

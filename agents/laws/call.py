@@ -111,9 +111,7 @@ def _checked(shared: Any, t: float) -> Mapping[str, float]:
             raise LawError(f"step at t = {t:.6g} s shares {_shown(name)}; a name has up to 32 letters, digits and _")
         checked[name] = _number(f'shared["{name}"]', value, t)
         if abs(checked[name]) > SHARED_LIMIT:
-            raise LawError(
-                f"step at t = {t:.6g} s shares {name} = {value:g}; the largest magnitude is {SHARED_LIMIT:g}"
-            )
+            raise LawError(f"step at t = {t:.6g} s shares {name} = {value:g}; share at most {SHARED_LIMIT:g}")
     return checked
 
 

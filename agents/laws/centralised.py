@@ -81,7 +81,6 @@ class Centralised(Law):
         return SetPoints(own.P_set, own.V_set, {"v": own.V}, True, Terms)
 
     def _mean_error(self, own: Own, neighbours: Sequence[Neighbour]) -> float:
-        """Return the error of the mean of the voltages that the centre knows (pu)."""
         voltages = [own.V, *(other.shared["v"] for other in neighbours if "v" in other.shared)]
         return 1.0 - sum(voltages) / len(voltages)
 

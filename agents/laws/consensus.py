@@ -23,14 +23,12 @@ neighbours' mean with weights c_ij. To first order in T this is (12)-(15).
         F = (1 - e^{-\lambda T/k_q}) / \lambda, \quad \lambda = \max(g \alpha, 2 \beta d)
 
 Explicit Euler needs kappa T lambda_max < 2; nine fully meshed agents at T = 20 ms have 2.6. The consensus term is the
-exact solution where the neighbours move towards agent i as it moves towards them. So agent i goes at most half of the
-way, and no eigenvalue of the consensus is below 0, whatever T and d. The leader term is the exact solution against the
-own quasi-steady response de/dy = 1; under one exponential with the consensus term, eight neighbours at 20 ms would
-restore 2.5 times more slowly. V_set rests where its bracket is 0, at every T, because both parts have the factor F. On
-the droop v + z = V_set, so max(alpha, 2 beta d) bounds alpha dv/dV_set + 2 beta d dz/dV_set, and F does not overshoot.
-At rest L y = -g b e, with the Laplacian L and a factor b > 0; the left null vector of L is positive and all e of an
-island are equal, so e = 0 and all y agree. Stability is a result of searches (`tests/unit/agents/test_law.py`): every
-connected graph tried was stable for every T, except where the paper's continuous law is unstable too.
+exact solution where neighbours move towards agent i as it moves towards them: at most half of the way, so no eigenvalue
+of the consensus is below 0. The leader term is the exact solution against the own quasi-steady response de/dy = 1.
+V_set rests where its bracket is 0, at every T, because both parts have the factor F. On the droop v + z = V_set, so
+max(alpha, 2 beta d) bounds alpha dv/dV_set + 2 beta d dz/dV_set, and F does not overshoot. At rest L y = -g b e with
+the Laplacian L and b > 0; its left null vector is positive and all e are equal, so e = 0 and all y agree.
+`tests/unit/agents/test_law.py` searches for instability: only where the paper's continuous law is unstable too.
 
 **Limits.** The agent limits P_set and V_set (anti-windup). The paper has no limits and accepts wind-up (its Remark 2).
 `gridpeers.agents.degraded_communication` has these and other options, and other weights c_ij than 1.
@@ -181,7 +179,6 @@ class Consensus(Law):
         return Terms(P, V)
 
     def _means(self, neighbours: Sequence[Neighbour]) -> tuple[float, float, float]:
-        """Return the neighbours' mean m_p P_set and m_q q (pu), and the sum d of their weights c_ij."""
         y = z = d = 0.0
         for other in neighbours:
             weight = other.weight

@@ -52,7 +52,6 @@ class FiniteTime(Law):
         return SetPoints(P_set, V_set, NOTHING_SHARED, True, partial(_terms, own, neighbours, P, V, (f_error, V_error)))
 
     def _move(self, difference: float, gain: float, most: float) -> float:
-        """Return gain sig(difference)^gamma, at most a part of the difference."""
         size = abs(difference)
         return copysign(min(gain * size**self.gamma, most * size), difference)
 

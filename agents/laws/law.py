@@ -1,11 +1,8 @@
 """The contract of a control law: one object per inverter, called once a control period, in per unit. Pure.
 
-A law sees its own inverter (`Own`) and its neighbours' last states (`Neighbour`), and returns the set-points of the
-next period (`SetPoints`), or the terms of their change (`Terms`). Its only memory is its own attributes. It uses no
-clock, file, randomness or network: the same calls give the same results in one process and in many.
-
-The agent of a law decides when to call it: not while the inverter is grid-connected or out of service,
-nor without a fresh measurement. After such a pause it calls `start` first.
+A law uses no clock, file, randomness or network: the same calls give the same results in one process and in many. The
+agent does not call it while the inverter is grid-connected, out of service or without a fresh measurement. After such a
+pause it calls `start` first.
 """
 
 from __future__ import annotations

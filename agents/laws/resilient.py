@@ -28,8 +28,6 @@ SLOWER = 10.0
 
 
 class _Memory(NamedTuple):
-    """Memory of one neighbour, from the last step."""
-
     t: float
     """Run time (s) of the last step with it."""
     P_set: float
@@ -46,15 +44,9 @@ class Resilient(Consensus):
     source = "LeBlanc et al., IEEE J. Sel. Areas Commun. 31(4), 2013"
 
     F: Annotated[int, Range(0, 100), "Largest number of liars among the neighbours of an agent; 0 trims none."] = 1
-    tolerance: Annotated[
-        float, Unit("pu"), Range(0, 100), "A state beyond the limits by more than this is implausible; 0: off."
-    ] = 0.0
-    rate: Annotated[
-        float, Unit("pu/s"), Range(0, 1e6), "Fastest change of a neighbour's values that counts; 0: any."
-    ] = 0.0
-    T_out: Annotated[
-        float, Unit("s"), Range(0, 1e3), "Time in which trust in an implausible neighbour falls; 0: off."
-    ] = 0.0
+    tolerance: Annotated[float, Unit("pu"), Range(0, 100), "Excess over a limit that is implausible; 0: off."] = 0.0
+    rate: Annotated[float, Unit("pu/s"), Range(0, 1e6), "Fastest change of a neighbour's value; 0: any."] = 0.0
+    T_out: Annotated[float, Unit("s"), Range(0, 1e3), "Time in which trust in an implausible one falls; 0: off."] = 0.0
 
     def __init__(self, **parameters: Any) -> None:
         super().__init__(**parameters)
@@ -129,7 +121,6 @@ class Resilient(Consensus):
         return believed, memory
 
     def _is_plausible(self, own: Own, n: Neighbour) -> bool:
-        """Return whether an inverter in the own island can have a neighbour's state."""
         if not self.tolerance:
             return True
         low, high = self.P_set_min - self.tolerance, self.P_set_max + self.tolerance
