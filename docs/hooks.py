@@ -95,17 +95,22 @@ def _members(cls: type) -> Iterator[str]:
     for field, (_, text) in field_docs(cls).items():
         if text and not field.startswith("_"):
             yield f"- `{field}`: {_plain(text)}"
-    for name, member in vars(cls).items():
+    private = [base for base in cls.__mro__ if base is cls or base.__name__.startswith("_From")]
+    for name, member in (entry for base in reversed(private) for entry in vars(base).items()):
         it = getattr(member, "fget", None) or getattr(member, "func", None) or getattr(member, "__func__", member)
-        text = (inspect.getdoc(it) or "").partition("\n\n")[0]
+        text, _, rest = (inspect.getdoc(it) or "").partition("\n\n")
         if text and inspect.isfunction(it) and not name.startswith("_"):
             called = f"({', '.join(_parameters(it))})" if it is member or hasattr(member, "__func__") else ""
             yield f"- `{name}{called}`: {_plain(' '.join(text.split()))}"
+            if section := re.search(r"Parameters\n-+\n(.*?)(\n\n|\Z)", rest, re.S):
+                yield from _entries(section[1], "    ")
 
 
 def _parameters(it: Callable[..., Any]) -> list[str]:
     return [
-        str(of.replace(annotation=of.empty)) for of in inspect.signature(it).parameters.values() if of.name != "self"
+        re.sub(r"<function (\w+) at \w+>", r"\1", str(of.replace(annotation=of.empty)))
+        for of in inspect.signature(it).parameters.values()
+        if of.name != "self"
     ]
 
 
@@ -124,18 +129,22 @@ def _docstring(text: str | None) -> Iterator[str]:
             yield from (f"Example: `{' '.join(example[1].split())}`", "")
         elif section := re.match(r"(\w+)\n-+\n(.*)", paragraph, re.S):
             yield from (f"{section[1]}:", "")
-            for entry in re.split(r"\n(?! )", section[2]):
-                head, _, meaning = entry.partition("\n")
-                yield f"- `{head.partition(' : ')[0]}`: {_plain(' '.join(meaning.split()))}"
-            yield ""
+            yield from (*_entries(section[2]), "")
         else:
             yield from (_plain(paragraph), "")
+
+
+def _entries(section: str, indent: str = "") -> Iterator[str]:
+    """Yield the parameters of a docstring as a list."""
+    for entry in re.split(r"\n(?! )", section):
+        head, _, meaning = entry.partition("\n")
+        yield f"{indent}- `{head.partition(' : ')[0]}`: {_plain(' '.join(meaning.split()))}"
 
 
 def _plain(text: str) -> str:
     """Return text in which nothing but code is markup, and a path of a page a link; all parts are in one folder."""
     parts = re.split(r"(`[^`]*`)", text)
-    plain = (part if part[:1] == "`" else re.sub(r"([*_<\[])", r"\\\1", part) for part in parts)
+    plain = (part if part[:1] == "`" else re.sub(r"([*_\[])", r"\\\1", part).replace("<", "&lt;") for part in parts)
     return re.sub(r"(?<!`)docs/([\w/-]+\.md)", r"[\1](../\1)", "".join(plain))
 
 

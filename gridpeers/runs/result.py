@@ -47,12 +47,15 @@ if TYPE_CHECKING:
 class _FromFolder:
     """The common part of `Result` and `Results`."""
 
+    spec: model.ScenarioModel
+    """Scenario of the run, as typed values."""
+    folder: Path
+    """Folder with the files of the run (docs/reference/files-and-export.md)."""
+
     def __init__(self, folder: RunFolder, spec: model.ScenarioModel, feeder: Tables) -> None:
         self._folder, self._feeder = folder, feeder
         self.spec = spec
-        """Scenario of the run, as typed values."""
         self.folder = folder.path
-        """Folder with the files of the run (docs/reference/files-and-export.md)."""
 
     @property
     def numbers(self) -> dict[str, Any]:
