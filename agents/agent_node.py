@@ -300,7 +300,7 @@ class AgentNode:
         if PLANT in self.admission.epochs:  # else the last measurement of a plant that is gone would still look fresh
             measured = heard.measurement if round(at - heard.measured_at, 9) <= self._config.max_age else None
             if measured is None:
-                policy.hold("no recent measurement; holds")
+                policy.hold("no recent measurement; holds its set-points")
             elif self.phases.now == "waiting":
                 self.phases.on("measured")
                 policy.joined(measured)

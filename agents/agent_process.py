@@ -72,7 +72,7 @@ def _check(configs: Sequence[AgentConfig]) -> None:
     except ValueError as error:
         raise ConfigurationError(str(error)) from None
     if len(configs) > 1 and configs[0].credentials is not None:
-        raise ConfigurationError(f"agents of one process have one certificate; start that of {configs[1].name} alone")
+        raise ConfigurationError(f"a process has one certificate; start the agent of {configs[1].name} in its own")
 
 
 def _made_laws(configs: Sequence[AgentConfig], laws: ExitStack) -> list[Law]:

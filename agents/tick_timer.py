@@ -134,7 +134,7 @@ class AgentTimer:
 
     def plant_came(self, now: float) -> None:
         if self._phases.now == "seeking":
-            self._post.say("the plant is there; waits for its measurement")
+            self._post.say("the plant is there; waits for its first measurement")
         self.plant_seen, self._give_up = True, None
         self.upkeep.health.plant_seen(now)
 
@@ -144,7 +144,7 @@ class AgentTimer:
             self.upkeep.missing_agents = message.waits_for
 
     def new_plant(self) -> None:
-        self.hold("the plant restarted; starts from its measurement")
+        self.hold("the plant restarted; continues from its measurement")
         self._ran = False
         self.upkeep.new_plant()
 
@@ -157,7 +157,7 @@ class AgentTimer:
     def gone(self, name: str) -> TickVerdict:
         """Note that a process is gone."""
         if name == PLANT:
-            return TickVerdict("wait", "the plant is gone; holds, and seeks it again")
+            return TickVerdict("wait", "the plant is gone; holds its set-points and looks for it")
         self._heard.states.pop(name, None)
         self.upkeep.health.forget(name)
         return WAIT

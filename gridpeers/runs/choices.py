@@ -65,7 +65,9 @@ def check_how(driver: str, pace: Pace, spec: model.ScenarioModel, *, dash: str =
         name = "strict" if strict else "speed"
         problem = f"{name}: simulated time has no pace to keep; use it with {dash}clock wall"
     elif clock == "wall" and spec.plant.simulator != "gridpeers":
-        problem = f'clock wall: the plant of "{spec.plant.simulator}" keeps no real time; use {dash}clock simulated'
+        problem = (
+            f'clock wall: the plant of "{spec.plant.simulator}" cannot run in real time; use {dash}clock simulated'
+        )
     elif clock == "wall" and driver == "inprocess":
         problem = f"clock wall: needs a process per agent; use {dash}driver processes"
     elif clock == "wall" and not SPEEDS[0] <= speed <= SPEEDS[1]:

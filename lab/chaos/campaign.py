@@ -160,7 +160,7 @@ class Campaign:
                 first = f"run {failed[0]}" if failed else ""
                 yield f"{name:18} {passed + len(failed):7} {len(failed):9}  {first}".rstrip()
         collapses = sum(bool(row.collapse) for row in rows)
-        beyond = f"; {collapses} with a collapse that no control prevents, and that lasts" if collapses else ""
+        beyond = f"; {collapses} with a lasting collapse that no control prevents" if collapses else ""
         yield f"{self.violated} of {len(rows)} runs violated anything; {sum(row.trips for row in rows)} trips{beyond}"
         for name, (found, simplest, file) in self.failures.items():
             # of the run as found if the simplest one passes the next time

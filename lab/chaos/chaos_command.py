@@ -36,11 +36,11 @@ def chaos(
     runs: Annotated[int, option("N", "Number of runs.", min=1)] = 100,
     driver: Annotated[
         Literal["inprocess", "processes"],
-        typer.Option(help="inprocess: each run in one process; processes: one per agent, beside the same in one."),
+        typer.Option(help="inprocess: each run in one process; processes: also with a process per agent."),
     ] = "inprocess",
-    seed: Annotated[int, option("S", "Seed of all that is drawn.", min=0, max=10**9)] = 1,
-    case: Annotated[str | None, option("NAME", "Case to disturb; the last one of the file when left out.")] = None,
-    jobs: Annotated[int | None, option("N", "Processes; one per core when left out.", min=1)] = None,
+    seed: Annotated[int, option("S", "Seed of the disturbances.", min=0, max=10**9)] = 1,
+    case: Annotated[str | None, option("NAME", "Case to disturb; the last one of the file if left out.")] = None,
+    jobs: Annotated[int | None, option("N", "Parallel processes; one per core if left out.", min=1)] = None,
     out: Annotated[
         Path | None, option("DIR", "Folder for the results, new or empty; runs/SCENARIO-chaos/TIME if left out.")
     ] = None,
@@ -58,9 +58,9 @@ def chaos(
     if len(spec.cases) > 1:
         fail(f"--case: takes one case, got {case}")
     if (simulator := spec.plant.simulator) != "gridpeers":
-        fail(f'{scenario}: plant.simulator = "{simulator}" lets nobody leave or join; use "gridpeers"')
+        fail(f'{scenario}: plant.simulator = "{simulator}" lets no inverter leave or join; use "gridpeers"')
     if spec.security == "mtls" and driver == "processes":
-        fail(f'{scenario}: security = "mtls" needs certificates, which chaos does not take; leave it out')
+        fail(f'{scenario}: security = "mtls" needs certificates, and chaos uses no certificates; remove it')
     require(_PACKAGES, "install what chaos needs: pip install 'gridpeers[chaos]'")
     from datetime import datetime
 
@@ -118,8 +118,8 @@ def _try_undisturbed(console: Console, campaign: Campaign) -> None:
         advice = f"choose another case (--case), or switch these checks off in the scenario{entry} ({page})"
         lines = [f"{name}: violated without any disturbance: {text}" for text in row.violated.values()]
         fail(*lines, advice)
-    how = "each with processes and again in one" if campaign.driver == "processes" else f"{campaign.jobs} at a time"
-    typer.echo(f"{name}: it violates nothing; next {counted(campaign.runs, 'run')} with disturbances, {how} ...")
+    how = "each with processes and in one" if campaign.driver == "processes" else f"{campaign.jobs} at a time"
+    typer.echo(f"{name}: it passes; now {counted(campaign.runs, 'run')} with disturbances, {how} ...")
 
 
 @contextmanager
@@ -144,4 +144,4 @@ def _told_if_ended(campaign: Campaign) -> Iterator[None]:
             fail(f"interrupted; {left}", code=exit_code(error))
         if isinstance(error, OSError) and path:
             fail(refusal(path, error), left, code=BROKEN)
-        fail(str(error) or "no memory is left", left, code=BROKEN)
+        fail(str(error) or "out of memory", left, code=BROKEN)

@@ -187,7 +187,7 @@ def judged(
                 violated = {LAW_FAILED if isinstance(error, LawStopError) else ENDS: str(error)}
             return JudgedRun(msgspec.structs.replace(row, violated=violated))
     links = [*recorded.links.warnings, *sorted(recorded.links.failures)]
-    unlike = "" if recorded.reproducible else "something happened that the scenario does not say"
+    unlike = "" if recorded.reproducible else "an event happened that is not in the scenario"
     asked = {ENDS: "", ERROR: unlike, LINKS: "; ".join(links[:2])}
     failed = {it.check: it.sentence for it in verdicts if it.status == "failed"}
     passed = [name for name, text in asked.items() if not text]

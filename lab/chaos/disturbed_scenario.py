@@ -373,5 +373,5 @@ class FeasibleSupply:
         able = sum(row.P_rated for row in alive)
         held = sum(row.P_rated for row in there) - able
         if not LEAST_LOAD * able + held <= load <= MOST_LOAD * able + KILLED * held:
-            return f"{load / 1e3:.0f} kW of load are not what {names} can feed"
+            return f"{load / 1e3:.0f} kW of load do not fit the ratings of {names}"
         return ""

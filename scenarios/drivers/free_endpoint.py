@@ -66,7 +66,7 @@ def free_endpoint(text: str = "tcp/127.0.0.1:0", *, option: str = "listen") -> s
     """
     endpoint = parse_endpoint(text)
     if endpoint is None:
-        raise ListenError(f'{option}: "{text}" is no endpoint; use e.g. tcp/127.0.0.1:7447, or port 0 for a free one')
+        raise ListenError(f'{option}: "{text}" is no endpoint; write e.g. tcp/127.0.0.1:7447, or port 0 for a free one')
     if not endpoint.connects:
         return text
     ports = [endpoint.port] if endpoint.port else random.SystemRandom().sample(_PORTS, min(100, len(_PORTS)))
@@ -85,7 +85,7 @@ def free_endpoint(text: str = "tcp/127.0.0.1:0", *, option: str = "listen") -> s
             continue
         return str(endpoint._replace(port=port))
     raise ListenError(
-        f"{option}: {text} cannot be listened on: {(reason.strerror or str(reason)).lower()}; "
+        f"{option}: {text} cannot be used: {(reason.strerror or str(reason)).lower()}; "
         f"{_way_out(endpoint.host, reason)}"
     )
 
@@ -101,9 +101,9 @@ def _claim(port: int) -> None:
 
 def _way_out(host: str, error: OSError) -> str:
     if isinstance(error, socket.gaierror) or error.errno == errno.EADDRNOTAVAIL:
-        return f"{host} is no address of this host; give one that it has, or 0.0.0.0 (IPv6: [::]) for all of them"
-    other = "choose another port, or 0 for a free one, here and for those that connect to it"
+        return f"{host} is not an address of this host; give one of its own, or 0.0.0.0 (IPv6: [::]) for all of them"
+    other = "choose another port, or 0 for a free one, and connect the others to that port"
     if error.errno == errno.EADDRINUSE:
-        ends = f"{command_line('down')} ends a live run; a frozen plant goes on with kill -CONT"
-        return f"end what uses it ({ends}), or {other}"
+        ends = f"{command_line('down')} ends a live run; kill -CONT wakes a frozen plant"
+        return f"end its user ({ends}), or {other}"
     return other

@@ -144,7 +144,7 @@ class _ProcessDriver:
                 since = now
             elif now - max(since, client.message_at) >= deadline:
                 report = supervisor.children[PLANT].report(self._when)
-                self._end(f"nothing was heard of the plant for {deadline:g} s, so the run was ended: {report}")
+                self._end(f"the plant was silent for {deadline:g} s, so the run was ended: {report}")
             for word in words:
                 if word == READY:
                     self._plant_ready = True

@@ -51,7 +51,7 @@ def check_alone(
     with RunClient(there) as client:
         if client.until(lambda: client.plant, LOOKING):
             raise UsageError(
-                f"--run: a plant of run {run} is there already, at {', '.join(beyond)}; end it "
+                f"--run: a plant of run {run} already exists, at {', '.join(beyond)}; end it "
                 f"({command_line('down', *there.words)}), or give this run another name"
             )
 
@@ -91,7 +91,7 @@ def configure(
     check_duration(duration)
     if scenario.plant.simulator != "gridpeers":
         raise UsageError(
-            f'plant.simulator = "{scenario.plant.simulator}": keeps no real time; use {command_line("run")}, '
+            f'plant.simulator = "{scenario.plant.simulator}": cannot run in real time; use {command_line("run")}, '
             'or "gridpeers"'
         )
     if scenario.security == "mtls" and not secured:
@@ -138,7 +138,7 @@ def folders(out: Path | None, scenario: ScenarioModel) -> Iterator[Folders]:
         yield Folders(Path(tempfile.mkdtemp(prefix="gridpeers-")))
         return
     whole = new_folder(out, scenario.name, datetime.now().astimezone())  # noqa: TID251  # folders are named by the day
-    begun = "A live run begins with it; how long it lasted, and what people did, is in events.csv and run.mcap."
+    begun = "The start of a live run. events.csv and run.mcap have its length and the commands of people."
     try:
         write_whole(whole / "scenario.toml", to_toml(scenario, {"driver": LIVE} | versions(), [begun]))
         (whole / "log").mkdir()

@@ -48,12 +48,12 @@ LOGGED = ("roster", "warning")
 CHECK = 0.25
 """Time (s) between two checks for process faults that are due."""
 
-UNHEARD = "the plant has ended, and nothing was ever heard of it here: no link to it was made"
+UNHEARD = "the plant has ended, and this command never had a link to it"
 
 LEAVING = 5.0
 """Time (s) that processes have to close by themselves once the plant has."""
 
-GOES_ON = "; the run goes on without it"
+GOES_ON = "; the run continues without it"
 
 _STOP = "stop"
 
@@ -133,7 +133,7 @@ class LiveRecorder:
     def _finish(self, recorder: Recorder) -> None:
         """Write the tables; of a record that is not whole there are none."""
         if recorder.count < 2:
-            say("nothing was recorded, so there are no numbers")
+            say("nothing was recorded, so nothing is measured")
         elif not self.client.ended:
             say(text := f"the record ends at {recorder.case.ended:.2f} s, without the plant's last message")
             self.failure = self.failure or text
@@ -162,7 +162,7 @@ class LiveRecorder:
                 self._recorder = None
                 recorder.close()
             for before, after in recorder.case.missing[known:]:
-                say(f"rows between {before:.2f} and {after:.2f} s are missing: for so long no word came of the plant")
+                say(f"rows between {before:.2f} and {after:.2f} s are missing: the plant was not heard")
         except Exception as error:
             self.client.rejects.failed("telemetry", error)
 
@@ -179,11 +179,11 @@ class LiveRecorder:
 def meaning(word: str, config: PlantConfig) -> str:
     """Return a sentence for a line that the plant prints at a step of its start, or for a refused link; or ""."""
     if word == COMPILING:
-        return "the plant is being built; the very first time its inner loop is compiled, which takes some seconds"
+        return "the plant is being built; the first time, its inner loop is compiled, which takes some seconds"
     if word == READY:
         agents = f"{len(config.agents)} agents {short(config.agents)}"
         wait = config.wait_for_agents
-        return f"waits up to {wait:g} s for its {agents}" if wait > 0.0 else f"waits for none of its {agents}"
+        return f"waits up to {wait:g} s for its {agents}" if wait > 0.0 else f"does not wait for its {agents}"
     refused = re.search(r"WARN.*zenoh_link_tls\S*\s(.*?)(?:\. Hint:.*)?$", word)
     return f"a link was refused: {printable(refused[1])}" if refused else ""
 
@@ -268,7 +268,7 @@ def agent_here(
     stop_at_signals(StoppedError)
     _log()
     who = ", ".join(names)
-    say(f"{who}: seeks the plant of {where}, for up to {wait:g} s")
+    say(f"{who}: looks for the plant of {where}, for up to {wait:g} s")
     try:
         with RunClient(where) as client:
             end = monotonic() + wait
@@ -277,8 +277,8 @@ def agent_here(
         named = list(dict.fromkeys(code for config in configs for code in own_code(config)))
         if named and not trusts and far_hosts(where.connect):
             raise UsageError(
-                f"{who}: the plant of {where} has its agents run {' and '.join(named)}, which is code of whoever runs "
-                "the plant; if you trust it, say --own-code"
+                f"{who}: the plant of {where} names {' and '.join(named)}, code that agents then run; "
+                "if you trust whoever runs the plant, use --own-code"
             )
         listen = listen or return_path((*where.connect, *configs[0].connect))
         own = {"connect": where.connect, "listen": listen, "credentials": where.credentials}
@@ -309,7 +309,7 @@ def _followed(recorder: LiveRecorder, run: Callable[[], str]) -> ProcessOutcome:
 def _say_end(recorder: LiveRecorder, config: PlantConfig) -> None:
     pacing = recorder.client.pacing
     if pacing is None or pacing.steps == 0:
-        say("the run ended before it began")
+        say("the run ended before its first step")
     else:
         say(f"ended at t = {recorder.client.t:.2f} s; {sentence(pacing, config.T_c / config.speed)}")
 
@@ -322,7 +322,7 @@ def conclude(outcome: ProcessOutcome, metrics: Request) -> ProcessOutcome:
     """
     folder, recorded = metrics.folder, outcome.recorded
     if outcome.broke or recorded is None:
-        set_broken(folder, outcome.broke or "no whole record")
+        set_broken(folder, outcome.broke or "the record is incomplete")
         return outcome
     (case,) = metrics.scenario.cases
     pacing = {} if outcome.pacing is None else {case: outcome.pacing}
@@ -337,10 +337,10 @@ def conclude(outcome: ProcessOutcome, metrics: Request) -> ProcessOutcome:
         show_summary(report, terminal(), command_line("export", shown(folder)))
         set_complete(folder)
     except (StoppedError, KeyboardInterrupt) as stop:
-        set_broken(folder, "interrupted while its numbers were made")
+        set_broken(folder, "interrupted while it was measured")
         return dataclasses.replace(outcome, interrupted=_signal_of(stop))
     except OSError as error:
-        broke = f"its numbers cannot be written: {error.strerror or error}"
+        broke = f"its measures cannot be written: {error.strerror or error}"
         set_broken(folder, broke)
         return dataclasses.replace(outcome, broke=broke)
     return outcome

@@ -78,9 +78,9 @@ def objection(option: str, endpoint: str, *, keys: bool, insecure: bool) -> str:
     assert parsed is not None
     tls = parsed._replace(protocol="tls")
     if keys and parsed.protocol != "tls":
-        return f"{option}: {endpoint} is open, and --keys asks for TLS: write {tls}"
+        return f"{option}: {endpoint} is open, and --keys needs TLS: write {tls}"
     if not keys and parsed.protocol == "tls":
-        return f"{option}: {endpoint} needs certificates: say --keys DIR, the folder that gridpeers keys init has made"
+        return f"{option}: {endpoint} needs certificates: use --keys DIR, a folder made by gridpeers keys init"
     if not (keys or insecure or is_loopback_host(parsed.host)):
         return (
             f"{option}: {endpoint} is not on this host's loopback, and without certificates whoever reaches it reads "

@@ -175,9 +175,9 @@ class RunClient:
             return ""
         own, vouched = credentials.own, self._session.vouches(PLANT)  # it looks at new links, and notes their lines
         silent = (
-            f"the plant at {', '.join(self.where.connect)} takes the link, but nothing passes on it: it is still being "
-            f"built, or its members.json revokes or lacks the certificate of {own.name}, which its output says; "
-            f"gridpeers keys issue {own.name} --role {own.role}, where the site was made, gives {own.name} a new one"
+            f"the plant at {', '.join(self.where.connect)} accepts the link, but no message passes: it is still being "
+            f"built, or its members.json revokes or lacks {own.name} (see its output); "
+            f"gridpeers keys issue {own.name} --role {own.role}, in the folder of the site, issues a new certificate"
         )
         return "; ".join([*self._session.take_lines(), *([silent] if vouched and not self.runs else [])])
 
@@ -188,13 +188,13 @@ class RunClient:
             if faults := self._link_faults():
                 return f"{missing}: {faults}"
             start = command_line("plant", "SCENARIO", "--run", where.run, *where.access.words)
-            return f"{missing}; start one ({start}), or give another name by --run"
+            return f"{missing}; start one ({start}), or name another run by --run"
         if refused := self._refused():
             return refused
         start = command_line("plant", "SCENARIO", *where.access.words)
         return (
             f"nothing answers at {', '.join(where.connect)} within {wait:g} s; start a plant there ({start}), "
-            "or say by --connect where it is; a frozen one goes on by kill -CONT"
+            "or name its endpoint by --connect; kill -CONT wakes a frozen plant"
         )
 
 
@@ -204,7 +204,7 @@ def _refusal(text: str, where: RunAddress) -> str:
         return ""
     if not (refusal := tls_refusal(endpoint.host.strip("[]"), endpoint.port, where.credentials, PROBE)):
         return ""
-    advice = "say by --keys the folder of its site, or by --connect where the plant of this site is"
+    advice = "give the folder of its site by --keys, or the endpoint of your plant by --connect"
     if where.credentials is None:
-        advice = f"say --keys DIR and {endpoint._replace(protocol='tls')}"
-    return f"what listens at {text} {refusal}; {advice} (docs/how-to/several-hosts.md)"
+        advice = f"use --keys DIR and {endpoint._replace(protocol='tls')}"
+    return f"{text} {refusal}; {advice} (docs/how-to/several-hosts.md)"

@@ -125,8 +125,8 @@ def data_of(client: RunClient, answer: Answer, kind: type[T]) -> T:
         return msgspec.convert(answer.data, kind)
     except msgspec.ValidationError as error:
         raise NobodyError(
-            f"the plant of {client.where} answers what cannot be read here: {printable(str(error), 200)}; is it of "
-            "another version?"
+            f"the answer of the plant of {client.where} cannot be read: {printable(str(error), 200)}; has it another "
+            "version?"
         ) from None
 
 
@@ -222,9 +222,9 @@ def load_setting(factor: float | None, P_kW: float | None, Q_kvar: float | None)
         if value is not None and (objection := allowed.objection(value)):
             raise UsageError(f"{option}: {objection}")
     if factor is not None and (P_kW is not None or Q_kvar is not None):
-        raise UsageError("--factor: goes with neither --P nor --Q; give the factor, or the power")
+        raise UsageError("--factor: cannot go with --P or --Q; give the factor or the power")
     if factor is None and P_kW is None and Q_kvar is None:
-        raise UsageError("nothing is to be set; give --factor, or one or both of --P (kW) and --Q (kvar)")
+        raise UsageError("nothing to set; give --factor, or one or both of --P (kW) and --Q (kvar)")
     return LoadSetting(
         factor=factor, P=None if P_kW is None else 1e3 * P_kW, Q=None if Q_kvar is None else 1e3 * Q_kvar
     )
@@ -254,9 +254,7 @@ def links_of_run(client: RunClient) -> EmulationConfig:
     for config in configurations(client).values():
         if config.links:
             return EmulationConfig.of_tree(config.links)
-    raise NobodyError(
-        f"{client.where} has no emulated links that could be changed; runs started by gridpeers plant or up have"
-    )
+    raise NobodyError(f"{client.where} has no emulated links; runs of gridpeers plant and gridpeers up have")
 
 
 def check_link_command(command: LinkCommand, setup: EmulationConfig | None) -> None:
@@ -282,7 +280,7 @@ def command_links(client: RunClient, command: LinkCommand) -> LinkCommandResult:
     refused = {name: answers[name].text for name in reached if name in answers and not answers[name].ok}
     failures = [f"{name}: {why}" for name, why in refused.items()]
     if silent:
-        failures.append(f"not acknowledged by {', '.join(silent)}; is it frozen? It will be told again")
+        failures.append(f"not acknowledged by {', '.join(silent)}; is it frozen? The plant repeats the command")
     return LinkCommandResult(
         text=f"{answer.text}; from t = {reply.t:.2f} s on" if reply.receivers else answer.text,
         acknowledged=[name for name in reached if name not in refused and name not in silent],

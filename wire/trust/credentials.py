@@ -166,7 +166,7 @@ class Credentials(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         shown = printable(common_name, 64) or "nobody"
         if any(common_name == member.common_name for member in self.members):
             return f"its other end is {shown}, whose certificate was revoked"
-        return f"its other end is {shown}, who is no member by the list that was read at the start"
+        return f"its other end is {shown}, who is not on the list of members that was read at the start"
 
     def zenoh_settings(self, *, star: bool) -> tuple[dict[str, Any], dict[str, Any]]:
         """Return Zenoh's settings ``transport/link`` and ``access_control``.
@@ -202,7 +202,7 @@ class LinkCertificates:
             if name not in self._names:
                 self._names.add(name)
                 if why := self._credentials.stranger(name):
-                    self._lines.append(f"a link to {link.dst}: {why}; nothing passes on it")
+                    self._lines.append(f"a link to {link.dst}: {why}; no message passes")
 
     def take_lines(self) -> tuple[str, ...]:
         lines, self._lines = tuple(self._lines), []

@@ -70,17 +70,17 @@ def read_list(folder: Path) -> MemberList:
 
     # Path.is_dir may raise an error where the folder above may not be entered
     if not os.path.isdir(folder):  # noqa: PTH112
-        raise KeysError(f"{folder}: there is no such folder of keys; gridpeers keys init {folder} makes one")
+        raise KeysError(f"{folder}: does not exist; gridpeers keys init {folder} makes a folder of keys")
     public = read_certificate(folder / CA).public_key()
     try:
         signed = decode_foreign(msgspec.json.Decoder(SignedList).decode, _read(folder / LIST))
         signature = base64.b64decode(signed.signature, validate=True)
         if not all(is_name(member.name) for member in signed.list.members):
-            raise ValueError("a name in it is none")
+            raise ValueError("it has an invalid name")
     except KeysError:
         raise
     except ValueError as error:
-        raise KeysError(f"{folder / LIST}: cannot be read: {error}; copy it anew from the site") from None
+        raise KeysError(f"{folder / LIST}: cannot be read: {error}; copy it from the site again") from None
     try:
         if not isinstance(public, ec.EllipticCurvePublicKey):  # no authority that gridpeers has made
             raise InvalidSignature
@@ -114,7 +114,7 @@ def open_credentials(
     if member is None or member.role not in roles:
         other = member or next((each for each in there if each.role == "viewer"), None)
         if other and other.role == "viewer" and tuple(roles) == COMMANDING:
-            look = "which may look at a run (status, watch, view) and not command it"
+            look = "which may look at a run (status, watch, view), but not command it"
             what = f"{other.name} has the role viewer, {look}; an {either} may"
         elif member:
             what = f"{member.name} has the role {member.role}; this needs the role {either}"
@@ -158,7 +158,7 @@ def _end_of(own: x509.Certificate, path: Path, folder: Path, member: SiteMember,
     if common_name != member.common_name:
         raise KeysError(
             f'{path}: is the certificate of "{printable(common_name)}", not of "{member.common_name}"; copy that of '
-            f"{member.name}, or issue it anew"
+            f"{member.name}, or issue a new one"
         )
     for certificate, what, renewal in ((own, path, f"issue {member.name}"), (ca, folder / CA, "init")):
         begins, ends = certificate.not_valid_before_utc, certificate.not_valid_after_utc
@@ -182,7 +182,7 @@ def read_certificate(path: Path) -> x509.Certificate:
         certificate.public_key(), certificate.subject, certificate.not_valid_after_utc  # read when they are asked for
         return certificate
     except (ValueError, UnsupportedAlgorithm):
-        raise KeysError(f"{path}: is no certificate in PEM; copy it anew from the site") from None
+        raise KeysError(f"{path}: is not a certificate in PEM; copy it from the site again") from None
 
 
 def load_pair(path: Path) -> tuple[x509.Certificate, Any]:
@@ -197,7 +197,9 @@ def load_pair(path: Path) -> tuple[x509.Certificate, Any]:
     try:
         key: Any = load_pem_private_key(data, None)
     except (ValueError, TypeError, UnsupportedAlgorithm) as error:
-        raise KeysError(f"{path}: is no private key: {printable(str(error), 80)}; copy it anew from the site") from None
+        raise KeysError(
+            f"{path}: is no private key: {printable(str(error), 80)}; copy it from the site again"
+        ) from None
     certificate = read_certificate(beside)
     if key.public_key() != certificate.public_key():
         raise KeysError(f"{path}: is not the key of {beside.name}; copy both from the same site")
@@ -209,8 +211,8 @@ def _read(path: Path) -> bytes:
         return path.read_bytes()
     except FileNotFoundError:
         raise KeysError(
-            f"{path}: is missing; copy it from the folder where the site issues certificates, or name by --keys DIR "
-            "the folder that has it"
+            f"{path}: is missing; copy it from the folder where the site issues certificates, or give another "
+            "folder by --keys"
         ) from None
     except OSError as error:
         raise KeysError(f"{path}: cannot be read: {error.strerror}") from None
@@ -239,7 +241,7 @@ def tls_refusal(host: str, port: int, credentials: Credentials | None, timeout: 
         if alert and credentials is None:
             return "asks for a certificate"
         if alert and credentials is not None:
-            why = "it has expired by the clock there" if name == "CERTIFICATE_EXPIRED" else f"{name}, of another site"
+            why = "expired by the clock of that host" if name == "CERTIFICATE_EXPIRED" else f"{name}, of another site"
             return f"does not accept the certificate of {credentials.own.name} ({why})"
     except OSError:  # nobody is there, or files of ours have gone
         pass

@@ -55,7 +55,7 @@ def make_site(folder: Path, *, days: float = LIFE_DAYS, now: datetime | None = N
         raise KeysError(f'{folder}: "{printable(site)}" cannot name a site; use letters, digits, "_", "-", "."')
     try:
         if folder.exists() or folder.is_symlink():
-            raise KeysError(f"{folder}: is there already; gridpeers keys show --keys {folder} shows it")
+            raise KeysError(f"{folder}: already exists; gridpeers keys show --keys {folder} shows it")
         folder.mkdir(0o700, parents=True)
         key = ec.generate_private_key(ec.SECP256R1())
         _write_key(folder / CA_KEY, key)
@@ -65,7 +65,7 @@ def make_site(folder: Path, *, days: float = LIFE_DAYS, now: datetime | None = N
         for name, role in FIRST:
             issue(folder, name, role, days=days, now=now)
     except OSError as error:
-        raise KeysError(f"{folder}: cannot be made: {error.strerror}; remove what there is of it") from None
+        raise KeysError(f"{folder}: cannot be made: {error.strerror}; remove its incomplete files") from None
     return read_list(folder)
 
 
@@ -107,11 +107,11 @@ def objection(known: MemberList, name: str, role: Role | None) -> str:
             "neither a dot nor a dash"
         )
     if name.casefold() in RESERVED:
-        return f'"{name}" cannot be a name: it is that of a file of the site; give the {role or "agent"} another name'
+        return f'"{name}" cannot be a name: a file of the site has it; give the {role or "agent"} another name'
     before = known.of(name)
     role = role or ("agent" if before is None else before.role)
     if before is not None and before.role != role:
-        return f"{name}: has the role {before.role} already; give the {role} another name"
+        return f"{name}: already has the role {before.role}; give the {role} another name"
     if len(f"{role}:{name}") > LONGEST_COMMON_NAME - 4:  # room for later generations
         return f"{name}: is too long for a certificate; {role}:NAME has at most {LONGEST_COMMON_NAME - 4} letters"
     return ""
@@ -123,9 +123,9 @@ def revoke(folder: Path, name: str) -> SiteMember:
     member = known.of(name)
     if member is None:
         have = ", ".join(each.name for each in known.members)
-        raise KeysError(f'{folder}: no certificate was issued to "{printable(name)}"; there are those of {have}')
+        raise KeysError(f'{folder}: no certificate was issued to "{printable(name)}"; certificates exist of {have}')
     if member.revoked:
-        raise KeysError(f"{name}: its certificate is revoked already")
+        raise KeysError(f"{name}: its certificate is already revoked")
     revoked = msgspec.structs.replace(member, revoked=True)
     _write_list(folder, _with(known, revoked), ca_key)
     try:

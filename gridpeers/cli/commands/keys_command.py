@@ -20,12 +20,12 @@ app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
     help="Make, issue and revoke the certificates of a site.\n\n"
-    "With them links are encrypted, every process proves who it is, and each may send only what is its own "
+    "Links are then encrypted, every process proves who it is, and may send only its own messages "
     "(docs/how-to/several-hosts.md).\n\n"
     "Example:  gridpeers keys init lab",
 )
 
-_Keys = Annotated[Path, option("DIR", "Folder of the site; the present one if left out.")]
+_Keys = Annotated[Path, option("DIR", "Folder of the site; the current one if left out.")]
 _Days = Annotated[float, option("N", "Life of the certificates (days).", min=0.01, max=3650.0)]
 _require_cryptography = partial(require, {"cryptography": "certificates"}, "install it: pip install 'gridpeers[keys]'")
 
@@ -44,20 +44,20 @@ def init(
     names = ", ".join(f"{member.name} ({member.role})" for member in known.members)
     typer.echo(f"{site}: the site {known.site}, with certificates of {names}, until {known.members[0].expires}")
     typer.echo(
-        f"{site}/ca.key stays here: whoever has it can be anybody. Next: gridpeers keys issue inv1 --keys {site}"
+        f"Keep {site}/ca.key here: it signs certificates of any name. Next: gridpeers keys issue inv1 --keys {site}"
     )
 
 
 @app.command()
 def issue(
-    names: Annotated[list[str], argument("NAME...", "Names; of agents those of their inverters.")],
+    names: Annotated[list[str], argument("NAME...", "Names; an agent has the name of its inverter.")],
     role: Annotated[
-        Role | None, flag("What its holder may do; a name keeps its role, a new one is an agent.", "--role")
+        Role | None, flag("Role of a new name, agent if left out; a known name keeps its role.", "--role")
     ] = None,
     keys: _Keys = Path(),
     days: _Days = 365.0,
 ) -> None:
-    """Issue certificates, or renew them. An agent may join a run that has begun before.
+    """Issue certificates, or renew them. An agent may join a run that has already started.
 
     Example:  gridpeers keys issue inv1 inv2 --keys lab
     """
@@ -73,24 +73,24 @@ def issue(
 
 @app.command()
 def revoke(
-    name: Annotated[str, argument("NAME", "Name; of an agent that of its inverter, e.g. inv4.")],
+    name: Annotated[str, argument("NAME", "Its name; an agent has that of its inverter, e.g. inv4.")],
     keys: _Keys = Path(),
 ) -> None:
-    """Revoke a certificate: processes that start from now on with the new list keep its holder out.
+    """Revoke a certificate: processes that start later with the new list refuse it.
 
     Example:  gridpeers keys revoke inv4 --keys lab
     """
     _require_cryptography()
     site_authority.revoke(keys, name)
     typer.echo(
-        f"{name}: revoked. Copy {keys / 'members.json'} to every host, and start anew what runs: what has begun "
-        "before still lets it in"
+        f"{name}: revoked. Copy {keys / 'members.json'} to every host, and restart all processes: those that run "
+        "still accept it"
     )
 
 
 @app.command()
 def show(keys: _Keys = Path()) -> None:
-    """Show the members of a site: role, until when its certificate is valid, whether its key is here.
+    """Show the members of a site: role, end of the certificate, whether the key is here.
 
     Example:  gridpeers keys show --keys lab
     """

@@ -13,15 +13,15 @@ from gridpeers.scenarios.live.run_address import UsageError
 link = typer.Typer(
     cls=Commands,
     no_args_is_help=True,
-    help="Hurt and heal links while a run goes on.\n\n"
-    "Links are those between agents, and between plant and agents. "
-    'One is named by sender and receiver, "inv1 -> inv4" or inv1 inv4; "inv4 <-> inv7" is both ways, "MG1 -> MG2" '
-    'and "* -> inv2" are several, plant is a name too. Times in seconds, probabilities from 0 to 1.\n\n'
+    help="Impair and heal links of a live run.\n\n"
+    "A link goes from an agent to an agent, or between the plant and an agent. "
+    'Name it by sender and receiver, "inv1 -> inv4" or inv1 inv4; "inv4 <-> inv7" is both ways, "MG1 -> MG2" '
+    'and "* -> inv2" are several, and plant is a name too. Times are in s, probabilities from 0 to 1.\n\n'
     'Example:  gridpeers link set "inv1 -> inv4" --delay 0.1 --jitter 0.02 --loss 0.2',
 )
 
 _Ends = Annotated[list[str], argument("LINKS", 'A pattern such as "inv1 -> inv4", or two names: sender and receiver.')]
-_For = Annotated[float | None, option("SECONDS", "Run time after which it ends; healed if left out.", "--for")]
+_For = Annotated[float | None, option("SECONDS", "Run time after which the fault ends; it stays if left out.", "--for")]
 
 
 @link.command("set")
@@ -30,7 +30,7 @@ def set_(
     links: _Ends,
     live: LiveRun,
     delay: Annotated[float | None, option("SECONDS", "Delay of every message.")] = None,
-    jitter: Annotated[float | None, option("SECONDS", "Delays are uniform, --delay plus or minus this.")] = None,
+    jitter: Annotated[float | None, option("SECONDS", "Uniform delays: --delay plus or minus this time.")] = None,
     loss: Annotated[float | None, option("P", "Probability that a message is lost.")] = None,
     duplicate: Annotated[float | None, option("P", "Probability of a second copy.")] = None,
     corrupt: Annotated[float | None, option("P", "Probability of a flipped bit.")] = None,
@@ -38,7 +38,7 @@ def set_(
     profile: Annotated[str, option("NAME", "A named link, e.g. lte; see docs/reference/link-faults.md.")] = "",
     duration: _For = None,
 ) -> None:
-    """Give links faults. What is set takes the place of what the link had of the same kind.
+    """Give links faults. A fault replaces the link's fault of the same kind.
 
     Example:  gridpeers link set inv1 inv4 --delay 0.1 --loss 0.2 --for 10
     """
@@ -46,7 +46,7 @@ def set_(
     fault = {key: value for key, value in given.items() if value is not None} | _delay(delay, jitter)
     if not fault and not profile:
         options = "--delay, --jitter (with --delay), --loss, --duplicate, --corrupt, --rate, --profile"
-        raise UsageError(f"nothing is to be set; give one of {options}")
+        raise UsageError(f"nothing to set; give one of {options}")
     _give(links, "->", fault | {"profile": profile}, duration, live)
 
 
@@ -56,10 +56,10 @@ def cut(
     links: _Ends,
     live: LiveRun,
     one_way: Annotated[bool, flag("With two names: only from the first.", "--one-way")] = False,
-    hold: Annotated[bool, flag("Keep messages and let them go when the link is healed.", "--hold")] = False,
+    hold: Annotated[bool, flag("Keep the messages, and deliver them when the link is healed.", "--hold")] = False,
     duration: _For = None,
 ) -> None:
-    """Cut links, between two names both ways.
+    """Cut links; two names mean both ways.
 
     Example:  gridpeers link cut inv4 inv7 --for 5
     """
@@ -73,12 +73,10 @@ def cut(
 def heal(
     live: LiveRun,
     links: Annotated[
-        list[str] | None, argument("[LINKS]", "A pattern, or two names (both ways); all links if none.")
+        list[str] | None, argument("[LINKS]", "A pattern, or two names (both ways); all links if left out.")
     ] = None,
 ) -> None:
-    """End what holds on links.
-
-    What the scenario has for later still comes.
+    """End the present faults of links. Later faults of the scenario still begin.
 
     Example:  gridpeers link heal inv4 inv7
     """
@@ -91,7 +89,7 @@ def _delay(delay: float | None, jitter: float | None) -> dict[str, Any]:
     if jitter is None:
         return {} if delay is None else {"delay": delay}
     if delay is None:
-        raise UsageError("--jitter: is around a delay; give --delay too")
+        raise UsageError("--jitter: needs --delay; delays are --delay plus or minus --jitter")
     if wrong := DELAY.objection(delay, "s"):
         raise UsageError(f"--delay: {wrong}")
     if not 0.0 < jitter <= delay:
@@ -136,6 +134,6 @@ def _give(links: list[str], arrow: str, fault: dict[str, Any] | None, duration: 
     if result.acknowledged:
         typer.echo(f"acknowledged: {', '.join(result.acknowledged)}")
     if result.absent:
-        typer.echo(f"no agent yet, told when it comes: {', '.join(result.absent)}")
+        typer.echo(f"no agent yet, will be told when it joins: {', '.join(result.absent)}")
     if result.failures:
         fail(*result.failures, code=BROKEN)

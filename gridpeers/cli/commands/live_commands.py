@@ -37,20 +37,20 @@ from gridpeers.wire.driver.ending import watch_readers
 
 
 def agent(
-    inverters: Annotated[list[str], argument("INVERTER", "Names of their inverters, e.g. inv2; spare ones too.")],
+    inverters: Annotated[list[str], argument("INVERTER", "Names of their inverters, e.g. inv2; also spare ones.")],
     run: Run = RUN,
     connect: Connect = None,
     listen: Annotated[
-        list[str] | None, option("ENDPOINT", "Where other agents connect; any free port if left out.")
+        list[str] | None, option("ENDPOINT", "Where this agent listens for others; any free port if left out.")
     ] = None,
     wait: Wait = 60.0,
     keys: Keys = None,
     insecure: Insecure = False,
     own_code: Annotated[
-        bool, flag("Run a law, graph or link fault that only the plant, on another host, names.", "--own-code")
+        bool, flag("Run a law, graph or link fault of your own for a plant on another host.", "--own-code")
     ] = False,
 ) -> None:
-    """Run the agent of an inverter, or of several, in this terminal. Ctrl-C leaves properly: they are switched off.
+    """Run the agent of an inverter, or of several, in this terminal. At Ctrl-C it leaves and switches them off.
 
     Example:  gridpeers agent inv2 --keys lab --connect tls/192.168.1.10:7447
     """
@@ -59,7 +59,7 @@ def agent(
 
     check_inverters(inverters)
     if keys is not None and len(inverters) > 1:
-        raise UsageError(f"--keys: agents of one process have one certificate; start that of {inverters[1]} alone")
+        raise UsageError(f"--keys: a process has one certificate; start the agent of {inverters[1]} in its own")
     where = address(run, connect, access := Access(keys=keys, insecure=insecure), ("agent",), inverters[0])
     for text in listen or ():
         check_open("--listen", check_endpoint("--listen", text), access)
@@ -71,7 +71,7 @@ def agent(
 
 @of_live_run
 def status(live: LiveRun) -> None:
-    """Look once at a run: time, pacing, agents, latest events.
+    """Show a run once: time, pace, agents, latest events.
 
     Example:  gridpeers status
     """
@@ -84,9 +84,9 @@ def status(live: LiveRun) -> None:
 @of_live_run
 def watch(
     live: LiveRun,
-    duration: Annotated[float | None, option("SECONDS", "Stop after so long; at Ctrl-C if left out.", "--for")] = None,
+    duration: Annotated[float | None, option("SECONDS", "End after this time; at Ctrl-C if left out.", "--for")] = None,
 ) -> None:
-    """Watch a run as a live table, until Ctrl-C. Where the output is no terminal, a text every second.
+    """Watch a run as a live table, until Ctrl-C. If the output is no terminal, print a text every second.
 
     Example:  gridpeers watch --keys lab --connect tls/192.168.1.10:7447
     """
@@ -102,9 +102,9 @@ def stop(
     inverter: Annotated[str, argument("INVERTER", "Name of its inverter, e.g. inv2.")],
     live: LiveRun,
 ) -> None:
-    """Have an agent leave properly: its inverter is switched off.
+    """Make an agent leave: its inverter is switched off.
 
-    The others take over.
+    The others take its load.
 
     Example:  gridpeers stop inv2
     """
@@ -120,7 +120,7 @@ def event(
     switch: Annotated[str, argument("SWITCH", 'Its name, e.g. "13-152" or "sw1_2".')],
     live: LiveRun,
     synchronised: Annotated[
-        bool, flag("Close only if both sides are in step (IEEE 1547, Table 5).", "--synchronised")
+        bool, flag("Close only when both sides are in synchronism (IEEE 1547, Table 5).", "--synchronised")
     ] = False,
 ) -> None:
     """Open or close a switch of a running plant.
@@ -128,7 +128,7 @@ def event(
     Example:  gridpeers event close 13-152 --synchronised
     """
     if synchronised and action == "open":
-        fail("--synchronised: only closing can wait for synchronism; leave it out to open a switch")
+        fail("--synchronised: goes with close; leave it out to open a switch")
     with live.client(acts=True) as client:
         typer.echo(ask(client, "synchronise" if synchronised else action, switch))
 
@@ -137,14 +137,14 @@ def event(
 def load(
     name: Annotated[str, argument("LOAD", 'Its bus, e.g. "48"; in an imported feeder its name.')],
     live: LiveRun,
-    factor: Annotated[float | None, option("X", "Times the power of the feeder's table; 1 is as before.")] = None,
+    factor: Annotated[float | None, option("X", "Factor on the power of the feeder's table; 1 restores it.")] = None,
     P: Annotated[float | None, option("KW", "Real power at nominal voltage.", "--P")] = None,
     Q: Annotated[float | None, option("KVAR", "Reactive power at nominal voltage.", "--Q")] = None,
 ) -> None:
     """Set a load of a running plant.
 
-    It takes the power from the next step on, in all its phases in proportion; of --P and --Q the one that is left out
-    stays as it is. In a scenario, load = { 48 = { factor = 1.5 } } in an [[event]] does the same at a time.
+    The power changes at the next step, in proportion in all phases. Without --P or --Q that power stays. In a scenario,
+    load = { 48 = { factor = 1.5 } } in an [[event]] does the same.
 
     Example:  gridpeers load 48 --factor 1.5
     """

@@ -1,6 +1,6 @@
 """Commands that start the plant of a live run: alone, or with all its agents.
 
-What the run itself needs is imported after the checks of the options: a wrong one is told at once.
+Modules of the run are imported after the checks of the options, so a wrong option is reported at once.
 """
 
 from __future__ import annotations
@@ -41,19 +41,19 @@ class Start:
     """The options of a live run, as typed."""
 
     scenario: ScenarioName
-    case: Annotated[str, option("NAME", "Case of the scenario; its last when left out.")] = ""
+    case: Annotated[str, option("NAME", "Case of the scenario; the last one if left out.")] = ""
     run: Run = RUN
     listen: Annotated[
-        str, option("ENDPOINT", "Where the others connect; with --keys tls/0.0.0.0:7447 for other hosts.", "--listen")
+        str, option("ENDPOINT", "Where the plant listens; for other hosts tls/0.0.0.0:7447 with --keys.", "--listen")
     ] = ENDPOINT
     connect: Annotated[
-        list[str] | None, option("ENDPOINT", "What the plant connects to itself, e.g. a Zenoh router.")
+        list[str] | None, option("ENDPOINT", "Endpoint that the plant connects to, e.g. a Zenoh router; repeatable.")
     ] = None
-    speed: Annotated[float, option("X", "Run time per wall time, 0.1 to 50; 1 is real.")] = 1.0
+    speed: Annotated[float, option("X", "Run time per real time, 0.1 to 50.")] = 1.0
     wait: Annotated[float, option("SECONDS", "How long the plant waits for its agents before it starts.")] = 30.0
-    duration: Annotated[float | None, option("SECONDS", "Run time to end at; no end if left out.", "--for")] = None
-    strict: Annotated[bool, flag("End with exit code 3 when pace cannot be kept.", "--strict")] = False
-    out: Annotated[Path | None, option("DIR", "Record the run in a new folder, and measure it at its end.")] = None
+    duration: Annotated[float | None, option("SECONDS", "Run time of the end; no end if left out.", "--for")] = None
+    strict: Annotated[bool, flag("End with exit code 3 if the plant cannot keep pace.", "--strict")] = False
+    out: Annotated[Path | None, option("DIR", "Record the run in this new folder, and measure it at its end.")] = None
     keys: Keys = None
     insecure: Insecure = False
 
@@ -129,7 +129,7 @@ def _start(start: Start, *, agents: bool) -> None:
 
 @of_live_run
 def plant(live: Start) -> None:
-    """Run the plant of a scenario in this terminal, in real time. Agents come from others.
+    """Run the plant of a scenario in this terminal, in real time. Start its agents in others.
 
     Example:  gridpeers plant islanding --keys lab --listen tls/0.0.0.0:7447
     """

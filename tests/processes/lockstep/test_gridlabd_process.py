@@ -147,8 +147,8 @@ def test_gridlabd_keeps_no_real_time(tmp_path: Path) -> None:
     code, text = invoke("run", "islanding", "--plant", "gridlabd", "--clock", "wall")
 
     assert code == 2
-    assert text == 'gridpeers: --clock wall: the plant of "gridlabd" keeps no real time; use --clock simulated\n'
+    assert text == 'gridpeers: --clock wall: the plant of "gridlabd" cannot run in real time; use --clock simulated\n'
     for live in ("plant", "up"):
         code, text = invoke(live, str(tmp_path / "mine.toml"), "--listen", "tcp/127.0.0.1:0")
         assert (code, text.count("\n")) == (2, 1)
-        assert 'plant.simulator = "gridlabd": keeps no real time' in text
+        assert 'plant.simulator = "gridlabd": cannot run in real time' in text

@@ -137,7 +137,7 @@ def test_live_links_from_set_to_heal(desk: Desk) -> None:
     kept = ("--out", "here")
     agents = [desk.open("agent", name) for name in ("inv1", "inv4")]
     for agent in agents:
-        agent.expect("seeks the plant of run lab")
+        agent.expect("looks for the plant of run lab")
     plant = desk.open_bare("plant", "calm.toml", "--run", "lab", "--listen", listen, "--wait", "0", *kept)
     plant.expect("t = 0; speed")
     for agent in agents:
@@ -150,13 +150,16 @@ def test_live_links_from_set_to_heal(desk: Desk) -> None:
     assert said is not None, text
     plant.expect(rf"link command 1: inv1 -> inv4: {slow}, from t = [\d.]+ s on")
     code, text = desk.type("link", "cut", "inv4", "inv7", "--for", "60")
-    assert (code, text.splitlines()[1:]) == (0, ["acknowledged: inv4", "no agent yet, told when it comes: inv7"]), text
+    assert (code, text.splitlines()[1:]) == (
+        0,
+        ["acknowledged: inv4", "no agent yet, will be told when it joins: inv7"],
+    ), text
     code, text = desk.type("status")
     assert re.search(r"lost +impaired\n", text), text
     assert re.search(r"\ninv4 .* inv1,7( |\n)", text), text
     code, text = desk.type("link", "heal")
     healed, *told = text.splitlines()
-    assert (code, told) == (0, ["acknowledged: inv4", "no agent yet, told when it comes: inv7"]), text
+    assert (code, told) == (0, ["acknowledged: inv4", "no agent yet, will be told when it joins: inv7"]), text
     assert re.fullmatch(r"all links: 3 links healed; from t = [\d.]+ s on", healed), text
     assert desk.type("down")[0] == 0
     assert plant.end() == 0

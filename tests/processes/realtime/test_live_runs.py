@@ -56,7 +56,7 @@ def test_terminals_in_the_order_of_people(desk: Desk) -> None:
     The plant says for whom it waits and how long, and starts without those who have not come.
     """
     early = desk.open("agent", "inv2")
-    early.expect("inv2: seeks the plant of run lab at tcp/127.0.0.1:")
+    early.expect("inv2: looks for the plant of run lab at tcp/127.0.0.1:")
     early.expect(r"inv2: no plant yet of run lab at .*; gridpeers up SCENARIO --run lab starts one; \d+ s left")
     plant = plant_of(desk, "--out", "here", wait=3.0)
     without = plant.expect("started without the agents of (inv1, .*inv3, inv4, .*)")
@@ -134,7 +134,7 @@ def test_what_is_not_there_is_told_in_one_line(desk: Desk) -> None:
         assert re.search(what, errors[0])
         assert "Traceback" not in text
     assert second.end() == 2
-    assert "address already in use; end what uses it (gridpeers down ends a live run" in second.text
+    assert "address already in use; end its user (gridpeers down ends a live run" in second.text
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds the children in /proc")

@@ -54,7 +54,7 @@ def test_a_host_cut_off_is_welcome_again(hosts: Hosts, tmp_path: Path) -> None:
         watch.expect(r"inv1 +inv1 +60\.0")
 
         hosts.cut(3)
-        cut_off.shows("inv7: no recent measurement; holds")
+        cut_off.shows("inv7: no recent measurement; holds its set-points")
         watch.expect(r"inv1 .* inv2-6 ")
         for _ in range(3):
             plant.expect("inv[789] died; its inverter stays on primary droop")
@@ -131,11 +131,11 @@ def test_all_meet_at_a_router_that_comes_last_dies_and_comes_back(desk: Desk, ro
     watch.expect(r"inv1 .* inv4,7 ")
     second = desk.open("plant", "calm.toml", "--listen", "tcp/127.0.0.1:0")
     assert second.end() == 2
-    assert f"--run: a plant of run site is there already, at {router.endpoint}; end it" in second.text
+    assert f"--run: a plant of run site already exists, at {router.endpoint}; end it" in second.text
 
     router.stop()
     for name, agent in agents.items():
-        agent.expect(f"{name}: the plant is gone; holds, and seeks it again")
+        agent.expect(f"{name}: the plant is gone; holds its set-points and looks for it")
     watch.expect("the plant has been silent for")
     router.start()
     for name, agent in agents.items():

@@ -142,7 +142,7 @@ def test_it_holds_while_no_measurement_comes_and_returns_from_what_the_plant_hol
     assert held[-1].P_set > before.P_set
     assert [state.P_set for state in lab.decided()] == [70e3]
     assert [line.split(" at ")[0] for line in lab.said[-2:]] == [
-        "inv1: no recent measurement; holds",
+        "inv1: no recent measurement; holds its set-points",
         "inv1: goes on",
     ]
 

@@ -46,9 +46,9 @@ UNUSABLE = [
     ("run islanding --out full", "--out full: the folder is not empty"),
     ("run bad.toml", "bad.toml:15: time.T_c_s: 20 s is not plausible"),
     ("check bad.toml", "2 problems:"),
-    ("run used.toml", "cannot be listened on: address already in use"),
+    ("run used.toml", "cannot be used: address already in use"),
     (f"plant islanding --case V {MINE}", '--case: no case "V"; did you mean "IV"?'),
-    ("plant islanding --listen tcp/192.0.2.1:1 --insecure", "--listen: tcp/192.0.2.1:1 cannot be listened on"),
+    ("plant islanding --listen tcp/192.0.2.1:1 --insecure", "--listen: tcp/192.0.2.1:1 cannot be used"),
     (f"plant islanding --speed 0 {MINE}", "--speed: must be from 0.1 to 50 (1 is real time), got 0"),
     (f"plant islanding --wait nan {MINE}", "--wait: must be a time of at least 0 s, got nan s"),
     (f"up islanding --for 0 {MINE}", "--for: must be a time of more than 0 s and at most 1e+09 s, got 0 s"),
@@ -57,16 +57,16 @@ UNUSABLE = [
     ("agent inv1 inv2 inv1", "INVERTER: inv1 is given twice; one agent controls an inverter\n"),
     ("agent 'inv 2'", 'INVERTER: "inv 2" cannot be part of a Zenoh key'),
     ("agent inv2 --wait -3", "--wait: must be a time of at least 0 s, got -3 s"),
-    ("load 48", "nothing is to be set; give --factor, or one or both of --P (kW) and --Q (kvar)"),
-    ("load 48 --factor 2 --P 9", "--factor: goes with neither --P nor --Q"),
+    ("load 48", "nothing to set; give --factor, or one or both of --P (kW) and --Q (kvar)"),
+    ("load 48 --factor 2 --P 9", "--factor: cannot go with --P or --Q"),
     ("load 48 --factor -1", "--factor: a factor on a load must not be negative, got -1; 0 to 10"),
     ("load 48 --factor 150", "--factor: 150 is not plausible for a factor on a load (0 to 10)"),
     ("load 48 --Q nan", "--Q: must be a finite number, got nan"),
-    ("link set inv1 inv4", "nothing is to be set; give one of --delay, --jitter (with --delay), --loss,"),
+    ("link set inv1 inv4", "nothing to set; give one of --delay, --jitter (with --delay), --loss,"),
     ("link set 'inv1 -> inv4' --loss 20", "--loss: 20 is not plausible for the probability of a loss (0 to 1); did"),
     ("link set inv1 inv4 --delay 100", "--delay: 100 s is not plausible for a delay (0 to 10 s); did"),
     ("link set inv1 inv4 --delay 0.1 --jitter 0.2", "--jitter: must be above 0 s, and at most"),
-    ("link set inv1 inv4 --jitter 0.2", "--jitter: is around a delay; give --delay too"),
+    ("link set inv1 inv4 --jitter 0.2", "--jitter: needs --delay"),
     ("link set inv1 inv4 --profile lt", '--profile: there is no profile "lt"; did you mean "lte"?'),
     ("link set inv1 inv4 --loss 0.1 --for -1", "--for: a time of the run must be above 0, got -1 s"),
     ("link cut plant plant", 'LINKS: "plant <-> plant" matches no link: both ends are plant;'),
@@ -134,7 +134,7 @@ def test_nobody_there_is_told_within_the_wait(words: list[str]) -> None:
     assert code == 2
     assert line == [
         f"gridpeers: nothing answers at {endpoint} within 0.2 s; start a plant there (gridpeers plant SCENARIO), "
-        "or say by --connect where it is; a frozen one goes on by kill -CONT"
+        "or name its endpoint by --connect; kill -CONT wakes a frozen plant"
     ]
 
 

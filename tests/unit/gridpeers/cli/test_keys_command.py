@@ -27,7 +27,7 @@ def test_a_site_from_its_making_to_a_revoked_member(elsewhere: Path) -> None:
     assert (
         "lab: the site lab, with certificates of plant (plant), operator (operator), viewer (viewer), until 2" in made
     )
-    assert "lab/ca.key stays here: whoever has it can be anybody" in made
+    assert "Keep lab/ca.key here: it signs certificates of any name" in made
 
     code, issued = invoke("keys", "issue", "inv1", "inv2", "--keys", "lab")
     assert code == 0, issued
@@ -35,7 +35,7 @@ def test_a_site_from_its_making_to_a_revoked_member(elsewhere: Path) -> None:
 
     code, revoked = invoke("keys", "revoke", "inv2", "--keys", "lab")
     assert code == 0, revoked
-    assert "inv2: revoked. Copy lab/members.json to every host, and start anew what runs" in revoked
+    assert "inv2: revoked. Copy lab/members.json to every host, and restart all processes" in revoked
 
     code, shown = invoke("keys", "show", "--keys", "lab")
     assert code == 0, shown
@@ -51,8 +51,8 @@ def test_a_site_from_its_making_to_a_revoked_member(elsewhere: Path) -> None:
 def test_what_cannot_be_done_with_a_site_is_refused(elsewhere: Path) -> None:
     """A folder that is there, one that is none, a life of no days."""
     assert invoke("keys", "init", "lab")[0] == 0
-    assert "lab: is there already; gridpeers keys show --keys lab shows it" in refused("keys", "init", "lab")
-    assert "other: there is no such folder of keys; gridpeers keys init other makes one" in refused(
+    assert "lab: already exists; gridpeers keys show --keys lab shows it" in refused("keys", "init", "lab")
+    assert "other: does not exist; gridpeers keys init other makes a folder of keys" in refused(
         "keys", "show", "--keys", "other"
     )
     assert "ca.pem: is missing; copy it from" in refused("keys", "show")
@@ -78,7 +78,7 @@ def test_a_viewer_is_told_who_may_command(elsewhere: Path) -> None:
     """With the files of a viewer alone, by name or not: the role that may, and how to get it."""
     assert invoke("keys", "init", "lab")[0] == 0
     (elsewhere / "lab" / "operator.key").unlink()
-    said = "lab: viewer has the role viewer, which may look at a run (status, watch, view) and not command it; an "
+    said = "lab: viewer has the role viewer, which may look at a run (status, watch, view), but not command it; an "
 
     assert f"{said}operator may: --as operator takes the certificate of one" in refused("down", "--keys", "lab")
     assert invoke("keys", "revoke", "operator", "--keys", "lab")[0] == 0
@@ -102,15 +102,15 @@ OPEN = (
             "--listen: tcp/0.0.0.0:7447 is not on this host",
         ),
         (["agent", "inv1", "--connect", FAR], f"--connect: {FAR} {OPEN}"),
-        (["down", "--connect", "tls/127.0.0.1:1"], "--connect: tls/127.0.0.1:1 needs certificates: say --keys DIR"),
+        (["down", "--connect", "tls/127.0.0.1:1"], "--connect: tls/127.0.0.1:1 needs certificates: use --keys DIR"),
         (
             ["status", "--connect", NEAR, "--keys", "lab"],
-            f"--connect: {NEAR} is open, and --keys asks for TLS",
+            f"--connect: {NEAR} is open, and --keys needs TLS",
         ),
         (["status", "--as", "eve"], "--as: chooses a certificate; say --keys DIR, too"),
-        (["status", "--keys", "nowhere"], "nowhere: there is no such folder of keys"),
+        (["status", "--keys", "nowhere"], "nowhere: does not exist"),
         (["agent", "inv7", "--keys", "lab"], 'no certificate was issued to "inv7"; those of role agent: none'),
-        (["agent", "inv1", "inv2", "--keys", "lab"], "--keys: agents of one process have one certificate"),
+        (["agent", "inv1", "inv2", "--keys", "lab"], "--keys: a process has one certificate"),
         (["run", "islanding", "--keys", "lab"], 'lab: no certificate was issued to "inv9"'),
         (["run", "islanding", "--keys", "lab", "--driver", "inprocess"], "--keys: needs --driver processes"),
         (["run", "islanding", "--keys", "lab", "--processes", "3"], "--processes: agents of one process have one"),

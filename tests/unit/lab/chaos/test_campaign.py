@@ -70,7 +70,7 @@ def test_the_command_keeps_every_run_with_its_seed_and_schedule(elsewhere: Path)
 
     assert {code for code, _ in ended.values()} <= {0, 1}
     assert ended["one"][1].startswith("small, case IV: first a run without disturbances ...\n")
-    assert "violates nothing; next 2 runs with disturbances, 1 at a time ...\nsmall, 0 of 2" in ended["one"][1]
+    assert "it passes; now 2 runs with disturbances, 1 at a time ...\nsmall, 0 of 2" in ended["one"][1]
     assert ended["one"][1].endswith("\n\nResults: one/\n")
     assert [row["seed"] for row in one] == [str(3_000_000 + i) for i in range(2)]
     assert [len(json.loads(row["schedule"])) for row in one] == [int(row["disturbances"]) for row in one]
@@ -86,8 +86,8 @@ def test_the_command_keeps_every_run_with_its_seed_and_schedule(elsewhere: Path)
         (("islanding", "--case", "V"), '--case: no case "V"'),
         (("islanding", "--case", "I,IV"), "--case: takes one case, got I,IV"),
         (("islanding", "--runs", "0"), "--runs"),
-        (("gridlabd.toml",), "lets nobody leave or join"),
-        (("keys.toml", "--driver", "processes"), "needs certificates, which chaos does not take"),
+        (("gridlabd.toml",), "lets no inverter leave or join"),
+        (("keys.toml", "--driver", "processes"), "needs certificates, and chaos uses no certificates"),
     ],
 )
 def test_bad_input_is_refused_in_one_line_before_anything_starts(

@@ -70,7 +70,7 @@ def test_a_run_without_room_ends_the_campaign_and_is_no_failure_of_the_scenario(
     assert code == 3
     assert "No space left on device" in text
     assert kept in text
-    assert "violated" not in text.partition("next 9 runs")[0]
+    assert "violated" not in text.partition("now 9 runs")[0]
     assert full.asked == whole + 1
     assert [*tmp.iterdir()] == []
     if whole:

@@ -90,7 +90,9 @@ def test_code_of_a_plant_on_another_host_is_run_only_if_it_is_trusted(
     if runs:
         live_processes.agent_here(where, ("inv1",), None, 1.0, trusts=trusts)
     else:
-        with pytest.raises(UsageError, match=r"inv1: the plant of run demo .* run the law mine:Mine and .*--own-code"):
+        with pytest.raises(
+            UsageError, match=r"inv1: the plant of run demo .* names the law mine:Mine and .*--own-code"
+        ):
             live_processes.agent_here(where, ("inv1",), None, 1.0, trusts=trusts)
     assert ran == (["inv1"] if runs else [])
 
@@ -133,7 +135,7 @@ def test_a_run_that_is_interrupted_while_it_is_judged_has_its_scenario(
 
     assert load_scenario(tmp_path / "live" / "scenario.toml")[0] == scenario
     assert ended.interrupted == "SIGINT"
-    assert (tmp_path / "live" / "status.txt").read_text() == "broken: interrupted while its numbers were made\n"
+    assert (tmp_path / "live" / "status.txt").read_text() == "broken: interrupted while it was measured\n"
 
 
 def one_case() -> tuple[ScenarioModel, Tables]:

@@ -153,7 +153,7 @@ def test_a_plant_of_another_run_is_told_with_each_reminder(waiting: Waiting) -> 
     ]
 
 
-STRANGER = "a link to tls/127.0.0.1:7447: its certificate is revoked; nothing passes on it"
+STRANGER = "a link to tls/127.0.0.1:7447: its certificate is revoked; no message passes"
 """A line that a session gives once."""
 
 
@@ -163,8 +163,8 @@ def test_a_link_without_access_is_the_reason_at_the_end(waiting: Waiting) -> Non
     *_, other = waiting({}, 10.0, SHOWN, strangers=(STRANGER,))
 
     said = "no plant of run lab at tcp/127.0.0.1:7447 within 10 s: "
-    assert own.startswith(f"{said}the plant at tcp/127.0.0.1:7447 takes the link, but nothing passes on it: ")
-    assert "revokes or lacks the certificate of inv1" in own
+    assert own.startswith(f"{said}the plant at tcp/127.0.0.1:7447 accepts the link, but no message passes: ")
+    assert "revokes or lacks inv1" in own
     assert other == said + STRANGER
 
 
@@ -173,10 +173,10 @@ def test_a_refused_certificate_ends_the_wait(waiting: Waiting, monkeypatch: pyte
     monkeypatch.setattr(client, "tls_refusal", lambda *_: "asks for a certificate")
 
     assert waiting({}, 60.0, None, 0) == [
-        "what listens at tcp/127.0.0.1:7447 asks for a certificate; say --keys DIR and tls/127.0.0.1:7447 "
+        "tcp/127.0.0.1:7447 asks for a certificate; use --keys DIR and tls/127.0.0.1:7447 "
         "(docs/how-to/several-hosts.md)"
     ]
     assert waiting({}, 60.0, SHOWN, 0)[0].endswith(
-        "asks for a certificate; say by --keys the folder of its site, or by --connect where the plant of this site is "
+        "asks for a certificate; give the folder of its site by --keys, or the endpoint of your plant by --connect "
         "(docs/how-to/several-hosts.md)"
     )

@@ -174,10 +174,10 @@ def test_only_the_answer_to_the_own_command_counts() -> None:
 
 def test_an_answer_of_another_form_is_told_in_one_line() -> None:
     """Of a plant of another version, or of whoever speaks as one on open links: nothing else is raised."""
-    with pytest.raises(NobodyError, match=r"run demo answers what cannot be read here: .* `phase`; is it of another"):
+    with pytest.raises(NobodyError, match=r"run demo cannot be read: .* `phase`; has it another"):
         plant_status(Client())  # type: ignore[arg-type]
     for number, found in ((True, "bool"), ([3], "array")):
-        with pytest.raises(NobodyError, match=rf"Expected `int`, got `{found}` - at `\$.number`; is it of another"):
+        with pytest.raises(NobodyError, match=rf"Expected `int`, got `{found}` - at `\$.number`; has it another"):
             command_links(Client(number=number), LinkCommand(heal=Heal(on="*", from_s=0.0)))  # type: ignore[arg-type]
 
 

@@ -215,6 +215,6 @@ def test_a_link_of_a_stranger_is_told_once() -> None:
     certificates.note(links)
 
     assert certificates.take_lines() == (
-        "a link to tls/192.0.2.1:5: its other end is operator:eve, whose certificate was revoked; nothing passes on it",
+        "a link to tls/192.0.2.1:5: its other end is operator:eve, whose certificate was revoked; no message passes",
     )
     assert certificates.take_lines() == ()

@@ -95,8 +95,8 @@ def of_another_site(lab: Path, name: str) -> None:
 
 
 WRONG: dict[str, tuple[Callable[[Path], object], str]] = {
-    "no folder": (shutil.rmtree, r"lab: there is no such folder of keys; gridpeers keys init .*lab makes one"),
-    "a file": (lambda lab: (shutil.rmtree(lab), lab.write_text("")), r"lab: there is no such folder of keys"),
+    "no folder": (shutil.rmtree, r"lab: does not exist; gridpeers keys init .*lab makes a folder of keys"),
+    "a file": (lambda lab: (shutil.rmtree(lab), lab.write_text("")), r"lab: does not exist"),
     "no key": (lambda lab: (lab / "inv1.key").unlink(), r"inv1.key: is missing; copy it"),
     "no certificate": (lambda lab: (lab / "inv1.pem").unlink(), r"inv1.pem: is missing; copy it"),
     "no list": (lambda lab: (lab / "members.json").unlink(), r"members.json: is missing; copy it"),
@@ -109,7 +109,10 @@ WRONG: dict[str, tuple[Callable[[Path], object], str]] = {
         lambda lab: shutil.copy2(lab / "inv2.pem", lab / "inv1.pem"),
         r'"agent:inv2", not of "agent:in',
     ),
-    "no PEM": (lambda lab: (lab / "inv1.pem").write_text("x"), r"inv1.pem: is no certificate in PEM; copy it anew"),
+    "no PEM": (
+        lambda lab: (lab / "inv1.pem").write_text("x"),
+        r"inv1.pem: is not a certificate in PEM; copy it",
+    ),
     "no private key": (lambda lab: (lab / "inv1.key").write_text("x"), r"inv1.key: is no private key: .*; copy it"),
     "no JSON": (lambda lab: (lab / "members.json").write_text("x"), r"members.json: cannot be read: .*; copy it"),
     "revoked": (lambda lab: revoke(lab, "inv1"), r"inv1.pem: was revoked; gridpeers keys issue inv1 gives inv1 a new"),
@@ -145,11 +148,11 @@ def test_a_name_and_a_role_that_do_not_fit_are_refused(lab: Path) -> None:
     )
     assert "viewer has the role viewer; this needs the role agent" in refusal(lab, "viewer")
     for name, role, text in (
-        ("inv1", "viewer", "inv1: has the role agent already; give the viewer another name"),
+        ("inv1", "viewer", "inv1: already has the role agent; give the viewer another name"),
         ("a/b", "agent", '"a/b" cannot be a name'),
         ("..", "agent", r'"\.\." cannot be a name.*neither a dot nor a dash'),
         ("-v", "agent", '"-v" cannot be a name'),
-        ("Ca.Key", "viewer", '"Ca.Key" cannot be a name: it is that of a file of the site'),
+        ("Ca.Key", "viewer", '"Ca.Key" cannot be a name: a file of the site has it'),
         ("x" * 60, "agent", "is too long for a certificate"),
     ):
         with pytest.raises(KeysError, match=text):
@@ -162,7 +165,7 @@ def test_a_new_certificate_after_a_revoked_one_has_another_common_name(lab: Path
     revoke(lab, "inv1")
     assert issue(lab, "inv1", now=NOW).common_name == "agent:inv1:2"
     assert open_credentials(lab, ("agent",), "inv1", now=NOW)[0].own.generation == 2
-    with pytest.raises(KeysError, match=r'no certificate was issued to "inv7"; there are those of'):
+    with pytest.raises(KeysError, match=r'no certificate was issued to "inv7"; certificates exist of'):
         revoke(lab, "inv7")
 
 
@@ -204,7 +207,7 @@ def test_the_end_that_refuses_a_link_and_its_reason_are_told(tmp_path: Path) -> 
         (lab, shown(lab), "$"),
         (other, shown(lab), "shows a certificate that .*lab/ca.pem does not accept "),
         (late, shown(lab), r"shows a certificate that .*lab/ca.pem does not accept \(certificate has expired\)"),
-        (lab, shown(late), r"does not accept the certificate of inv1 \(it has expired by the clock there"),
+        (lab, shown(late), r"does not accept the certificate of inv1 \(expired by the clock of that host"),
         (lab, shown(other, lab / "ca.pem"), "does not accept the certificate of inv1 .*, of another site"),
         (lab, None, "asks for a certificate"),
     ):
