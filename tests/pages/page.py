@@ -34,6 +34,9 @@ _COMMENT = re.compile(r"<!-- *(skip|exit|file): *(.*?) *-->", re.S)
 _NEVER_RUN = ("", "bash", "sh", "shell", "shell-session")
 """Languages that a page does not use: what is typed is console, and what is only shown is text."""
 
+_SLOW = re.compile(r"^(?:still |starting \.\.\. |checking the start |case \S+: \S+ s simulated in ).*\n", re.M)
+"""Lines that a command prints only where it takes long: the machine decides, and no page shows them."""
+
 _TIME_LIMIT_S = 240.0
 _BEFORE_A_COMMAND = re.compile(r"do|then|else|time|exec|nohup|!|\w+=.*", re.S)
 
@@ -182,7 +185,7 @@ class PageRun:
                 entry.split("=", 1) for entry in kept.read_text(encoding="utf-8").split("\0") if "=" in entry
             )
             output.seek(0)
-            return code, output.read().removeprefix(f"{COMPILING}\n")  # shown where the machine is slow
+            return code, _SLOW.sub("", output.read()).removeprefix(f"{COMPILING}\n")  # shown where the machine is slow
 
     def _session(self, block: Block) -> None:
         test = doctest.DocTestParser().get_doctest(block.text, {}, "page", self.module.__file__, block.line)
