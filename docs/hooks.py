@@ -186,16 +186,10 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add the pages that are files of the root, and a line for those that are not written yet."""
+    """Add the page that is a file of the root."""
     from mkdocs.structure.files import File
 
-    for title, name in (
-        (t, n) for section in config.nav or () for pages in section.values() for p in pages for t, n in p.items()
-    ):
-        if name == "contributing.md":
-            files.append(File.generated(config, name, content=from_root("CONTRIBUTING.md")))
-        elif name not in files.src_uris:
-            files.append(File.generated(config, name, content=f"# {title}\n\nThis page is not written yet."))
+    files.append(File.generated(config, "contributing.md", content=from_root("CONTRIBUTING.md")))
     return files
 
 

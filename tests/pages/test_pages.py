@@ -10,13 +10,7 @@ import pytest
 from tests.pages.page import PageRun, blocks_of, calls_of, inline_code, parse
 
 ROOT = Path(__file__).parents[2]
-DOCS = ROOT / "docs"
-NEW = [
-    *DOCS.glob("*/*.md"),
-    *(DOCS / name for name in ("index.md", "architecture.md", "releases.md")),
-    ROOT / "README.md",
-]
-PAGES = sorted(str(page.relative_to(ROOT)) for page in NEW if page.exists())
+PAGES = sorted(str(page.relative_to(ROOT)) for page in (ROOT / "README.md", *ROOT.glob("docs/**/*.md")))
 
 
 @pytest.fixture

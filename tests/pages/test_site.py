@@ -16,7 +16,7 @@ from gridpeers.cli.root import app
 from gridpeers.scenarios.reference import TOPICS, page
 
 DOCS = Path(__file__).parents[2] / "docs"
-MOST_PAGES, MOST_WORDS, MOST_GENERATED = 30, 43_000, 14_000
+MOST_PAGES, MOST_WORDS, MOST_GENERATED = 30, 43_000, 14_500
 SPEC = spec_from_file_location("site_hooks", DOCS / "hooks.py")
 assert SPEC is not None
 assert SPEC.loader is not None
@@ -61,7 +61,6 @@ def test_a_reference_has_every_row_that_the_command_prints(topic: str) -> None:
     assert [code for code in re.findall(r"`[^`]+`", page(topic).partition("\n")[2]) if code not in part] == []
 
 
-@pytest.mark.xfail(reason="old pages are not all replaced", strict=True)
 def test_the_pages_stay_few_and_short() -> None:
     """Hand-written words and pages; and words of the parts that pages ask for."""
     pages = {file: file.read_text(encoding="utf-8") for file in DOCS.rglob("*.md")}

@@ -217,16 +217,6 @@ def test_bad_rows_of_a_trace_are_named(tmp_path: Path, rows: str | None, words: 
 TEXT = (Path(__file__).parents[3] / "docs" / "reference" / "link-faults.md").read_text(encoding="utf-8")
 
 
-def test_the_example_is_a_scenario_without_a_problem() -> None:
-    """The example of the page is a valid scenario and does what the page says."""
-    example = re.findall(r"```toml\n(.*?)```", TEXT, flags=re.S)[0]
-    netem, form = read_table(Netem, tomllib.loads(example))
-
-    assert not form
-    assert not netem.problems(list(MICROGRIDS), MICROGRIDS, 10.0)
-    assert (len(netem.links), len(netem.partitions), len(netem.nodes)) == (2, 1, 2)
-
-
 def test_every_model_with_its_keys_every_kind_and_every_profile_is_told_of() -> None:
     """Nothing that a scenario may say is missing from the tables."""
     for model in (*get_args(AnyDelay), *get_args(AnyLoss), *get_args(AnyLie)):
