@@ -186,7 +186,7 @@ KEY_SPECS = (
     KeySpec("measurement/<inverter>", "publication", "Measurement", _PLANT, _AGENT, "at every tick: it is the grant"),
     KeySpec(
         "state/<inverter>", "publication", "State", _AGENT, ("plant", "agent"),
-        "at every tick, once its measurement and the neighbours' states of the tick before are in",
+        "at every tick, after its measurement and the neighbours' states of the tick before",
     ),
     KeySpec(
         "set_points/<inverter>", "publication", "State", _AGENT, _PLANT,
@@ -202,7 +202,7 @@ KEY_SPECS = (
     ),
     KeySpec(
         "journal/<inverter>", "publication", "Journal", _AGENT, _PLANT,
-        "in a recorded run: when the way in which the agent decides changes; real time: every 0.2 s (the plant "
+        "in a recorded run: with each change of the inputs of its decisions; real time: every 0.2 s (the plant "
         "publishes it on telemetry)",
     ),
     KeySpec(
@@ -216,11 +216,11 @@ KEY_SPECS = (
     ),
     KeySpec(
         "leave/<inverter>", "publication", "Leave", _AGENT, _PLANT,
-        "real time: when it leaves properly; the plant then takes its inverter off the network",
+        "real time: at a proper leave; the plant then takes its inverter off the network",
     ),
     KeySpec(
         "status/<inverter>", "publication", "AgentStatus", _AGENT, _PEOPLE,
-        "real time: every 0.5 s of wall time, and when its phase or its neighbours in use change",
+        "real time: every 0.5 s, and when its phase or its neighbours in use change",
     ),
     KeySpec(
         "config/<inverter>", "queryable", "-", _PLANT, ROLES,

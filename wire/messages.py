@@ -36,8 +36,8 @@ NameOrNone = Annotated[str, msgspec.Meta(pattern=rf"^({NAME})?\Z")]
 """The same, or empty if there is none or it is not known."""
 
 QuickName = Annotated[str, msgspec.Meta(max_length=64, extra={"pattern": rf"^{NAME}\Z"})]
-"""A name that `__post_init__` checks together with all others of its message: a pattern for each would cost
-several times the rest of decoding, and states and measurements are decoded at every tick."""
+"""A `Name`; all of a message are checked together, because a pattern for each would cost several times the rest of
+decoding a state or a measurement."""
 
 QuickNameOrNone = Annotated[str, msgspec.Meta(max_length=64, extra={"pattern": rf"^({NAME})?\Z"})]
 """The same, or empty."""
@@ -372,7 +372,7 @@ class LoadSetting(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     """A power that a person or a scenario gives a load: a factor, or real and reactive power; what is nil stays."""
 
     factor: Factor | None = None
-    """Factor on the real and the reactive power of its table; the plant takes what makes sense of it."""
+    """Factor on the real and the reactive power of its table; the plant refuses an implausible one."""
     P: Power | None = None
     """Real power at nominal voltage (W)."""
     Q: Power | None = None
@@ -421,7 +421,7 @@ class AgentStatus(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw
     phase: Literal["seeking", "waiting", "running"]
     """No plant found; plant found, but no fresh measurement; ticking."""
     waits_for: Text
-    """What the agent waits for, for a person; empty while it runs."""
+    """Reason of the wait, for a person; empty while it runs."""
     island: NameOrNone
     """Its island: "grid", the first inverter in it, or empty if that is not known."""
     neighbours: Names
@@ -444,7 +444,7 @@ class AgentStatus(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw
     missed: Count
     """Ticks skipped since its start, because their time was over."""
     lateness: Time
-    """Longest delay of a tick behind its time since the last status (s of wall time)."""
+    """Longest delay of a tick behind its time since the last status (s of real time)."""
     impaired: Names = ()
     """Senders whose links to this agent have an emulated fault now."""
 
@@ -482,7 +482,7 @@ class Pacing(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     steps: Count
     """Steps since the start."""
     late: Count
-    """Steps more than one control period (of wall time) late."""
+    """Steps more than one control period (of real time) late."""
     p50: Time
     """Median delay (s)."""
     p95: Time
