@@ -120,12 +120,12 @@ class Meeting:
             if self.post.process_came(name, instance):
                 self._tokens.add(key)
         elif self._refusal_limit.admit("refused", now) is None:
-            text = f"a token of {name}, one of too many to be told that they are refused"
+            text = f"a token of {name}, beyond the number of refusals that are answered"
             self.post.rejects.add("excess", key, text)
         elif ends:  # it has missed the `Stop` to all
             self._tokens.add(key)
             self.stop(self.post.keys.stop_request(name, instance), self.stepper.outcome or "the run has ended")
         else:
             if self._log_limit.admit(reason.partition(": ")[2], now) is not None:
-                self.post.say(f"refused {reason}; further ones of this kind are only told so themselves")
+                self.post.say(f"refused {reason}; further refusals of this kind go only to the agent itself")
             self.stop(self.post.keys.stop_request(name, instance), reason, refused=True)

@@ -59,7 +59,7 @@ class Modes:
     kappa: float
     """m_p / k_p (1/s), the mean where droops differ."""
     frequency_rate: float
-    """kappa n_L / N (1/s): how fast the frequency comes back when all that run the law share at once."""
+    """kappa n_L / N (1/s): rate of the frequency if all inverters that run the law shared immediately."""
     sharing_rate: float
     slowest_rate: float
     """Smallest real part of an eigenvalue of K (L + g w^T) (1/s), zeros left out: the exact slower one of the two."""
@@ -89,7 +89,9 @@ def modes(inverters: InverterGroup) -> Modes:
     """
     acts = inverters.acts
     if not acts.any():
-        raise ValueError("nobody runs the secondary law, so it has no modes; take a case with secondary control")
+        raise ValueError(
+            "no inverter runs the secondary law, so there are no modes; choose a case with secondary control"
+        )
     L, kappa = laplacian(inverters), inverters.kappa[acts]
     lambdas = np.sort(np.linalg.eigvals(L).real)
     sharing = np.sort(np.linalg.eigvals(kappa[:, None] * L).real)
@@ -204,9 +206,9 @@ def _exact(links: np.ndarray[tuple[int, int], np.dtype[np.bool_]]) -> int:
 
 
 def robustness_notes(scenario: ScenarioModel, feeder: Tables) -> Iterator[str]:
-    """Yield a sentence for each case with the law "resilient" whose F is more than its graph bears for certain.
+    """Yield a sentence for each case with the law "resilient" whose F is more than its graph certainly tolerates.
 
-    It is for `gridpeers check`: robustness is of the graph, the rest of a prediction of the paper's law alone.
+    `gridpeers check` prints it. Robustness is a property of the graph, whatever the law.
     """
     for case in scenario.cases:
         law = law_of(scenario, case)

@@ -66,7 +66,7 @@ def predictions(spec: ScenarioModel, feeder: Tables, *, voltage: bool) -> dict[s
     others = {case: law.name for case in spec.cases if (law := law_of(spec, case)).name != PAPER}
     if others:
         raise ScenarioError(
-            f'case {case}: runs the law {name}, and the predictions are of the law "{PAPER}" alone; run it instead'
+            f'case {case}: runs the law {name}; only the law "{PAPER}" can be predicted; run the case instead'
             for case, name in others.items()
         )
     for row in inverters_of(spec, feeder):
@@ -82,7 +82,7 @@ def predictions(spec: ScenarioModel, feeder: Tables, *, voltage: bool) -> dict[s
     for name, rule in spec.cases.items():
         title = f"{spec.name}, case {name}" + (f" {rule.title}" if rule.title else "")
         if not is_calm(netem_of(spec, name)):
-            title += "; without its faults of links and nodes, which these numbers leave out"
+            title += "; its faults of links and nodes are left out"
         islands = tuple(
             (step, inverter_group_of(spec, feeder, name, roster=step.roster, island=step.members)) for step in steps
         )
@@ -153,7 +153,7 @@ class Prediction:
         found = []
         for step, island in self._islands:
             if step.load is None:
-                note = "islands join, which is not predicted"
+                note = "not predicted, because islands join"
             elif not island.GFM.any():
                 note = "no grid-forming inverter, so the island is de-energised"
             elif not self._has_law:
@@ -166,7 +166,9 @@ class Prediction:
 
     def __str__(self) -> str:
         if not self._has_law:
-            words = "No secondary control: no modes, no limits of delay. Droop alone decides, at once: `gridpeers run`."
+            words = (
+                "No secondary control, so there are no modes and no limits of delay. `gridpeers run` shows the droop."
+            )
             return "\n".join([self.title, *_wrapped(words)])
         lines = [self.title, *_wrapped(_words(self._inverters))]
         for name, left, right, words in (("", "continuous", "our law", ""), *self._rows()):
@@ -186,21 +188,21 @@ class Prediction:
         limits = [(_s(one, "any"), _limit(other)) for one, other in self.delay_limits.itertuples(index=False)]
         r = robustness(inverters.A[np.ix_(inverters.acts, inverters.acts)])
         return [
-            ("links", f"{found.links}", "", "undirected, among those that run the law"),
-            ("lambda_2", f"{found.lambda_2:.3f}", "", "algebraic connectivity; 0 when parts are not linked"),
+            ("links", f"{found.links}", "", "undirected, among the inverters that run the law"),
+            ("lambda_2", f"{found.lambda_2:.3f}", "", "algebraic connectivity; 0 for an unconnected graph"),
             ("lambda_max", f"{found.lambda_max:.3f}", "", "largest eigenvalue of the Laplacian"),
-            ("robustness", str(r), "", f"of the graph; W-MSR bears F = {r.F} liars around each agent"),
-            ("frequency mode", f"{found.frequency_rate:.2f} 1/s", "", "kappa n_L/N: rate if sharing were at once"),
+            ("robustness", str(r), "", f"of the graph; W-MSR resists {r.F} liars around each agent"),
+            ("frequency mode", f"{found.frequency_rate:.2f} 1/s", "", "kappa n_L/N: rate if sharing were immediate"),
             ("sharing mode", _rate(found.sharing_rate), "", "kappa lambda_2: rate at which powers agree"),
             ("slowest mode", _rate(found.slowest_rate), _rate(SETTLING / slowest), "exact, of law and plant together"),
-            ("2 % settling", settled, _s(slowest, "never"), "four time constants of it"),
-            ("sharing 2 %", _s(settling(found.sharing_rate), "never"), "", "the same of the sharing mode"),
-            ("largest step", _s(found.euler_step_s, "any"), "any", "longest T_c; continuous: as explicit Euler"),
-            ("delay: links", *limits[0], "agent to agent, own value fresh"),
-            ("delay: both", *limits[1], "own value as late as neighbours'"),
-            ("delay: plant", *limits[2], "f as measured, or P_set, late"),
-            ("loss 50 %", "", _s(equivalent_delay(T_c, 0.5), ""), "held: as so much more delay on the links"),
-            ("loss 90 %", "", _s(equivalent_delay(T_c, 0.9), ""), "the same; T_c p/(1 - p)"),
+            ("2 % settling", settled, _s(slowest, "never"), "four time constants of the slowest mode"),
+            ("sharing 2 %", _s(settling(found.sharing_rate), "never"), "", "four time constants of the sharing mode"),
+            ("largest step", _s(found.euler_step_s, "any"), "any", "longest T_c; continuous: by explicit Euler"),
+            ("delay: links", *limits[0], "from agent to agent; the own value is fresh"),
+            ("delay: both", *limits[1], "the own value is as late as the neighbours'"),
+            ("delay: plant", *limits[2], "measured f or P_set is late"),
+            ("loss 50 %", "", _s(equivalent_delay(T_c, 0.5), ""), "equivalent delay on the links, T_c p/(1 - p)"),
+            ("loss 90 %", "", _s(equivalent_delay(T_c, 0.9), ""), "the same"),
         ]
 
 
@@ -214,14 +216,14 @@ def _words(inverters: InverterGroup) -> str:
     text = f"{acting} of {inverters.n} inverters run the law; leaders {', '.join(leaders) or 'none'}; "
     text += f"kappa {inverters.kappa[inverters.acts].mean():.3g} 1/s; T_c {inverters.T_c:g} s. "
     if not leaders:
-        text += "Nobody leads, so nobody corrects the frequency. "
+        text += "Without a leader, no agent corrects the frequency. "
     if len(apart) > 1:
         text += f"The graph is not connected; its {len(apart)} parts ({' | '.join(' '.join(part) for part in apart)}) "
-        text += "agree on power within themselves only, so sharing among all never comes. "
+        text += "share power only within themselves. "
     if idle := int((inverters.shares & ~inverters.acts).sum()):
-        text += f"The other {idle} with an agent keep their set-points and take no part in sharing. "
+        text += f"The other {idle} with an agent keep their set-points and do not take part in sharing. "
     if agentless := [name for name, shares in zip(inverters.names, inverters.shares, strict=True) if not shares]:
-        text += f"{', '.join(agentless)} without an agent: droop alone, and the sharing index leaves them out. "
+        text += f"{', '.join(agentless)} without an agent: on droop, and not counted in the sharing index. "
     return text.rstrip()
 
 
@@ -239,7 +241,7 @@ def _sentence(step: IslandStep, island: InverterGroup, times: Times) -> str:
             f"MPSI < 0.01 in {times.share_s:.2f} s)"
         )
     elif times.restore_s is not None:
-        text = f"frequency back in {times.restore_s:.2f} s, equal power never: {times.note}"
+        text = f"frequency restored in {times.restore_s:.2f} s, power never shared equally: {times.note}"
     else:
         text = f"not restored: {times.note}"
     return f"load {step.load.start_pu:.3f} -> {step.load.load_pu:.3f} pu of the ratings: {text}"
@@ -247,16 +249,16 @@ def _sentence(step: IslandStep, island: InverterGroup, times: Times) -> str:
 
 def _vars(inverters: InverterGroup, plant: VarResponse | None) -> str:
     if plant is None:
-        return "left out by --no-vars"
+        return "left out (--no-vars)"
     if not all(name in plant.names for name in inverters.names):
         return "not predicted with spare inverters"
     radius, limit = var_spectral_radius(inverters, plant), var_delay_limit(inverters, plant)
     if radius >= 1.0:
-        return f"unstable on a plant without lags, spectral radius {radius:.4f}"
+        return f"unstable for a plant without lags, spectral radius {radius:.4f}"
     delays = "with any delay up to 1 s" if math.isinf(limit) else f"up to {_limit(limit)} of delay"
     return (
-        f"slowest mode to 2 % in {settling_in_ticks(radius, inverters.T_c):.2f} s; stable {delays} of measurement or "
-        "set-point (on a plant without lags; right to about one control period)"
+        f"slowest mode settles to 2 % in {settling_in_ticks(radius, inverters.T_c):.2f} s; stable {delays} of "
+        "measurement or set-point (for a plant without lags; accurate to about one control period)"
     )
 
 

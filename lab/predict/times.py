@@ -25,10 +25,10 @@ HORIZON = 120.0
 @dataclass(frozen=True, kw_only=True)
 class LoadStep:
     start_pu: float = 0.647
-    """At the start all stand at it, at nominal frequency. The paper's start."""
+    """Power of every inverter before the step, at nominal frequency (pu). The paper's start."""
     load_pu: float = 0.880
     islanding: bool = True
-    """The event makes the island, as islanding does. Then agents leave out states that were sent before it."""
+    """Whether the event creates the island. Then agents leave out states that were sent before it."""
     joining: tuple[str, ...] = ()
 
 
@@ -56,9 +56,8 @@ def predicted_times(
 ) -> Times:
     """Return the times to restore and to share after a step of the load, and whether the loop is stable.
 
-    Delays (s) of states from agent to agent, and probabilities that one is lost, so that the last one is held, are for
-    all links, or by (src, dst) for some. The load is that of the paper's event 1 if left out; `load_steps` has those of
-    a scenario.
+    `link_delay_s`, `loss`: delay of states, and probability of losing one, where the last state is held; for all links,
+    or by (src, dst). `load`: the paper's event 1 by default; `load_steps` has those of a scenario.
     """
     step = LoadStep() if load is None else load
     link: int | dict[LinkEnds, int]
@@ -69,7 +68,7 @@ def predicted_times(
     loop = Loop(inverters=inverters, ticks=Ticks(link=link, loss=loss))
     if not loop.stable:
         return Times(restore_s=None, share_s=None, stable=False, note="unstable: oscillations grow")
-    # until the slowest mode has fallen to 1e-5, but no longer than anybody would wait
+    # until the slowest mode has fallen to 1e-5, at most HORIZON
     slowest = max(loop.spectral_radius, 1e-3)
     count = math.ceil(math.log(1e-5) / math.log(slowest)) + sum(loop.matrix.shape) // max(inverters.n, 1)
     count = min(max(count, round(2.0 / inverters.T_c)), round(HORIZON / inverters.T_c))
@@ -85,7 +84,7 @@ def predicted_times(
 
 
 def sharing_index(path: Path, inverters: InverterGroup) -> Floats:
-    """Return MPSI of each tick, (16), over the inverters that have an agent; nan where nobody has one."""
+    """Return MPSI of each tick, (16), over the inverters that have an agent; nan if none has one."""
     if not inverters.shares.any():
         return np.full(path.t.shape, np.nan)
     power, weight = path.power[:, inverters.shares], inverters.weight[inverters.shares]
@@ -115,19 +114,19 @@ def _beyond_limits(inverters: InverterGroup, path: Path) -> str:
     limit = float((highest * s)[acts].sum() / s[acts].sum())
     if needed <= limit:
         return ""
-    return f"those that run the law would have to carry {needed:.2f} pu each, their limit is {limit:.2f} pu"
+    return f"the inverters that run the law would need {needed:.2f} pu each, and their limit is {limit:.2f} pu"
 
 
 def _note(inverters: InverterGroup, restore: float | None, share: float | None) -> str:
     if restore is not None and share is not None:
         return ""
     if not inverters.acts.any():
-        return "no secondary control: droop alone keeps its error"
+        return "no secondary control, so the error of the droop stays"
     if restore is None and not inverters.leads.any():
-        return "no leader: nobody corrects the frequency"
+        return "no leader, so no agent corrects the frequency"
     idle, agents = int((inverters.shares & ~inverters.acts).sum()), int(inverters.shares.sum())
     if share is None and idle:
-        return f"{idle} of {agents} with an agent run no secondary law: their power stays"
+        return f"{idle} of {agents} inverters with an agent run no secondary law, and their power stays"
     if share is None and (parts := len(groups(inverters))) > 1:
-        return f"the graph falls into {parts} groups, which do not agree on a share"
+        return f"the graph has {parts} unconnected groups, which do not agree on a share"
     return f"not within {HORIZON:g} s"

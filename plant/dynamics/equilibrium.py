@@ -108,7 +108,7 @@ def set_equilibrium(units: Inverters, point: OperatingPoint, online: Flags, P: R
 def require_within_limits(units: Inverters, online: Flags) -> None:
     """Raise PlantError if the start is no equilibrium: a GFM that forms an island must be within its limits."""
     S, _ = units.measured(units.V, units.I)
-    words = {"P": "give", "Q": "give", "E": "have an internal voltage of"}
+    words = {"P": "P of", "Q": "Q of", "E": "an internal voltage of"}
     for i in np.flatnonzero(units.forming & online).tolist():
         unit, E = units.units[i], abs(units.J[i, 0] / units.y_f[i]) / units.V_b[i]
         values = {"P": units.set_points[i, 0], "Q": S[i].imag, "E": E}
@@ -117,13 +117,13 @@ def require_within_limits(units: Inverters, online: Flags) -> None:
             low, high = getattr(unit.parameters, lowest), getattr(unit.parameters, highest)
             if not low - 1e-9 <= value <= high + 1e-9:
                 raise PlantError(
-                    f"no equilibrium at t = 0: {unit.name} would have to {words[what]} {value * base:.5g} {symbol}, "
-                    f"it can from {low * base:.5g} to {high * base:.5g} {symbol} ({lowest}_pu, "
-                    f"{highest}_pu of [plant.gfm]); set another P_set0_pu or V_set0_pu, or change its load"
+                    f"no equilibrium at t = 0: {unit.name} needs {words[what]} {value * base:.5g} {symbol}; its limits "
+                    f"are {low * base:.5g} and {high * base:.5g} {symbol} ({lowest}_pu, {highest}_pu of [plant.gfm]); "
+                    "set another P_set0_pu or V_set0_pu, or change its load"
                 )
         current, most = float(np.max(np.abs(units.I[i]))), float(units.I_limit[i])
         if current > most * (1.0 + 1e-9):
             raise PlantError(
-                f"no equilibrium at t = 0: {unit.name} would have to carry {current:.5g} A in a phase, it can carry "
+                f"no equilibrium at t = 0: {unit.name} needs {current:.5g} A in a phase; its limit is "
                 f"{most:.5g} A (I_max_pu of [plant.gfm]); set another P_set0_pu, or change its load"
             )

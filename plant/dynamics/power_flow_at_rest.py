@@ -172,7 +172,7 @@ def solve_by_droop(
             return J, V, Q, on_droop | ~free, (place == UNDER) | (place == OVER)
         place = right
     raise PlantError(
-        "no initial operating point: it is not found which GFL rest within their dead bands (db_UV_pu, db_OV_pu); "
+        "no initial operating point: the GFL within their dead bands (db_UV_pu, db_OV_pu) cannot be determined; "
         "try another V_set0"
     )
 

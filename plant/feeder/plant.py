@@ -28,8 +28,8 @@ from gridpeers.wire.timing import time_of
 
 def hunting_event(name: str) -> PlantEvent:
     text = (
-        f"{name} has no rest at t = 0: without vars its voltage is beyond its dead band, with those of its droop it is "
-        "within, so Q hunts between both; choose another db_UV_pu, db_OV_pu or V_set0_pu to avoid it"
+        f"{name} has no steady state at t = 0: its voltage is beyond its dead band without vars, and within it with "
+        "the vars of its droop, so Q hunts between both; choose another db_UV_pu, db_OV_pu or V_set0_pu"
     )
     return PlantEvent(t=0.0, kind="warning", subject=name, text=text)
 

@@ -74,4 +74,4 @@ def sentence(pacing: Pacing, period: float) -> str:
         f"delay p50 {pacing.p50 * ms:.1f}, p95 {pacing.p95 * ms:.1f}, p99 {pacing.p99 * ms:.1f}, "
         f"worst {pacing.worst * ms:.1f} ms"
     )
-    return text + (f"; the schedule was put off by {pacing.slipped:.2f} s in all" if pacing.slipped else "")
+    return text + (f"; all delays together put the schedule {pacing.slipped:.2f} s back" if pacing.slipped else "")

@@ -98,7 +98,7 @@ class RealtimeTimer:
             return TickVerdict("tick")
         warnings, slipped, speed = list[str](), self.pacer.note(now), self._config.speed
         if slipped:
-            warnings.append(f"fell {slipped:.3f} s of wall time behind; all later steps are put off by as much")
+            warnings.append(f"fell {slipped:.3f} s of real time behind; all later steps are delayed by as much")
         fails = self.pacer.take_failure(of=self._stepper.end_tick)
         if fails:
             pace = sentence(self.pacing(), self.pacer.period)

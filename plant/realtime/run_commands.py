@@ -182,7 +182,7 @@ class RunCommands:
             return f"{argument} was asked to leave {when}"
         if verb == "load":
             if command.load is None:
-                raise ValueError(f"load {argument}: nothing is to be set; give a factor, or real or reactive power")
+                raise ValueError(f"load {argument}: nothing to set; give a factor, or real or reactive power")
             return f"{plant.set_load(argument, command.load)}, {when}"
         if verb == "synchronise":
             plant.switch(argument, "close", synchronised=True)

@@ -189,8 +189,8 @@ def _check_place(row: CsvRow[columns.InverterColumns], bus: Bus | None, neutral:
     require_ground(row, bus, "an inverter", places.floating)
     if taken := next((phase for phase in phases if (bus.name, phase) in places.taken), None):
         row.problem(
-            f'bus "{bus.name}" has inverter "{places.taken[bus.name, taken]}" on phase {taken} already; only one can '
-            "stand on each phase of a bus"
+            f'bus "{bus.name}" has inverter "{places.taken[bus.name, taken]}" on phase {taken} already; each '
+            "phase of a bus takes only one"
         )
     try:
         return neutral_for(neutral, bus, phases, places.neutrals.get(bus.name, ""))

@@ -123,7 +123,7 @@ def test_an_inverter_without_rest_is_a_warning_on_either_plant(islanding: gp.Sce
         plant.close()
 
     assert texts[0] == texts[1]
-    assert [text.partition(":")[0] for text in texts[0]] == ["inv6 has no rest at t = 0"]
+    assert [text.partition(":")[0] for text in texts[0]] == ["inv6 has no steady state at t = 0"]
 
 
 def largest_difference(scenario: gp.Scenario, ran: Result, later: dict[str, float] | None = None) -> float:

@@ -146,7 +146,7 @@ def test_a_plant_that_freezes_or_dies_is_held_out_for_and_has_its_agents_again(t
         assert town.telemetry is not None
         assert town.telemetry.pacing is not None
         assert town.telemetry.pacing.slipped > 1.0
-        assert "s of wall time behind; all later steps are put off" in town.children["plant"].log.read_text()
+        assert "s of real time behind; all later steps are delayed" in town.children["plant"].log.read_text()
 
         town.signal("plant", signal.SIGKILL)
         town.until(lambda: all(town.status[name].phase == "seeking" for name in FOUR), "all seek")

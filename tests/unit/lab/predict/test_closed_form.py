@@ -132,7 +132,7 @@ def notes(law: dict[str, object], graph: str) -> list[str]:
 
 
 def test_a_graph_that_does_not_bear_F_is_named() -> None:
-    """Nine agents: a full graph (r 5) bears F = 2, a ring (r 1 or 2) none; without F nothing is said."""
+    """Of nine agents a full graph (r 5) resists two liars and a ring (r 1) none; without F there is no note."""
     (said,) = notes({"use": "resilient", "F": 3}, "full")
     assert said.startswith("case IV: W-MSR with F = 3 needs a graph with r 7, and this one has r 5: even without liars")
     assert said.endswith("use more links, or F = 2 (docs/understand/findings.md)")

@@ -83,4 +83,4 @@ def test_an_inverter_without_agent_counts_neither_in_the_run_nor_in_its_predicti
     assert "inv9 without an agent" in " ".join(str(prediction).split())
     all_agents = scenario.replace({"case.IV.without_agent": None, "case.IV.secondary": ALL_BUT_9})
     listed = gp.predict(all_agents, "IV", voltage=False)
-    assert set(listed.times["note"]) == {"1 of 9 with an agent run no secondary law: their power stays"}
+    assert set(listed.times["note"]) == {"1 of 9 inverters with an agent run no secondary law, and their power stays"}

@@ -49,7 +49,7 @@ def test_who_leaves_and_returns_is_predicted_too() -> None:
     assert code == 0
     assert re.search(r"leave at 2 s: load 0\.873 -> 0\.959 pu of the ratings: restored in 0\.3\d s", words)
     assert re.search(r"return at 3 s: load 0\.959 -> 0\.873 pu of the ratings: restored in 0\.\d\d s", words)
-    assert "left out by --no-vars" in words
+    assert "left out (--no-vars)" in words
 
 
 @pytest.mark.parametrize(

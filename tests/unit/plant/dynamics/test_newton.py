@@ -192,5 +192,5 @@ def test_a_start_beyond_the_limit_is_refused() -> None:
     """At rest no phase may be beyond its limit; the error says the currents and what to change."""
     settings = PlantSettings(gfm=GfmDroop(I_max=0.6))
 
-    with pytest.raises(PlantError, match=r"inv1 would have to carry \d+(\.\d+)? A in a phase, .*I_max_pu"):
+    with pytest.raises(PlantError, match=r"inv1 needs \d+(\.\d+)? A in a phase; .*I_max_pu"):
         Plant(Network(read_feeder("microgrid123")), settings, 0.02, 0.02)

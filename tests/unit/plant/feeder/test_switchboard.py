@@ -188,9 +188,9 @@ def test_a_spell_of_limited_set_points_is_told_once_with_value_and_bound() -> No
 @pytest.mark.parametrize(
     ("settings", "said"),
     [
-        (PlantSettings(P_set0=1.1, gfl=Gfl(P_max=1.1)), r"inv1 would have to give \d+ kW, .*P_set0_pu"),
-        (PlantSettings(V_set0=1.2), r"inv1 would have to have an internal voltage of 1\.\d+ pu, .*E_max_pu.*V_set0_pu"),
-        (PlantSettings(gfm=GfmDroop(Q_max=0.01)), r"inv1 would have to give \d+(\.\d+)? kvar, .*Q_max_pu.*V_set0_pu"),
+        (PlantSettings(P_set0=1.1, gfl=Gfl(P_max=1.1)), r"inv1 needs P of \d+ kW; .*P_set0_pu"),
+        (PlantSettings(V_set0=1.2), r"inv1 needs an internal voltage of 1\.\d+ pu; .*E_max_pu.*V_set0_pu"),
+        (PlantSettings(gfm=GfmDroop(Q_max=0.01)), r"inv1 needs Q of \d+(\.\d+)? kvar; .*Q_max_pu.*V_set0_pu"),
     ],
 )
 def test_a_start_beyond_the_limits_of_the_gfm_that_holds_an_island_up_is_refused(

@@ -122,7 +122,7 @@ def test_far_behind_it_puts_its_schedule_off_and_says_how_much() -> None:
     lab.step(1, delay=3.0)
 
     assert lab.node.deadline == pytest.approx(due + 3.0 + T_C)
-    assert lab.events("warning")[-1].text.startswith("fell 3.000 s of wall time behind")
+    assert lab.events("warning")[-1].text.startswith("fell 3.000 s of real time behind")
     assert lab.node.ticks.pacer.report().slipped == pytest.approx(3.0)
 
 
@@ -136,7 +136,7 @@ def test_the_end_has_the_number_of_the_warnings_that_came_too_often() -> None:
     slips = [event.text for event in lab.events("warning") if "behind" in event.text]
 
     assert len(slips) == 6
-    assert slips[-1].startswith("2 more of this kind left out, the last: fell 0.500 s of wall time behind")
+    assert slips[-1].startswith("2 more of this kind left out, the last: fell 0.500 s of real time behind")
 
 
 def test_a_plant_without_solution_breaks_the_run() -> None:
@@ -197,7 +197,7 @@ def test_commands_are_done_and_answered() -> None:
 
 @pytest.mark.parametrize(("verb", "argument", "text"), [
     ("open", "sw7", 'no switch "sw7"; switches are sw1'),
-    ("load", "load1", "load load1: nothing is to be set; give a factor, or real or reactive power"),
+    ("load", "load1", "load load1: nothing to set; give a factor, or real or reactive power"),
     ("stop", "inv7", 'no agent "inv7" is running; running are: inv1, inv2, inv3'),
 ])  # fmt: skip
 def test_what_cannot_be_done_is_answered_with_what_there_is(verb: str, argument: str, text: str) -> None:
