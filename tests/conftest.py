@@ -12,7 +12,7 @@ from hypothesis import settings
 from xdist.remote import Producer
 
 from tests.pinned_kernels import choose
-from tests.side_by_side import RealTimeApart, compile_once, give_way
+from tests.side_by_side import SLOW, RealTimeApart, compile_once, give_way, leave_out_slow
 
 choose()
 
@@ -52,6 +52,32 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     """Compile before any worker or test, whose deadlines are those of a machine on which a plant has run before."""
     if not (session.config.option.collectonly or hasattr(session.config, "workerinput")):
         compile_once()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Have an option that runs everything."""
+    parser.addoption("--all", action="store_true", help="Run the slow tests too.")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_configure(config: pytest.Config) -> None:
+    """Take tests that are named as meant, slow ones too; workers get the option with the others."""
+    if config.args_source is not config.ArgsSource.TESTPATHS:
+        config.option.all = True
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave the slow tests out."""
+    if not config.option.all:
+        config.hook.pytest_deselected(items=leave_out_slow(items))
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    """Say what was left out, and how to run it."""
+    if not config.option.all:
+        terminalreporter.write_line(f"Left out, as they take minutes: tests of {', '.join(SLOW.values())}.")
+        terminalreporter.write_line("pytest -n 2 --all runs everything; pytest FOLDER runs one folder, such as:")
+        terminalreporter.write_line("  " + " ".join(SLOW))
 
 
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> RealTimeApart:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from pathlib import PurePosixPath
 
+import pytest
 from xdist.scheduler import LoadFileScheduling
 from xdist.workermanage import WorkerController
 
@@ -22,6 +24,30 @@ ONE_RUN = (
     "tests/conformance/test_islands.py",
 )
 """Tests that look at the same runs of the catalogue: one worker has them all, and runs each case once."""
+
+
+SLOW = {
+    "tests/processes": "processes and real time",
+    "tests/validation": "other simulators",
+    "tests/conformance/test_gridlabd_plant.py": "GridLAB-D as the plant",
+    "tests/conformance/laws/test_carriers.py": "FMUs",
+    "tests/unit/lab/chaos/test_campaign.py": "campaigns of chaos",
+    "tests/pages": "the pages",
+    "tests/examples": "the examples",
+    "tests/wheel": "the wheel",
+    "tests/soak": "a soak",
+    "tests/peers": "the benches",
+    "tests/security": "intruders",
+    "tests/resources": "floods and clocks that jump",
+}
+"""Tests that `pytest` leaves out unless they are named: `--all` runs them too, as .ci/run does."""
+
+
+def leave_out_slow(items: list[pytest.Item]) -> list[pytest.Item]:
+    """Take the slow tests out of the list, and return them."""
+    left_out = [item for item in items if _within(item.nodeid.partition("::")[0], SLOW)]
+    items[:] = [item for item in items if item not in set(left_out)]
+    return left_out
 
 
 class RealTimeApart(LoadFileScheduling):
@@ -50,7 +76,7 @@ class RealTimeApart(LoadFileScheduling):
             node.shutdown()
 
 
-def _within(file: str, folders: tuple[str, ...]) -> bool:
+def _within(file: str, folders: Iterable[str]) -> bool:
     return any(PurePosixPath(file.partition("::")[0]).is_relative_to(folder) for folder in folders)
 
 
