@@ -127,7 +127,9 @@ class Agent:
         self._weights = StalenessWeights(options)
         self.weighs_alike = self._weights.all_count
         self.notes_arrivals = self._weights.ages_count
-        self._silent_at_most = SIGN_OF_LIFE * (options.max_age or (config.max_age if config.clock == "wall" else inf))
+        self._silent_at_most = SIGN_OF_LIFE * (
+            options.max_age or (config.max_age if config.clock == "realtime" else inf)
+        )
         self.watches_saturation = options.anti_windup == "conditional"
         """True if the law is told at which limits the own inverter is saturated."""
         self._islands_from_switches = options.islands == "switches"

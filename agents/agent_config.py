@@ -191,10 +191,10 @@ class AgentConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     """Whether the plant relays all messages, in simulated time: the agents have one link each."""
     epoch: int = 1
     """Epoch of this process; see `gridpeers.wire.membership`."""
-    clock: Literal["simulated", "wall"] = "simulated"
+    clock: Literal["simulated", "realtime"] = "simulated"
     """Lock-step with the plant, or real time."""
     speed: float = 1.0
-    """Real time: run time per wall time (s/s), > 0."""
+    """Real time: run time (s) per s, above 0."""
     clock_rate: float = 1.0
     """Rate of the agent's own clock: 1.0001 gains 100 ppm. Real time: the agent ticks that much more often; simulated:
     it takes a period for that much longer."""

@@ -115,7 +115,7 @@ class AgentNode:
         known: KnownAgents | None = None,
     ) -> None:
         check_nameplate(config)
-        name, realtime = config.name, config.clock == "wall"
+        name, realtime = config.name, config.clock == "realtime"
         known = KnownAgents(config.control) if known is None else known
         post = self.post = Post(name, config.run, config.epoch, None if realtime else known.members)
         keys = self.keys = post.keys

@@ -39,8 +39,8 @@ def run_agents(process: AgentProcess, make_links: MakeLinks = no_links) -> str:
     """
     configs = process if isinstance(process, tuple) else (process,)
     _check(configs)
-    wall = configs[0].clock == "wall"
-    if wall:  # each process has an epoch of its own, which tells it from its ghost; only equality matters
+    realtime = configs[0].clock == "realtime"
+    if realtime:  # each process has an epoch of its own, which tells it from its ghost; only equality matters
         configs = tuple(replace(config, epoch=new_epoch()) for config in configs)
     else:
         schedule_as_batch()
@@ -57,7 +57,7 @@ def run_agents(process: AgentProcess, make_links: MakeLinks = no_links) -> str:
         seen, places = node.policy.plant_seen, ", ".join(config.connect)
         asks = "" if seen else f"; is the plant of run {config.run} running at {places}?"
         failures.append(f"{node.failed}{asks}")
-    if failures and wall:
+    if failures and realtime:
         raise ConfigurationError("\n".join(failures))
     return "\n".join(failures)
 

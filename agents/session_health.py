@@ -7,7 +7,7 @@ Both ends of a link see that it fails, and one new session mends it: that of the
 So an agent that misses no more than half of the others waits `STAGGER` longer, and again if the name of the one it
 misses is smaller.
 
-Times are s of wall time on the agent's clock.
+Times are s of real time on the agent's clock.
 """
 
 from __future__ import annotations

@@ -75,11 +75,11 @@ class TickTimer(Timer):
 
 
 LINKS_PERIOD = 0.5
-"""Time (s, wall) between two reports on links beside a journal: a record loses no more when a process is killed."""
+"""Time (s, real time) between two reports on links beside a journal: a killed process costs a record no more."""
 
 LEAVING = 1.0
-"""Longest wait (s, wall) for the plant's word that it has taken the inverter off: a session that closes at once can
-take what was sent last with it."""
+"""Longest wait (s, real time) for the plant's word that the inverter is off: a session that closes at once can lose
+the last messages."""
 
 
 class AgentTimer:

@@ -16,7 +16,7 @@ from gridpeers.wire.timing import Timer
 from gridpeers.wire.wording import printable
 
 STATUS_PERIOD = 0.5
-"""Time (s, wall) between two `AgentStatus`; one more goes out whenever the phase or the neighbours in use change."""
+"""Time (s, real time) between two `AgentStatus`; a new phase, or other neighbours in use, send one more."""
 
 
 class LinkCommandReceiver:
@@ -77,7 +77,7 @@ class Upkeep:
         self.lost = 0
         """Messages that did not come off the wire, as the numbers of those that did show."""
         self.lateness = 0.0
-        """Longest delay of a tick behind its time since the last status (s of wall time)."""
+        """Longest delay of a tick behind its time since the last status (s of real time)."""
         self.start(0.0)
         self._forget()
 

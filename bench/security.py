@@ -120,7 +120,9 @@ def be(config: Role) -> None:
     credentials = config.credentials
     if credentials is not None and not config.rules:
         credentials = TlsAlone(**msgspec.structs.asdict(credentials))
-    session = Session(config.role, listen=config.listen, connect=config.connect, clock="wall", credentials=credentials)
+    session = Session(
+        config.role, listen=config.listen, connect=config.connect, clock="realtime", credentials=credentials
+    )
     if config.role == "send":
         due, padding = monotonic(), bytes(SIZE - STAMP)
         for _ in range(round(LONGEST / TICK)):  # not for ever, if nobody ends it

@@ -74,7 +74,7 @@ class ForeignAgent:
 
     def __init__(self, config: dict, session: zenoh.Session) -> None:
         self.config, self.session, self.name = config, session, config["name"]
-        self.wall, self.root = config["clock"] == "wall", f"gridpeers/{config['run']}/"
+        self.realtime, self.root = config["clock"] == "realtime", f"gridpeers/{config['run']}/"
         self.head = {"sender": self.name, "epoch": time.time_ns() // 1_000_000, "seq": 0, "t": 0.0}  # noqa: TID251
         self.own = self.head | {"type": "Nameplate"}
         self.own |= {key: config[key] for key in ("kind", "microgrid", "P_rated", "V_nom", "f_nom", "m_p", "m_q")}
@@ -99,7 +99,7 @@ class ForeignAgent:
 
     def publish(self, key: str, kind: str, seq: int, t: float, **fields: object) -> None:
         """Publish a message; in real time Zenoh drops a state rather than wait."""
-        control = zenoh.CongestionControl.DROP if self.wall and key == "state" else zenoh.CongestionControl.BLOCK
+        control = zenoh.CongestionControl.DROP if self.realtime and key == "state" else zenoh.CongestionControl.BLOCK
         message = {**self.head, "type": kind, "seq": seq, "t": t, **fields}
         self.session.put(f"{self.root}{key}/{self.name}", pack(message), congestion_control=control)
 
@@ -133,7 +133,7 @@ class ForeignAgent:
         elif key[0] in ("alive", "asked"):
             self.alive.pop(who, None)
             if who[0] == "plant":
-                self.measurement, self.due, self.status = None, 0.0, -1 if self.wall else 3
+                self.measurement, self.due, self.status = None, 0.0, -1 if self.realtime else 3
         elif key[0] == "nameplate" and who in self.alive:
             self.alive[who] = message
         elif key != ["leave"] and any(message[same] != (speaker or {}).get(same) for same in ("sender", "epoch")):
@@ -147,13 +147,13 @@ class ForeignAgent:
             self.members, self.prepare = dict(zip(message["roster"], message["instances"], strict=True)), message
         elif message["type"] == "Measurement":
             self.measurement = message
-            if self.wall and not self.leaving:  # decide in the middle of the period
+            if self.realtime and not self.leaving:  # decide in the middle of the period
                 self.due = self.due or time.monotonic() + 0.5 * self.config["T_c"] / self.config["speed"]
-        elif message["type"] == "Stop" and self.wall and not (self.leaving or message.get("refused")):
+        elif message["type"] == "Stop" and self.realtime and not (self.leaving or message.get("refused")):
             self.publish("leave", "Leave", self.sent, 0.0)  # the plant answers with another Stop
             self.leaving, self.due = True, time.monotonic() + 1.0
         elif message["type"] == "Stop":
-            self.status = (2 if self.wall else 3) if message.get("refused") else 0
+            self.status = (2 if self.realtime else 3) if message.get("refused") else 0
         elif message["type"] == "LinkRequest":
             answer = {"ok": False, "text": "no emulated links", "reply_to": message["reply_to"], "data": b""}
             self.publish("link_acknowledgement", "LinkAcknowledgement", message["seq"], message["t"], **answer)
@@ -171,10 +171,14 @@ class ForeignAgent:
         m, c, now, near = self.measurement, self.config, time.monotonic(), []
         if m is None or self.leaving or now < self.due:
             return
-        k, speed, limit = (self.sent, c["speed"], c["max_age"]) if self.wall else (m["seq"], 1.0, inf)
-        for name in list(self.states) if self.wall else [n for n in self.neighbours if n in self.members]:
-            heard = [one for one in self.states.get(name, []) if self.wall or one[1]["seq"] < k][-1:]
-            if not self.wall and (not heard or heard[0][1]["seq"] < k - 1) and (name, self.members[name]) in self.alive:
+        k, speed, limit = (self.sent, c["speed"], c["max_age"]) if self.realtime else (m["seq"], 1.0, inf)
+        for name in list(self.states) if self.realtime else [n for n in self.neighbours if n in self.members]:
+            heard = [one for one in self.states.get(name, []) if self.realtime or one[1]["seq"] < k][-1:]
+            if (
+                not self.realtime
+                and (not heard or heard[0][1]["seq"] < k - 1)
+                and (name, self.members[name]) in self.alive
+            ):
                 return
             for plate, state, came in heard:
                 here = state.get("island", "") in ("", m["island"], self.island or m["island"])
@@ -193,7 +197,7 @@ class ForeignAgent:
 
 if __name__ == "__main__":
     config = json.load(sys.stdin) if len(sys.argv) == 1 else None
-    lease = 2_000 if config is None or config["clock"] == "wall" else 86_400_000
+    lease = 2_000 if config is None or config["clock"] == "realtime" else 86_400_000
     endpoint = config["connect"][0] if config else sys.argv[1]
     with zenoh.open(zenoh.Config.from_json5(SETTINGS % (endpoint, lease))) as session:
         while config is None:

@@ -154,7 +154,7 @@ class Scenario:
         processes : int
             Number of processes that the agents share; 0 gives each agent its own. An agent that the scenario starts,
             stops, kills or pauses always has its own.
-        clock : {"simulated", "wall"}
+        clock : {"simulated", "realtime"}
             Simulated time, or real time, which needs the driver "processes".
         speed : float
             In real time: seconds of the run per second, from 0.1 to 50.

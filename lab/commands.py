@@ -240,5 +240,5 @@ def _counterfactual(record: RunRecord, changes: Changes, out: Path | None) -> bo
 
 def _about(record: RunRecord) -> str:
     info = record.info
-    kind = "real" if info.clock == "wall" else "simulated"
+    kind = "real" if info.clock == "realtime" else "simulated"
     return f"{info.scenario}{f', case {info.case}' if info.case else ''}, in {kind} time"

@@ -53,7 +53,7 @@ def flows(record: RunRecord, since: float = 0.0, until: float = inf) -> list[Flo
                     _judged(trace.src, trace.dst, number, t, outcome, 0.0 if PLANT in link else least)
                 )
     result = [flow for copies in found.values() for flow in copies]
-    others = _noted if record.info.clock == "wall" else _implied
+    others = _noted if record.info.clock == "realtime" else _implied
     result += [flow for flow in others(record, since, until) if flow.sent < first.get((flow.src, flow.dst), inf) - 1e-9]
     return sorted(result, key=lambda flow: (flow.sent, flow.src, flow.dst, flow.number, flow.arrived or inf))
 

@@ -46,7 +46,7 @@ class Meeting:
     def __init__(self, post: Post, stepper: PlantStepper, phases: Phases, feed: RecorderFeed) -> None:
         self.post, self.stepper, self.phases, self.feed = post, stepper, phases, feed
         self.recorders: set[str] = set()  # those present; in real time also those lost while the run went on
-        self._live = stepper.config.clock == "wall"
+        self._live = stepper.config.clock == "realtime"
         self._needed = stepper.config.recorders
         self._tokens: set[str] = set()
         """Tokens of agents and recorders that take part; while the run ends, also of agents that were told to stop."""

@@ -153,8 +153,8 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     star: bool = False  # whether the plant relays all messages, in simulated time: the agents have one link each
     recorders: tuple[str, ...] = ()  # recorders of the telemetry that the plant waits for before tick 0
     epoch: int = 1  # epoch of this process; see `gridpeers.wire.membership`
-    clock: Literal["simulated", "wall"] = "simulated"  # lock-step with the agents, or real time
-    speed: float = 1.0  # real time: run time per wall time (s/s), > 0
+    clock: Literal["simulated", "realtime"] = "simulated"  # lock-step with the agents, or real time
+    speed: float = 1.0  # real time: run time (s) per s, above 0
     max_age: float = 0.25  # real time: age (s of run time) beyond which agents do not use a neighbour's state
     wait_for_agents: float = 10.0  # real time: longest wait (s) for the agents before the plant starts
     strict: bool = False  # real time: whether the run breaks when it cannot keep pace

@@ -97,7 +97,7 @@ class PlantNode:
         self.received, self.lost = post.received, post.lost
         self.take_actions, self.take_rejects = post.take_actions, post.take_rejects
         post.on_nameplate = self._on_nameplate
-        realtime = config.clock == "wall"
+        realtime = config.clock == "realtime"
         stepper = self.stepper = PlantStepper(config, plant)
         phases = self._phases = Phases(PHASES)
         kept = None if not realtime else KEPT_BYTES if post.journal is None else KEPT_BYTES_RECORDED

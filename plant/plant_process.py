@@ -46,8 +46,8 @@ def run_plant(
     configuration cannot work.
     """
     log = logging.getLogger("plant")
-    wall = config.clock == "wall"
-    if wall:  # each process has an epoch of its own, which tells it from its ghost; only equality matters
+    realtime = config.clock == "realtime"
+    if realtime:  # each process has an epoch of its own, which tells it from its ghost; only equality matters
         config = replace(config, epoch=new_epoch())
     else:
         schedule_as_batch()

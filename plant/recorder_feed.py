@@ -29,7 +29,7 @@ BLOCK = 1 << 20
 """Bytes of a block of kept messages: kept one by one, they leave the heap full of holes (40 MB in a live run)."""
 
 AT_ONCE = 20  # messages that are published again in one control period, so that the plant keeps its pace
-TELEMETRY = 0.2  # time (s, wall) between two telemetry messages in real time
+TELEMETRY = 0.2  # time (s, real time) between two telemetry messages in real time
 SILENT = 3.0  # time (s) after a recorder's last question after which it counts as silent; it asks every second
 
 

@@ -56,7 +56,7 @@ def write_measures(
     told = [
         f"case {name}: {note}"
         for name, record in recorded.items()
-        for note in _notes(cases[name], record, wall=run.clock == "wall")
+        for note in _notes(cases[name], record, realtime=run.clock == "realtime")
     ]
     report = RunReport(
         scenario=scenario.name,
@@ -85,10 +85,10 @@ def _facts(case: CheckedCase, recorded: Recorded) -> dict[str, Any]:
     return {"history_sha256": recorded.sha256} | {name: value for name, value in facts.items() if value}
 
 
-def _notes(case: CheckedCase, recorded: Recorded, *, wall: bool) -> Iterator[str]:
+def _notes(case: CheckedCase, recorded: Recorded, *, realtime: bool) -> Iterator[str]:
     """Yield sentences on what the scenario does not have, and on what of it is not measured."""
     ended, end_s = recorded.ended, case.scenario.time.end_s
-    if wall and not case.scenario.events:
+    if realtime and not case.scenario.events:
         yield "the scenario has no event, so there is no window to measure in"
     if ended > end_s + 1e-9:
         yield f"measured up to {end_s:g} s, where the scenario ends; the history goes on to {ended:.2f} s"
@@ -103,7 +103,7 @@ def _notes(case: CheckedCase, recorded: Recorded, *, wall: bool) -> Iterator[str
     if commands := [event.text for event in recorded.events if event.kind == "command"]:
         count = counted(len(commands), "command")
         yield f"people gave {count} that may change the run (events.csv), first: {commands[0]}"
-    if wall and (moves := [each for each in recorded.events if each.kind == "roster" and each.t > 0.0]):
+    if realtime and (moves := [each for each in recorded.events if each.kind == "roster" and each.t > 0.0]):
         times = counted(len(moves), "time")
         yield f"agents came, left or were silent {times} after the start (events.csv), first: {moves[0].text}"
     if shares := case.messages_saved:
@@ -136,7 +136,7 @@ def metrics_json(
             cases[case]["without_agent"] = list(findings.without_agent[case])
         cases[case] |= facts[case]
     scenario = run.scenario
-    clock = {"clock": run.clock, "speed": run.speed} if run.clock == "wall" else {}
+    clock = {"clock": run.clock, "speed": run.speed} if run.clock == "realtime" else {}
     text = {"scenario": scenario.name, "seed": scenario.seed, "driver": run.driver, **clock, "cases": cases}
     return json.dumps(text, indent=2, allow_nan=False) + "\n"
 

@@ -98,7 +98,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
         )
     from gridpeers.scenarios.measured_run import write_measures
 
-    if request.clock == "wall":
+    if request.clock == "realtime":
         notes.append("in real time no two runs are the same: each has its own delays")
     else:
         notes += [
@@ -128,7 +128,7 @@ def run_case(
 
     In one process `plant_at_rest` gives the plant at t = 0 instead of building it.
     """
-    scenario, real = request.scenario, request.clock == "wall"
+    scenario, real = request.scenario, request.clock == "realtime"
     time = scenario.time
     plant, agents = _configs(request, case)
     record = RecordInfo(
@@ -180,7 +180,7 @@ def run_case(
 
 def _configs(request: Request, case: str) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
     listen = local_endpoint(request.scenario.processes.port) if request.driver == "processes" else ""
-    real = request.clock == "wall"
+    real = request.clock == "realtime"
     plant, agents = configs(request.scenario, request.feeder, case, listen, real_nodes=real)
     plant = replace(plant, record=request.scenario.record)
     agents = tuple(replace(agent, record=request.scenario.record) for agent in agents)

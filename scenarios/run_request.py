@@ -30,7 +30,7 @@ class Outcome:
 
 
 SPEEDS = (0.1, 50.0)
-"""Least and greatest useful speed (s of run time per s of wall time), of a live run or of a scenario."""
+"""Least and greatest useful speed (s of run time per s), of a live run or of a scenario."""
 
 
 Other = LinkReport | Journal | LinkRequest
@@ -39,7 +39,7 @@ Other = LinkReport | Journal | LinkRequest
 Driver = Literal["processes", "inprocess"]
 """Driver of a case: one process per agent over Zenoh, or all in this process."""
 
-Clock = Literal["simulated", "wall"]  # Lock-step of plant and agents, or real time
+Clock = Literal["simulated", "realtime"]  # Lock-step of plant and agents, or real time
 
 Progress = Callable[[str, float, float], None]
 """Takes the case, the time it has reached (s) and its end (s)."""
@@ -65,7 +65,7 @@ class Request:
     folder: Path
     clock: Clock = "simulated"
     speed: float = 1.0
-    """Real time: run time per wall time (s/s)."""
+    """Real time: run time (s) per s."""
     keys: str | Path | None = None
     """Folder with the certificates of plant and agents; None: links are open, on the loopback."""
     processes: int = 0

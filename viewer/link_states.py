@@ -29,7 +29,7 @@ class LinkView(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     ageing: bool = False
     """It is used though it is older than `AGEING`."""
     rate: float = 0.0
-    """Messages per s of wall time that come over it: what the sender sends, less what an emulated link drops."""
+    """Messages per s of real time that come over it: what the sender sends, less what an emulated link drops."""
     holds: tuple[str, ...] = ()
     """Emulated faults that it has now, in words; "impaired" if they are not known yet."""
     cut: bool = False

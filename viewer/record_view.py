@@ -194,7 +194,7 @@ class RecordView:
             outcome="",
             reproducible=False,
         )
-        # a row holds until the next one: what the page takes for silence is a time of the wall clock
+        # a row holds until the next one: what the page takes for silence is a time of real time
         view.telemetry(message, t if t - row[0] <= self._rows.longest_gap else row[0])
         return row[0]
 
@@ -251,7 +251,7 @@ def _missing(record: RunRecord, *, has_feeder: bool) -> Iterator[str]:
     info = record.info
     if info.level == "physics":
         yield 'It was recorded with record = "physics": no links and no decisions are in it.'
-    elif info.level == "decisions" and info.clock == "wall":
+    elif info.level == "decisions" and info.clock == "realtime":
         yield 'It was recorded with record = "decisions": what else arrived, and the fates of messages, are not in it.'
     if not has_feeder:
         yield f"The feeder {info.plant.settings.feeder} is not here: its inverters stand in a ring."

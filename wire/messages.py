@@ -477,7 +477,7 @@ class PlantEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 
 
 class Pacing(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Delays of the plant's steps behind their due times (s of wall time)."""
+    """Delays of the plant's steps behind their due times (s of real time)."""
 
     steps: Count
     """Steps since the start."""

@@ -14,7 +14,7 @@ HOLD = 0.5
 """Run time (s) for which the frequency must stay in its band to count as restored."""
 
 OFFSETS = 50
-"""Latest messages of the plant by which run time and wall time are compared."""
+"""Latest messages of the plant by which run time and real time are compared."""
 
 
 class SoakMonitor:

@@ -44,6 +44,8 @@ def check_how(driver: str, pace: Pace, spec: model.ScenarioModel, *, dash: str =
     clock, speed, strict = pace.get("clock", "simulated"), pace.get("speed", 1.0), pace.get("strict", False)
     processes, keys, simulator = pace.get("processes", 0), pace.get("keys"), SIMULATORS.resolve(spec.plant.simulator)
     problem = ""
+    if str(clock) == "wall":
+        raise ScenarioError([f'{dash}clock: "wall" is now called "realtime"; use {dash}clock realtime'])
     for word, value, choices in (("driver", driver, get_args(Driver)), ("clock", clock, get_args(Clock))):
         if value not in choices:
             raise ScenarioError([f'{dash}{word}: there is no "{value}"; {suggestion(value, choices, "choices")}'])
@@ -63,14 +65,14 @@ def check_how(driver: str, pace: Pace, spec: model.ScenarioModel, *, dash: str =
         problem = f"case: {simulator.words} runs once, so choose one case of {', '.join(spec.cases)}"
     elif clock == "simulated" and (speed != 1.0 or strict):
         name = "strict" if strict else "speed"
-        problem = f"{name}: simulated time has no pace to keep; use it with {dash}clock wall"
-    elif clock == "wall" and spec.plant.simulator != "gridpeers":
+        problem = f"{name}: simulated time has no pace to keep; use it with {dash}clock realtime"
+    elif clock == "realtime" and spec.plant.simulator != "gridpeers":
         problem = (
-            f'clock wall: the plant of "{spec.plant.simulator}" cannot run in real time; use {dash}clock simulated'
+            f'clock realtime: the plant of "{spec.plant.simulator}" cannot run in real time; use {dash}clock simulated'
         )
-    elif clock == "wall" and driver == "inprocess":
-        problem = f"clock wall: needs a process per agent; use {dash}driver processes"
-    elif clock == "wall" and not SPEEDS[0] <= speed <= SPEEDS[1]:
+    elif clock == "realtime" and driver == "inprocess":
+        problem = f"clock realtime: needs a process per agent; use {dash}driver processes"
+    elif clock == "realtime" and not SPEEDS[0] <= speed <= SPEEDS[1]:
         problem = f"speed: must be from {SPEEDS[0]:g} to {SPEEDS[1]:g} (1 is real time), got {speed:g}"
     if problem:
         raise ScenarioError([f"{dash}{problem}"])

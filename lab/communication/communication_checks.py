@@ -221,10 +221,10 @@ DELAY_TICKS, DELAY = 300, 5.0
 """How long after its run time a decision is looked at: ticks of simulated time, where a journal comes every 100
 ticks at the latest; seconds of real time, where it comes every 0.2 s."""
 
-PAUSE = 1.5  # Silence of a process (s of wall time) after which its links may be given up: Zenoh gives them 2 s
+PAUSE = 1.5  # Silence of a process (s of real time) after which its links may be given up: Zenoh gives them 2 s
 
 LINKED_WITHIN = 2.0 * PATIENCE
-"""Time (s of wall time) within which two processes hear each other: a session that brings nothing is given up after
+"""Time (s of real time) within which two processes hear each other: a session that brings nothing is given up after
 `PATIENCE`, and the next one may take as long."""
 
 

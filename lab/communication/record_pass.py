@@ -37,7 +37,7 @@ from gridpeers.wire.messages import MOST_COUNT, PLANT, Journal, LinkReport, Stat
 from gridpeers.wire.timing import time_of
 
 AHEAD = 5.0
-"""How far (s of wall time) an entry may be behind the record's end: far more than clocks of two processes differ by."""
+"""How far (s of real time) an entry may be behind the record's end: far more than clocks of two processes differ by."""
 
 _STATE_KEYS = ("state", "set_points")
 """First parts of the keys of states; one that is not for the neighbours has a key of its own."""

@@ -74,7 +74,7 @@ class ChangedRule:
     def unwritten(self, *, clock: str) -> Iterator[str]:
         if not self.links_written:
             yield "The changes of links are not in this file: their entries would contradict others."
-        if clock == "wall":
+        if clock == "realtime":
             yield "Not in this file: delays and losses on the wire, and what people did; a run of it has its own."
 
 

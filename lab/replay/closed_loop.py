@@ -66,7 +66,7 @@ KEPT_DELAYS, KEPT_STATUSES = 1000, 16
 """Latest delays of a link, and latest statuses of an agent, that are kept: one may be some seconds on its way."""
 
 CUT_OFF = 1.0
-"""Time (s of wall time) before the end of a record that is cut off within which a process belongs to its end."""
+"""Time (s of real time) before the end of a record that is cut off within which a process belongs to its end."""
 
 _CALL, _ARRIVAL = 0, 1
 """Order of calls at the same time: processes that share a session send before they hear."""
@@ -337,7 +337,7 @@ def _named(step: RecordedStep) -> tuple[str, str, int, int] | None:
 
 
 class LinkDelays:
-    """Delays of messages (s of wall time) by sender and receiver, as they are met, for messages that the record lacks.
+    """Delays of messages (s of real time) by sender and receiver, as they are met, for messages that the record lacks.
 
     A link on which nothing was heard takes those of the other links to its receiver.
     """

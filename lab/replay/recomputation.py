@@ -39,7 +39,7 @@ def recomputed(record: RunRecord, agent: str, law: Law | None = None) -> Iterato
     """
     config = record.info.agent(agent)
     assert config is not None
-    config = config if config.clock == "wall" else config.by_own_clock()
+    config = config if config.clock == "realtime" else config.by_own_clock()
     with ExitStack() as ends:
         core: Agent | None = None
         epoch = -1

@@ -27,7 +27,7 @@ from gridpeers.wire.post import Post, Route
 from gridpeers.wire.tick_policy import WAIT, TickVerdict
 from gridpeers.wire.timing import Awaited, RateLimit
 
-# times in s, wall
+# times in s, real time
 LEAD = 0.25  # from the last agent's nameplate to step 0: the agents are still busy finding each other
 HEARD = 1.0  # after its last state for which the plant hears an agent
 LINKS = 0.5  # between two accounts of links in a recorded run

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from gridpeers.plant.plant_node import PlantNode
     from gridpeers.plant.realtime.realtime import RealtimeTimer
 
-AGAIN = 1.0  # time (s, wall) after which a command that was not acknowledged is sent again
+AGAIN = 1.0  # time (s, real time) after which a command that was not acknowledged is sent again
 
 COMMANDS, COMMAND_INTERVAL = 100, 0.02
 """Commands of one verb that are carried out at once, and time (s) after which one more is: a step must not wait for
@@ -214,7 +214,7 @@ class RunCommands:
         return [name for name in self._plant.inverters if (name in met) == present]
 
     def _status(self) -> dict[str, Any]:
-        """Return the run's status: times in s, delays in s of wall time."""
+        """Return the run's status: times in s, delays in s of real time."""
         node, stepper, plant = self._node, self._node.stepper, self._plant
         return {
             "run": node.config.run,

@@ -14,8 +14,10 @@ from dataclasses import dataclass, field
 
 from gridpeers.wire.messages import AgentStatus
 
-SETTLING = 0.1  # time (s, wall) for which a neighbour must be reported as not heard; a frozen one is detected meanwhile
-ACQUAINTANCE = 1.0  # time (s, wall) after a join in which agents may not have heard each other yet
+SETTLING = (
+    0.1  # time (s, real time) for which a neighbour must be reported as not heard; a frozen one is detected meanwhile
+)
+ACQUAINTANCE = 1.0  # time (s, real time) after a join in which agents may not have heard each other yet
 LISTENED = 2.0  # control periods between two steps of the plant in which it counts as listening; longer, it slept
 RECENT = 3.0  # control periods within which the plant must have heard an agent that a neighbour does not hear
 
@@ -38,13 +40,13 @@ class SilenceDetector:
     """Keep the time at which each agent was heard last, and report silences.
 
     `max_age`: age (s of run time) beyond which a state is not used; `T_c`, `period`: control period (s of run time and
-    of wall time).
+    of real time).
     """
 
     def __init__(self, max_age: float, T_c: float, period: float) -> None:
         self._max_age, self._period = max_age, period
-        self._limit = max_age * period / T_c  # the same in wall time (s)
-        self._clock = 0.0  # time (s, wall) for which the plant has listened
+        self._limit = max_age * period / T_c  # the same in real time (s)
+        self._clock = 0.0  # time (s, real time) for which the plant has listened
         self._now: float | None = None  # time of the last update of the clock (s)
         self._agents: dict[str, _Agent] = {}
 
@@ -84,7 +86,7 @@ class SilenceDetector:
         agent.unheard = lost | unheard
 
     def take(self, now: float) -> Iterator[tuple[str, str]]:
-        """Yield the agents whose silence begins or ends by the plant's step at this time (s, wall), with a sentence."""
+        """Yield the agents whose silence begins or ends by this step of the plant, each with a sentence; `now` in s."""
         self._clock += 0.0 if self._now is None else min(max(0.0, now - self._now), LISTENED * self._period)
         self._now = now
         for name, agent in self._agents.items():

@@ -62,10 +62,10 @@ def run_processes(
     is in use or Zenoh is missing.
     """
     agents = {config.name: config for config in agent_configs}
-    wall = plant_config.clock == "wall"
+    realtime = plant_config.clock == "realtime"
     endpoint = free_endpoint(*plant_config.listen[:1])
-    deadline = "deadline" if wall else "plant_wait"  # an agent that waits for the plant waits for its compiler too
-    star = star and not wall
+    deadline = "deadline" if realtime else "plant_wait"  # an agent that waits for the plant waits for its compiler too
+    star = star and not realtime
     own: dict[str, Any] = {deadline: BUILD_DEADLINE, "connect": (endpoint,), "star": star}
     if plant_config.credentials is not None:
         own["listen"] = ("tls/127.0.0.1:0",)
@@ -104,10 +104,10 @@ class _ProcessDriver:
         )
         self._broke = ""
         """Why the run broke; "" after a good end."""
-        self._T_c, self._wall = config.T_c, config.clock == "wall"
+        self._T_c, self._realtime = config.T_c, config.clock == "realtime"
         self._plant_deadline = 1.5 * config.deadline + 1.0
         """Longer than the plant's own (s): the plant reports better what is wrong, unless it is the cause itself."""
-        if self._wall:
+        if self._realtime:
             self._plant_deadline += config.wait_for_agents + 2.0 * config.T_c / config.speed
         self._on_telemetry, self._on_other = on_telemetry, on_other
         self._began = self._ended_at = monotonic()
@@ -160,7 +160,7 @@ class _ProcessDriver:
         supervisor.faults.end(supervisor.children)
         until = monotonic() + self.patience
         # in simulated time the plant leaves once its last telemetry is acknowledged
-        while not self._wall and supervisor.children[PLANT].status is None and (left := until - monotonic()) > 0.0:
+        while not self._realtime and supervisor.children[PLANT].status is None and (left := until - monotonic()) > 0.0:
             client.take(left)
 
     def _take(self, message: Recordable) -> None:
@@ -178,11 +178,11 @@ class _ProcessDriver:
     def _note_exit(self, child: Child, supervisor: Supervisor) -> None:
         begun = self.client.latest is not None
         # in simulated time a run does not begin without one of its agents
-        ends_it = child.name == PLANT if begun else child.name != PLANT and not self._wall
+        ends_it = child.name == PLANT if begun else child.name != PLANT and not self._realtime
         if child.status == 0 and ends_it:
             if self._left is None:
                 self._left, self._left_at = child, monotonic()
-        elif child.name == PLANT or (supervisor.failed(child) and not self._wall and (child.crashed or not begun)):
+        elif child.name == PLANT or (supervisor.failed(child) and not self._realtime and (child.crashed or not begun)):
             self._end(child.report(self._when))
         elif supervisor.failed(child):
             self._notes[child.name] = child.report(self._when)
@@ -202,7 +202,7 @@ class _ProcessDriver:
 
         In simulated time a run may reach its end before the exit of a process is noticed.
         """
-        unscripted = self.client.latest is not None and not self.client.latest.reproducible and not self._wall
+        unscripted = self.client.latest is not None and not self.client.latest.reproducible and not self._realtime
         died = {event.subject: event.t for event in self._events if event.kind == "roster" and unscripted}
         for child in supervisor.children:
             known = child.name in self._notes or child.name == PLANT or (self._broke and child.status is None)

@@ -26,7 +26,7 @@ class FaultInjector:
     def __init__(self, plant: PlantConfig) -> None:
         self._due: list[tuple[float, str, signal.Signals]] = []
         """Run time (s), agent and signal of the faults that are left, in the order of time; others are emulated."""
-        if plant.links and plant.clock == "wall":
+        if plant.links and plant.clock == "realtime":
             setup = EmulationConfig.of_tree(plant.links)
             for node in setup.netem.nodes if setup.real_nodes else ():
                 end = math.inf if node.to_s is None else node.to_s
@@ -36,7 +36,7 @@ class FaultInjector:
             self._due.sort()
         self._speed, self._T_c = plant.speed, plant.T_c
         self._offset: float | None = None
-        """Run time minus wall time times the speed (s); None before the run begins."""
+        """Run time minus real time times the speed (s); None before the run begins."""
         self.killed: set[str] = set()
         self._paused: set[str] = set()
 

@@ -81,7 +81,7 @@ def configure(
     """Return the configurations of the plant and of all agents of a checked scenario, spare ones last.
 
     The plant connects to the endpoints `beyond` itself, e.g. a Zenoh router. It waits for its agents for `wait` (s);
-    the run ends after `duration` (s of run time). `speed` is run time per wall time; a `strict` run breaks when the
+    the run ends after `duration` (s of run time). `speed` is run time (s) per s; a `strict` run breaks when the
     plant cannot keep pace. UsageError if an option cannot be used.
     """
     least, greatest = SPEEDS
@@ -101,7 +101,7 @@ def configure(
     # links are emulated even without a fault: gridpeers link may set one during the run
     links = plant.links or setup_of(netem_of(scenario, case), scenario, feeder, real_nodes=True).to_tree()
     level: RecordLevel = scenario.record if recorded else "physics"
-    live = {"run": run, "clock": "wall", "speed": speed, "links": links, "record": level}
+    live = {"run": run, "clock": "realtime", "speed": speed, "links": links, "record": level}
     first = [replace(agent, **live, deadline=0.0) for agent in agents if agent.name in plant.agents]
     nameplate = ("name", "kind", "microgrid", "P_rated", "V_nom", "m_p", "m_q")
     spares = (replace(first[0], **{name: getattr(row, name) for name in nameplate}) for row in feeder.spares)

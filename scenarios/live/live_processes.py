@@ -103,7 +103,7 @@ class LiveRecorder:
     def __enter__(self) -> LiveRecorder:
         keep_out_of_the_heap()
         config, endpoint = self._config, loopback_of(self._config.listen[0])
-        self.client = TelemetryClient(RECORDER, config.run, endpoint, "wall", self._take, config.credentials)
+        self.client = TelemetryClient(RECORDER, config.run, endpoint, "realtime", self._take, config.credentials)
         self._thread.start()
         return self
 

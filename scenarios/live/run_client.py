@@ -44,7 +44,7 @@ class RunClient:
             "visitor",
             listen=self._listen,
             connect=self.where.connect,
-            clock="wall",
+            clock="realtime",
             meets_all=self._meet_agents,
             credentials=self.where.credentials,
         )

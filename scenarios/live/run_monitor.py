@@ -94,7 +94,7 @@ V_LOW, V_HIGH = 0.95, 1.05
 """Terminal voltages (pu) beyond which one is shown as off: range A of ANSI C84.1."""
 
 SILENT = 1.5
-"""An agent whose status is older than this (s of wall time) is silent: it sends three in this time."""
+"""An agent whose status is older than this (s of real time) is silent: it sends three in this time."""
 
 _PER_INVERTER = 6
 """Values of one inverter in a row of telemetry."""

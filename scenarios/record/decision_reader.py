@@ -220,7 +220,7 @@ class DecisionReader:
 
     def _own_before(self, config: AgentConfig, state: State, form: Decision) -> tuple[float, float] | None:
         """Return the agent's own set-points (W, V) before a decision; None where it starts, or starts again."""
-        if self._info.clock == "wall":
+        if self._info.clock == "realtime":
             return (form.before[0], form.before[1]) if len(form.before) == 2 else None
         last = self._index.state(config.name, state.seq - 1, time_of(state.seq - 1, self._info.T_c))
         if last is None or last.epoch != state.epoch or last.idle or last.island == OFF:

@@ -30,7 +30,7 @@ from gridpeers.wire.messages import AnyMessage, Journal, Measurement, Message, S
 M = TypeVar("M", bound=Message)
 
 LATE = 2.0
-"""Longest time (s; of wall time in real time) after which an entry of a journal may come into the record."""
+"""Longest time (s; of real time in real time) after which an entry of a journal may come into the record."""
 
 MOST_KNOWN = 100_000  # States that are known as noted: by their sender, and by a plant while it knows no journal
 
@@ -58,13 +58,13 @@ class MessageIndex:
         self.file, self.info = file, file.info
         self.damage: list[str] = []
         """Sentences on what could not be read."""
-        wall = self.info.clock == "wall"
-        speed = self.info.plant.speed if wall else 0.0
-        self._late = LATE * max(1.0, speed) if wall else max(LATE, REPORT_TICKS * self.info.T_c)
+        realtime = self.info.clock == "realtime"
+        speed = self.info.plant.speed if realtime else 0.0
+        self._late = LATE * max(1.0, speed) if realtime else max(LATE, REPORT_TICKS * self.info.T_c)
         """As `LATE`, of run time: in simulated time reports come every so many ticks."""
         self._reach = max(0.0, 2.0 * speed - 1.0)
         """How much further than its own time a message is looked for (s of run time): journals come up to a second of
-        wall time late."""
+        real time late."""
         self.part = lru_cache(maxsize=40)(self._read_part)  # more than `near` yields for a message: 20 in real time
 
     @property

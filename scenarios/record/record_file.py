@@ -184,7 +184,8 @@ class RecordFile:
                 f"{FORMAT}: install the later gridpeers"
             )
         try:
-            return decode_foreign(msgspec.json.Decoder(RecordInfo).decode, metadata.metadata["info"])
+            info = metadata.metadata["info"].replace('"clock":"wall"', '"clock":"realtime"')  # until November 2026
+            return decode_foreign(msgspec.json.Decoder(RecordInfo).decode, info)
         except (KeyError, msgspec.MsgspecError) as error:
             raise RecordFileError(
                 f"{self.path}: what it says about its run (written by gridpeers {by[:40]}) cannot be read: {error}"

@@ -56,7 +56,7 @@ class RecordInfo(msgspec.Struct, frozen=True, kw_only=True):
         return self.plant.run
 
     @property
-    def clock(self) -> Literal["simulated", "wall"]:
+    def clock(self) -> Literal["simulated", "realtime"]:
         return self.plant.clock
 
     @property

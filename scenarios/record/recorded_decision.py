@@ -115,5 +115,5 @@ class RecordedDecision:
     @property
     def T(self) -> float:
         """Control period (s) that the law was called with."""
-        wall = self.config.clock == "wall"
-        return self.config.T_c if wall else self.config.by_own_clock().T_c
+        realtime = self.config.clock == "realtime"
+        return self.config.T_c if realtime else self.config.by_own_clock().T_c

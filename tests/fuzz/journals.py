@@ -79,7 +79,7 @@ class Journals:
         data = rng.choice((data, data[: rng.randrange(len(data))], payload[:-CRC] + data, data + payload[:-CRC]))
         parts = [(rng.choice(("inv1", PLANT)), data[:200_000])]
         reports = [link_report("inv1", _verdicts(rng)) for _ in range(rng.randrange(3))]
-        sums, unreadable = judged(parts, reports, clock=rng.choice(("simulated", "wall")))
+        sums, unreadable = judged(parts, reports, clock=rng.choice(("simulated", "realtime")))
         sums.finish()
         return "garbled" if unreadable else ""
 

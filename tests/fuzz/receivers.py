@@ -141,7 +141,7 @@ class LinkedAgentScene(RealtimeAgentScene):
 
     def __init__(self) -> None:
         super().__init__()
-        config = replace(agent_config("inv1"), clock="wall", epoch=EPOCH, links=LATE, record="all")
+        config = replace(agent_config("inv1"), clock="realtime", epoch=EPOCH, links=LATE, record="all")
         self.side = AgentNode(config, "a", links_of("inv1", LATE))
         self.side.start(self.now)
         meet(self, *NAMES[1:])

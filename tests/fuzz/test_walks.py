@@ -100,7 +100,7 @@ def test_no_order_of_honest_events_leads_out_of_the_table_of_phases(
         on(phases, event)
 
     monkeypatch.setattr(Phases, "on", noted)
-    for seed, clock in product(range(60), ("simulated", "wall")):
+    for seed, clock in product(range(60), ("simulated", "realtime")):
         rng = random.Random(seed)
         walk(node_of(kind, clock, rng), rng)
     all_of = {(phase, event) for phase, events in table.items() for event in events}

@@ -44,9 +44,9 @@ def measurement(k: int) -> Measurement:
 class Scene:
     """A core in the middle of a run: what it is told, and what it does."""
 
-    def __init__(self, side: AgentNode | PlantNode, *, wall: bool) -> None:
+    def __init__(self, side: AgentNode | PlantNode, *, realtime: bool) -> None:
         self.side: Any = side
-        self._wall = wall
+        self._realtime = realtime
         self.now = 100.0
         self.done: list[object] = []
         self.side.start(self.now)
@@ -58,7 +58,7 @@ class Scene:
             self.hear(KEYS.measurement("inv1"), measurement(k))
         for name in NAMES[1:] if agent else NAMES:
             self.hear(KEYS.state(name), state(name, k))
-        if self._wall:
+        if self._realtime:
             self.now = self.now + T_C + 1e-9 if agent else self.side.deadline
             self.side.expire(self.now)
         self.take()
@@ -87,7 +87,7 @@ class RealtimeAgentScene(Scene):
     """inv1 in real time."""
 
     def __init__(self) -> None:
-        super().__init__(AgentNode(replace(agent_config("inv1"), clock="wall", epoch=EPOCH), "a"), wall=True)
+        super().__init__(AgentNode(replace(agent_config("inv1"), clock="realtime", epoch=EPOCH), "a"), realtime=True)
         meet(self, *NAMES[1:])
 
 
@@ -95,7 +95,7 @@ class AgentScene(Scene):
     """inv1 in simulated time."""
 
     def __init__(self) -> None:
-        super().__init__(AgentNode(replace(agent_config("inv1"), epoch=EPOCH), "a"), wall=False)
+        super().__init__(AgentNode(replace(agent_config("inv1"), epoch=EPOCH), "a"), realtime=False)
         meet(self, *NAMES[1:])
         instances = tuple(INSTANCES[name] for name in NAMES)
         prepare = Prepare(sender="plant", epoch=EPOCH, seq=0, t=0.0, roster=NAMES, instances=instances)
@@ -109,8 +109,8 @@ class RealtimePlantScene(Scene):
 
     def __init__(self) -> None:
         config, _ = toy_configs(3, end=None)  # type: ignore[arg-type]
-        config = replace(config, clock="wall", epoch=EPOCH)
-        super().__init__(PlantNode(config, ToyPlant(config)), wall=True)
+        config = replace(config, clock="realtime", epoch=EPOCH)
+        super().__init__(PlantNode(config, ToyPlant(config)), realtime=True)
         meet(self, *NAMES)
 
 
@@ -120,7 +120,7 @@ class PlantScene(Scene):
     def __init__(self) -> None:
         config, _ = toy_configs(3, end=1e4)
         config = replace(config, epoch=EPOCH)
-        super().__init__(PlantNode(config, ToyPlant(config)), wall=False)
+        super().__init__(PlantNode(config, ToyPlant(config)), realtime=False)
         meet(self, *NAMES)
         for name in NAMES:
             self.hear(KEYS.ready(name), Ready(sender=name, epoch=EPOCH, seq=0, t=0.0))

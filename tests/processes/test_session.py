@@ -64,7 +64,7 @@ def take_one(session: Session) -> tuple[str, str, bytes]:
 def test_only_in_wall_clock_time_a_link_may_be_given_up_early_and_newest_values_dropped() -> None:
     """Lock-step drops nothing and waits Zenoh's 5 s; real time drops stale values and waits 200 ms."""
     found = {}
-    for clock in ("simulated", "wall"):
+    for clock in ("simulated", "realtime"):
         session = Session("a", listen=("tcp/127.0.0.1:0",), clock=clock)
         try:
             keys = ("gridpeers/t/state/inv1", "gridpeers/t/telemetry")
@@ -73,7 +73,7 @@ def test_only_in_wall_clock_time_a_link_may_be_given_up_early_and_newest_values_
         finally:
             session.close()
 
-    assert found == {"simulated": (5_000_000, [False, False]), "wall": (200_000, [True, False])}
+    assert found == {"simulated": (5_000_000, [False, False]), "realtime": (200_000, [True, False])}
 
 
 def lingers(connection: socket.socket) -> bool:

@@ -247,8 +247,8 @@ def fake_clock_record(
     if netem is not None:
         microgrids = {agent.name: agent.microgrid for agent in agents}
         links = EmulationConfig(netem=netem, microgrids=microgrids, real_nodes=True).to_tree()
-    plant = replace(plant, clock="wall", links=links, record=record, wait_for_agents=5.0)
-    agents = tuple(replace(agent, clock="wall", links=links, record=record, deadline=0.0) for agent in agents)
+    plant = replace(plant, clock="realtime", links=links, record=record, wait_for_agents=5.0)
+    agents = tuple(replace(agent, clock="realtime", links=links, record=record, deadline=0.0) for agent in agents)
     info = toy_info(plant, agents, level=record)  # in one process: it is written between the calls, in the same parts
     with pytest.MonkeyPatch.context() as patch, Recorder(folder, gaps=True, record=info) as recorder:
         patch.setattr("gridpeers.scenarios.record.record_writer.CHUNK", 20_000)

@@ -35,9 +35,9 @@ on = "inv1 -> *"
 loss = 0.1
 """
 
-Clock = Literal["simulated", "one process", "wall"]
+Clock = Literal["simulated", "one process", "realtime"]
 
-CLOCKS: tuple[Clock, ...] = ("simulated", "one process", "wall")
+CLOCKS: tuple[Clock, ...] = ("simulated", "one process", "realtime")
 """Kinds of runs: in simulated time with processes and without, and in real time."""
 
 

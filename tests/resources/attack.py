@@ -71,7 +71,7 @@ def main() -> None:
     attack = msgspec.json.decode(sys.stdin.readline(), type=Attack)
     keys, names = Keys(attack.run), attack.names
     ending = threading.Event()
-    session = Session("attacker", listen=("tcp/127.0.0.1:0",), connect=(attack.endpoint,), clock="wall")
+    session = Session("attacker", listen=("tcp/127.0.0.1:0",), connect=(attack.endpoint,), clock="realtime")
     while session.peers() <= len(names):
         session.take(1, 0.05)
     print(LINKED, flush=True)

@@ -29,7 +29,9 @@ class Intruder:
 
     def __init__(self, endpoint: str, credentials: Credentials | None) -> None:
         listen = ("tcp/127.0.0.1:0",) if credentials is None else ("tls/127.0.0.1:0",)
-        self.session = Session("intruder", listen=listen, connect=(endpoint,), clock="wall", credentials=credentials)
+        self.session = Session(
+            "intruder", listen=listen, connect=(endpoint,), clock="realtime", credentials=credentials
+        )
 
     @property
     def raw(self) -> Any:

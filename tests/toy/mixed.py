@@ -35,14 +35,14 @@ class Mixed(ProcessRun):
 
     def start(self, name: str) -> None:
         """Start a foreign agent as a person would: the plant configures it in real time, a file in simulated time."""
-        wall = self.plant.clock == "wall"
+        realtime = self.plant.clock == "realtime"
         with (self.log_dir / f"{name}-foreign-{len(self.foreigners)}.log").open("wb") as log:
-            options = [self.endpoint, self.plant.run, name] if wall else []
+            options = [self.endpoint, self.plant.run, name] if realtime else []
             process = subprocess.Popen([sys.executable, PROGRAM, *options], stdin=subprocess.PIPE, stderr=log)
         self.foreigners.append(process)
         assert process.stdin is not None
         with process.stdin as pipe:
-            if not wall:
+            if not realtime:
                 pipe.write(msgspec.json.encode(replace(self._first[name], connect=(self.endpoint,))))
 
     def _started(self, children: Children) -> None:

@@ -68,7 +68,7 @@ class Town:
         self.endpoint = free_endpoint() if keys_folder is None else free_endpoint("tls/127.0.0.1:0")
         self.plant_config = replace(
             plant,
-            clock="wall",
+            clock="realtime",
             end=None,
             listen=(self.endpoint,),
             links=links,
@@ -78,7 +78,7 @@ class Town:
         self.plant_config = replace(self.plant_config, **changes)
         connect = (self.endpoint, *also)
         self.agent_configs = {
-            config.name: replace(config, clock="wall", connect=connect, deadline=PATIENCE, links=links)
+            config.name: replace(config, clock="realtime", connect=connect, deadline=PATIENCE, links=links)
             for config in agents
         }
         beside = "tcp/127.0.0.1:0"
@@ -111,7 +111,7 @@ class Town:
         self.link_record = LinkRecord()
         self.tokens: set[str] = set()
         self.session = Session(
-            "observer", listen=(beside,), connect=connect, clock="wall", credentials=self.plant_config.credentials
+            "observer", listen=(beside,), connect=connect, clock="realtime", credentials=self.plant_config.credentials
         )
         for name in self.agent_configs:
             self.session.subscribe(self.keys.status(name))

@@ -115,7 +115,7 @@ class Session:
             zenoh.init_log_from_env_or(_REFUSED_LINKS)
         self.inbox = inbox or Inbox(lossless=clock == "simulated")
         self._zenoh = zenoh
-        self._drops = clock == "wall"
+        self._drops = clock == "realtime"
         self._publishers: dict[str, zenoh.Publisher] = {}
         self._declared: list[Any] = []
         self._tokens: dict[str, zenoh.LivelinessToken] = {}
@@ -131,7 +131,7 @@ class Session:
             link, config["access_control"] = credentials.zenoh_settings(star=star)
             config["transport"]["link"] |= link
         self._session = self._open(who, config)
-        self._changeable = clock == "wall" and gossip and bool(connect) and not rendezvous
+        self._changeable = clock == "realtime" and gossip and bool(connect) and not rendezvous
         try:
             while in_star and not self._meets_router():
                 pass  # a signal ends this wait, as it would not end the opening of a client
@@ -143,7 +143,7 @@ class Session:
             self._session = self._open(who, config | {"mode": "client", "listen": {"endpoints": []}})
             self._changeable = False
         self._links: Any = None
-        if clock == "wall" or credentials is not None:
+        if clock == "realtime" or credentials is not None:
             # no callback: one during the end of Python would abort the process
             channel: Any = zenoh.handlers.RingChannel(1)
             self._links = self._session.info.declare_link_events_listener(channel, history=True)

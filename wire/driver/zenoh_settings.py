@@ -13,7 +13,7 @@ ONE_THREAD = "(rx: (handover: app), acc: (handover: app), net: (handover: app), 
 a message then wakes one thread of Zenoh instead of two."""
 
 
-Clock = Literal["simulated", "wall"]
+Clock = Literal["simulated", "realtime"]
 
 MOST_BYTES = 8_000_000
 """Longest message that Zenoh puts together, in bytes; its default is 1 GiB for each link. After a longer one it passes
@@ -24,9 +24,9 @@ def zenoh_settings(
     listen: tuple[str, ...], connect: tuple[str, ...], *, gossip: bool, clock: Clock, meets_all: bool
 ) -> dict[str, Any]:
     """Return Zenoh's configuration of a peer; parameters are those of `gridpeers.wire.driver.session.Session`."""
-    wall = clock == "wall"
-    first, longest, growth = (100, 500, 2.0) if wall else (20, 50, 1.5)
-    open_within = 1_000 if wall else 10_000
+    realtime = clock == "realtime"
+    first, longest, growth = (100, 500, 2.0) if realtime else (20, 50, 1.5)
+    open_within = 1_000 if realtime else 10_000
     return {
         "mode": "peer",
         "listen": {"endpoints": list(listen)},
@@ -62,11 +62,13 @@ def zenoh_settings(
                 "tx": {
                     # In simulated time a day, because it must not decide: the death of a process closes its links at
                     # once, the deadlines of the lock-step detect a frozen one, and a whole run may be frozen for hours.
-                    "lease": 2_000 if wall else 86_400_000,
+                    "lease": 2_000 if realtime else 86_400_000,
                     "keep_alive": 4,
                     # A message that may not be dropped waits so long (us) for a full link; then the link is closed. A
                     # plant that waits holds up the control of all others in real time.
-                    "queue": {"congestion_control": {"block": {"wait_before_close": 200_000 if wall else 5_000_000}}},
+                    "queue": {
+                        "congestion_control": {"block": {"wait_before_close": 200_000 if realtime else 5_000_000}}
+                    },
                 },
                 "rx": {"max_message_size": MOST_BYTES},
             },

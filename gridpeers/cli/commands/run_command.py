@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, cast
 
 import typer
 
@@ -29,6 +29,7 @@ from gridpeers.wire.driver.command_line import command_line
 if TYPE_CHECKING:
     from gridpeers.plant.equipment import Tables
     from gridpeers.runs.choices import Pace
+    from gridpeers.scenarios.run_request import Clock
     from gridpeers.scenarios.schema import ScenarioModel
 
 
@@ -39,11 +40,13 @@ def run(
         typer.Option(help="processes: a plant process and one process per agent, over Zenoh; inprocess: all in one."),
     ] = "processes",
     clock: Annotated[
-        Literal["simulated", "wall"],
-        typer.Option(help="simulated: in lock-step, the same result every time; wall: real time, agents run freely."),
+        str,
+        option(
+            "simulated|realtime", "simulated: in lock-step, the same result every time; realtime: agents run freely."
+        ),
     ] = "simulated",
-    speed: Annotated[float, option("X", "With --clock wall: seconds of the run per second of real time.")] = 1.0,
-    strict: Annotated[bool, flag("With --clock wall: break the run when it cannot keep pace.", "--strict")] = False,
+    speed: Annotated[float, option("X", "With --clock realtime: seconds of the run per second of real time.")] = 1.0,
+    strict: Annotated[bool, flag("With --clock realtime: break the run when it cannot keep pace.", "--strict")] = False,
     plant: Annotated[
         str | None,
         option("NAME", "What simulates the plant: gridpeers, gridlabd or helics; else as the scenario says."),
@@ -76,7 +79,7 @@ def run(
     from gridpeers.scenarios.run import run as run_scenario
     from gridpeers.scenarios.run_request import BrokenRunError, LawStopError, Request
 
-    pace: Pace = {"clock": clock, "speed": speed, "strict": strict, "processes": processes, "keys": keys}
+    pace: Pace = {"clock": cast("Clock", clock), "speed": speed, "strict": strict, "processes": processes, "keys": keys}
     check_how(driver, pace, spec, dash="--")
     if keys is not None:
         _check_keys(keys, spec, feeder)

@@ -49,7 +49,7 @@ class Start:
     connect: Annotated[
         list[str] | None, option("ENDPOINT", "Endpoint that the plant connects to, e.g. a Zenoh router; repeatable.")
     ] = None
-    speed: Annotated[float, option("X", "Run time per real time, 0.1 to 50.")] = 1.0
+    speed: Annotated[float, option("X", "Seconds of the run per second, 0.1 to 50; 1 is real time.")] = 1.0
     wait: Annotated[float, option("SECONDS", "How long the plant waits for its agents before it starts.")] = 30.0
     duration: Annotated[float | None, option("SECONDS", "Run time of the end; no end if left out.", "--for")] = None
     strict: Annotated[bool, flag("End with exit code 3 if the plant cannot keep pace.", "--strict")] = False
@@ -115,7 +115,7 @@ def _start(start: Start, *, agents: bool) -> None:
             outcome = plant_here(config, kept.record, info)
         if kept.whole is not None:
             metrics = Request(
-                scenario=spec, feeder=feeder, driver=LIVE, folder=kept.whole, clock="wall", speed=start.speed
+                scenario=spec, feeder=feeder, driver=LIVE, folder=kept.whole, clock="realtime", speed=start.speed
             )
             outcome = conclude(outcome, metrics)
         elif outcome.failed_laws:

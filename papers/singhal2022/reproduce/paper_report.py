@@ -60,8 +60,8 @@ class Reproduction:
 
     @property
     def took(self) -> str:
-        wall, cpu = sum(result.wall_s for result in self.results), sum(result.cpu_s for result in self.results)
-        return f"{wall:.0f} s, {cpu:.0f} s of processor time"
+        elapsed, cpu = sum(result.elapsed_s for result in self.results), sum(result.cpu_s for result in self.results)
+        return f"{elapsed:.0f} s, {cpu:.0f} s of processor time"
 
 
 def settings(scenarios: Mapping[str, theory.ScenarioModel]) -> list[tuple[str, str, str]]:
@@ -213,7 +213,7 @@ def metrics_json(whole: Reproduction) -> str:
         "started": whole.started,
         "machine": machine(),
         "versions": versions(),
-        "times_s": {result.part.name: {"wall": result.wall_s, "cpu": result.cpu_s} for result in whole.results},
+        "times_s": {result.part.name: {"wall": result.elapsed_s, "cpu": result.cpu_s} for result in whole.results},
         "tables": [
             _number(result, cell) for result in whole.results for table in result.tables for cell in table.cells
         ],

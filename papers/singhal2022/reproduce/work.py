@@ -94,7 +94,7 @@ class PartResult:
     """Hash of each case's history.csv, by case."""
     metrics: Any
     """Contents of its metrics.json; None for the topologies."""
-    wall_s: float
+    elapsed_s: float
     cpu_s: float
     """Processor time (s) of all its processes."""
 
@@ -150,7 +150,7 @@ class Work:
             before += self._length(part)
 
     def _part(self, part: ReportPart, before: float, tell: TellPart, figures: bool) -> PartResult:
-        wall, cpu = perf_counter(), sum(os.times()[:4])
+        elapsed, cpu = perf_counter(), sum(os.times()[:4])
         length = self._length(part)
         do = self._topology if part.name == TOPOLOGY else self._scenario
         found, sha256, metrics, plot = do(
@@ -171,7 +171,7 @@ class Work:
             figures={picture: png for picture, (png, *_) in zip(pictures, files, strict=True)},
             sha256=sha256,
             metrics=metrics,
-            wall_s=perf_counter() - wall,
+            elapsed_s=perf_counter() - elapsed,
             cpu_s=sum(os.times()[:4]) - cpu,
         )
 

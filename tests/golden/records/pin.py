@@ -39,7 +39,7 @@ def main() -> None:
         },
     )
     with tempfile.TemporaryDirectory() as folder:
-        scenario.run("ring", driver="processes", clock="wall", folder=Path(folder) / "run")
+        scenario.run("ring", driver="processes", clock="realtime", folder=Path(folder) / "run")
         shutil.copy(Path(folder) / "run" / "ring" / "run.mcap", RECORD)
     for (command, *words), file in SAID.items():
         file.write_text(invoke(command, str(RECORD), *words)[1], encoding="utf-8")

@@ -39,7 +39,7 @@ def result(folder: Path, f_error: float = 0.136) -> PartResult:
         figures=dict.fromkeys(ISLANDING.picture, image),
         sha256={"IV": "1b14ee14"},
         metrics={"seed": 1},
-        wall_s=1.0,
+        elapsed_s=1.0,
         cpu_s=2.0,
     )
 

@@ -194,7 +194,7 @@ def test_a_run_that_has_ended_is_offered_as_a_record(desk: Desk, browser: Browse
     few = 'graph = "full"\nwithout_agent = ["inv3", "inv5", "inv6", "inv7", "inv8", "inv9"]\n'
     text = ISLANDED.format(end=2.0).replace('graph = "full"\n', few)
     (desk.folder / "it.toml").write_text(text, encoding="utf-8")
-    run = desk.open_bare("run", "it.toml", "--clock", "wall", "--out", "out")
+    run = desk.open_bare("run", "it.toml", "--clock", "realtime", "--out", "out")
     wait_for(desk.folder / "out" / "status.txt", "running")
     view = desk.open_bare("view", "out", "--port", "0")
     url = view.expect(r"open (http://\S+) in a browser; Ctrl-C ends the page")[1]

@@ -144,10 +144,10 @@ def test_a_damaged_wheel_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyP
 def test_gridlabd_keeps_no_real_time(tmp_path: Path) -> None:
     """A second of it takes more than a second, so real time is refused in one line."""
     (tmp_path / "mine.toml").write_text(TWO_CASES.format(end=1.0))
-    code, text = invoke("run", "islanding", "--plant", "gridlabd", "--clock", "wall")
+    code, text = invoke("run", "islanding", "--plant", "gridlabd", "--clock", "realtime")
 
     assert code == 2
-    assert text == 'gridpeers: --clock wall: the plant of "gridlabd" cannot run in real time; use --clock simulated\n'
+    assert text == 'gridpeers: --clock realtime: the plant of "gridlabd" cannot run in real time; use --clock simulated\n'
     for live in ("plant", "up"):
         code, text = invoke(live, str(tmp_path / "mine.toml"), "--listen", "tcp/127.0.0.1:0")
         assert (code, text.count("\n")) == (2, 1)

@@ -104,8 +104,8 @@ def test_an_agent_that_ends_its_process_breaks_the_run(status: int, end: float, 
 def test_an_agent_that_ends_its_process_fails_a_run_in_real_time(tmp_path: Path) -> None:
     """The run goes on, as the others would, and its record has the event that a failed law has."""
     plant, agents = toy_configs(4, quitting(tmp_path, 0), end=1.0)
-    plant = msgspec.structs.replace(plant, clock="wall")
-    run = ProcessRun(plant, [msgspec.structs.replace(agent, clock="wall") for agent in agents], tmp_path / "log")
+    plant = msgspec.structs.replace(plant, clock="realtime")
+    run = ProcessRun(plant, [msgspec.structs.replace(agent, clock="realtime") for agent in agents], tmp_path / "log")
     outcome = run()
     (failed,) = law_failures(run.events)
 

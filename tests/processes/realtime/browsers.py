@@ -29,7 +29,7 @@ WAIT = 80_000
 """Longest wait (ms) for anything on the page."""
 
 SLOW = "0.2"
-"""Speed of the runs: a control period is 100 ms of wall time, so that a busy machine keeps pace."""
+"""Speed of the runs: a control period is 100 ms of real time, so that a busy machine keeps pace."""
 
 
 @contextmanager

@@ -45,7 +45,7 @@ def lives(run: ProcessRun, name: str) -> tuple[Child, ...]:
 
 @pytest.mark.parametrize(
     ("clock", "schedule"),
-    [("simulated", AWAY), ("wall", ((0.4, "inv2", "leave"), (0.8, "inv2", "join")))],
+    [("simulated", AWAY), ("realtime", ((0.4, "inv2", "leave"), (0.8, "inv2", "join")))],
 )
 def test_the_process_ends_and_a_new_one_is_started(tmp_path: Path, clock: str, schedule: Schedule) -> None:
     """The leaver's process ends well before the new one starts, both end with status 0, and each has its own log."""
@@ -76,8 +76,8 @@ class Broken(ToyPlant):
         raise ZeroDivisionError("no step")
 
 
-@pytest.mark.parametrize("clock", ["wall", "simulated"])
-def test_agents_are_told_to_close_whatever_broke_the_plant(clock: Literal["wall", "simulated"]) -> None:
+@pytest.mark.parametrize("clock", ["realtime", "simulated"])
+def test_agents_are_told_to_close_whatever_broke_the_plant(clock: Literal["realtime", "simulated"]) -> None:
     """An error that is no PlantError, too, ends the run with a Stop to all: no agent outlives its plant."""
     endpoint = free_endpoint()
     config, _ = toy_configs(1, end=5.0)

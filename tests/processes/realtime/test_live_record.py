@@ -30,7 +30,7 @@ def recorded(folder: Path, plant: PlantConfig, agents: list[AgentConfig]) -> Run
     info = RecordInfo(
         level=plant.record,
         scenario="toy",
-        case="wall",
+        case="realtime",
         toml="",
         seed=7,
         driver="processes",
@@ -39,11 +39,11 @@ def recorded(folder: Path, plant: PlantConfig, agents: list[AgentConfig]) -> Run
         plant=plant,
         agents=tuple(agents),
     )
-    with Recorder(folder / "wall", gaps=True, record=info) as recorder:
+    with Recorder(folder / "realtime", gaps=True, record=info) as recorder:
         outcome = run_processes(plant, agents, folder / "log", recorder, on_other=recorder, plant_command=TOY)
         assert outcome.broke == ""
         recorder.finish()
-    return RunRecord.open(folder / "wall")
+    return RunRecord.open(folder / "realtime")
 
 
 @pytest.fixture(scope="module")
@@ -62,9 +62,9 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> RunRecord:
     microgrids = {f"inv{k}": "mg1" for k in (1, 2, 3, 4)}
     links = EmulationConfig(netem=netem, microgrids=microgrids, real_nodes=True).to_tree()
     plant, agents = toy_configs(4, end=3.4)
-    wall = {"clock": "wall", "links": links, "record": "all"}
-    folder = tmp_path_factory.mktemp("wall")
-    return recorded(folder, replace(plant, **wall), [replace(agent, **wall) for agent in agents])
+    realtime = {"clock": "realtime", "links": links, "record": "all"}
+    folder = tmp_path_factory.mktemp("realtime")
+    return recorded(folder, replace(plant, **realtime), [replace(agent, **realtime) for agent in agents])
 
 
 def test_every_decision_can_be_made_again(record: RunRecord) -> None:

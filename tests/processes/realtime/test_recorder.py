@@ -79,7 +79,7 @@ MOST = 4.0
 """Run time (s) of a run beyond which it would take long to read."""
 
 
-@pytest.mark.parametrize(("who", "clock"), [("plant", "wall"), ("inv1", "simulated")])
+@pytest.mark.parametrize(("who", "clock"), [("plant", "realtime"), ("inv1", "simulated")])
 def test_a_killed_process_leaves_a_record(who: str, clock: Clock, tmp_path: Path) -> None:
     """Decisions are made again from all that is there, if what it records was killed."""
     assert_usable(killed(tmp_path / "run", clock, 1.3, who, most=MOST), complete=who == "plant")
@@ -91,7 +91,7 @@ def test_a_killed_command_leaves_a_record(clock: Clock, tmp_path: Path) -> None:
     left = killed(tmp_path / "run", clock, 0.6, most=MOST)
 
     assert_usable(left)
-    if clock == "wall":
+    if clock == "realtime":
         assert_commands_read(left.record)
 
 
@@ -116,7 +116,7 @@ ROOM = 180_000
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("run", "--clock", "wall"), "here/calm/run.mcap: cannot be written: File too large"),
+        (("run", "--clock", "realtime"), "here/calm/run.mcap: cannot be written: File too large"),
         (("up", "--run", "full", "--for", "7", "--listen", "tcp/127.0.0.1:0"), "s: File too large"),
     ],
 )

@@ -38,7 +38,7 @@ def run() -> Result:
             }
         },
     )
-    return scenario.run("IV", driver="processes", clock="wall")
+    return scenario.run("IV", driver="processes", clock="realtime")
 
 
 def test_a_replay_gives_the_set_points_of_the_run(run: Result) -> None:

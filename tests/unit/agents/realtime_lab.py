@@ -23,7 +23,7 @@ class Lab:
     """inv1 on a fake clock, with everything around it played by the test."""
 
     def __init__(self, law: Law | None = None, **changes: Any) -> None:
-        config = replace(agent_config("inv1"), clock="wall", **changes)
+        config = replace(agent_config("inv1"), clock="realtime", **changes)
         self.now = 100.0
         self.side = AgentNode(config, "me", law=law)
         self.listened: list[str] = []

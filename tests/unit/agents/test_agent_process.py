@@ -54,7 +54,7 @@ class Played:
 
 
 def ended(*events: Stamped | BaseException) -> Played:
-    agent = AgentNode(replace(agent_config("inv1"), clock="wall"), "me")
+    agent = AgentNode(replace(agent_config("inv1"), clock="realtime"), "me")
     session = Played(("appeared", PLANT_TOKEN, b"", monotonic()), *events)
     with pytest.raises(StoppedError):
         take_part(agent, (agent,), cast(Session, session), logging.getLogger("test"))

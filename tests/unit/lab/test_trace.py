@@ -49,7 +49,7 @@ def test_in_ticks_a_message_arrives_with_the_decision_that_can_use_it() -> None:
     ]
     assert [flow.arrived for flow in found[:2]] == [pytest.approx(0.12), pytest.approx(0.17)]
     assert found[0][1:3] == ("inv2", "inv1")
-    assert judged((0.1, 0.003), clock="wall")[0].arrived == pytest.approx(0.103)
+    assert judged((0.1, 0.003), clock="realtime")[0].arrived == pytest.approx(0.103)
 
 
 def test_in_real_time_messages_arrive_when_their_receivers_noted_them(tmp_path: Path) -> None:
@@ -84,6 +84,6 @@ def test_with_speed_the_way_of_a_message_is_run_time() -> None:
         (heard, ReceivedMessage(10.001, "state/inv2", payload, "stale")),
     )
 
-    found = flows(record_of(clock="wall", speed=10.0, entries=entries))
+    found = flows(record_of(clock="realtime", speed=10.0, entries=entries))
 
     assert found == [Flow(0.1, "inv2", "inv1", 5, pytest.approx(0.11), "stale")]

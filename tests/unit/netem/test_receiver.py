@@ -117,11 +117,11 @@ def test_a_cut_on_a_link_shifts_no_other_fate_on_it(kinds: set[str], start: int)
 def test_a_message_fares_alike_in_simulated_and_wall_clock_time(kinds: set[str], missed: set[int]) -> None:
     """Times that wander, a way that takes time and messages never seen change no fate, nor does another process."""
     fault = Fault(on="inv1 -> inv2", **{kind: KINDS[kind] for kind in kinds})
-    simulated, wall = receiver(fault), receiver(fault)
+    simulated, realtime = receiver(fault), receiver(fault)
     send(simulated, range(100))
     for k in sorted(set(range(100)) - missed):
-        wall.offer("inv1", k, 0.7 + k * 0.0213, 0.703 + k * 0.0213, PAYLOAD)
-    fates, seen = outcomes(simulated.take_trace()), outcomes(wall.take_trace())
+        realtime.offer("inv1", k, 0.7 + k * 0.0213, 0.703 + k * 0.0213, PAYLOAD)
+    fates, seen = outcomes(simulated.take_trace()), outcomes(realtime.take_trace())
 
     assert seen.get("inv1", {}) == {k: v for k, v in fates["inv1"].items() if k not in missed}
 

@@ -76,7 +76,7 @@ def test_a_record_of_any_size_is_judged(sound: CheckedCase, monkeypatch: pytest.
         _ = large.content
 
 
-@pytest.mark.parametrize("clock", ["simulated", "wall"])
+@pytest.mark.parametrize("clock", ["simulated", "realtime"])
 def test_the_memory_of_a_pass_does_not_grow_with_the_run(sound: CheckedCase, clock: str) -> None:
     """Three times the run, the same memory: what is done with is forgotten."""
     info = sound.content.info

@@ -40,7 +40,7 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("clock", ["simulated", "wall"])
+@pytest.mark.parametrize("clock", ["simulated", "realtime"])
 @pytest.mark.parametrize("bad", BAD)
 def test_what_is_none_of_ours_is_counted_and_the_rest_is_read(bad: str, clock: str) -> None:
     """One bad entry of one agent, between sound ones of it and of another: both have their states."""
@@ -76,7 +76,7 @@ def test_a_new_session_in_a_journal_begins_new_accounts_of_links() -> None:
     heard = [["heard", 1.0, "state/inv1", 1, k, ""] for k in range(10) if k not in (5, 6)]
     other = [[*entry[:2], "state/inv2", entry[3].replace(b"inv1", b"inv2")] for entry in states]
     found = {
-        renewed: judged([("inv1", packed(*states)), ("inv2", packed(*heard, *entries))], clock="wall")
+        renewed: judged([("inv1", packed(*states)), ("inv2", packed(*heard, *entries))], clock="realtime")
         for renewed, entries in ((True, [*other[:6], new, *other[6:]]), (False, other))
     }
 

@@ -145,7 +145,7 @@ def test_the_command_to_close_in_step_is_answered_with_the_differences(network: 
     """`gridpeers event close --synchronised` is refused with the plant's reason, and the run goes on."""
     p = plant(network)
     run(p, 2.5)
-    config = replace(toy_configs(9, end=60.0)[0], clock="wall")
+    config = replace(toy_configs(9, end=60.0)[0], clock="realtime")
     side = PlantNode(config, p)
     side.start(0.0)
     command = Command(sender="visitor", epoch=0, seq=0, t=0.0, verb="synchronise", argument="13-152", reply_to="v")

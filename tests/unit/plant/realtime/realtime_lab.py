@@ -20,7 +20,9 @@ class Lab(PlantLab):
         config, _ = toy_configs(n, end=2.0)
         settings = replace(config.settings, spares=spares)
         agents = tuple(name for name in config.agents if name not in spares)
-        super().__init__(replace(config, **{"clock": "wall", "settings": settings, "agents": agents} | changes), 50.0)
+        super().__init__(
+            replace(config, **{"clock": "realtime", "settings": settings, "agents": agents} | changes), 50.0
+        )
 
     def leave(self, name: str, epoch: int = 1) -> None:
         """An agent says that it leaves."""

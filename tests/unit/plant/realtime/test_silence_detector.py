@@ -140,7 +140,7 @@ def test_an_agent_that_has_no_measurement_is_told_from_one_that_is_frozen(at: in
 
 @pytest.mark.parametrize("period", [0.02, 0.001])
 def test_who_was_never_heard_is_told_of_once_both_had_time_to_meet(period: float) -> None:
-    """-1 means never: a second of wall time after a join, at every speed, that is news."""
+    """-1 means never: a second of real time after a join, at every speed, that is news."""
     silence = SilenceDetector(max_age=0.25, T_c=0.02, period=period)
     for name in NAMES:
         silence.joined(name)

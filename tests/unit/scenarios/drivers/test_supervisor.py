@@ -124,7 +124,7 @@ def test_process_faults_come_in_turn_and_no_process_stays_paused(monkeypatch: py
 
     children: Any = {name: Victim(name) for name in ("inv1", "inv2", "inv3")}
     links = EmulationConfig(netem=Netem(nodes=nodes), microgrids=MICROGRIDS, real_nodes=True).to_tree()
-    injector = FaultInjector(replace(toy_configs(3)[0], clock="wall", speed=2.0, links=links))
+    injector = FaultInjector(replace(toy_configs(3)[0], clock="realtime", speed=2.0, links=links))
     injector.inject(children)
     injector.note_time(0.02, 100.0)
     for _ in range(5):

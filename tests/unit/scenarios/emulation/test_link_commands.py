@@ -36,7 +36,7 @@ CUT = LinkCommand(fault=Fault(on="inv2 -> inv1", cut=True)).to_tree()
 def agent_lab() -> agent_side.Lab:
     """The agent of inv1, which ticks and hears inv2, behind links without a fault."""
     lab = agent_side.Lab()
-    lab.side = AgentNode(replace(agent_config("inv1"), clock="wall"), "me", EmulatedLinks("inv1", SETUP))
+    lab.side = AgentNode(replace(agent_config("inv1"), clock="realtime"), "me", EmulatedLinks("inv1", SETUP))
     lab.side.start(lab.now)
     lab.token("plant")
     lab.meet("inv2")

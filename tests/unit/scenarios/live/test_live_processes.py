@@ -159,7 +159,7 @@ def measured(
 ) -> tuple[dict[str, Any], str, Drawing]:
     """Case IV in metrics.json, the report, and the data of the figures, of a run that ended then (s)."""
     scenario, feeder = one_case()
-    clock = "wall" if driver == "live" else "simulated"
+    clock = "realtime" if driver == "live" else "simulated"
     ran = Request(scenario=scenario, feeder=feeder, driver=driver, folder=folder, clock=clock)  # type: ignore[arg-type]
     rows = [row for row in recorded.history.table.tolist() if row[0] <= until]
     events = [event for event in recorded.events if event.t <= until]

@@ -190,7 +190,9 @@ def index_of(clock: str, speed: float, T_c: float = 0.02) -> MessageIndex:
     return MessageIndex(cast(RecordFile, SimpleNamespace(info=info, ends=ends)))
 
 
-@pytest.mark.parametrize(("clock", "speed", "last"), [("simulated", 40.0, 12), ("wall", 1.0, 12), ("wall", 10.0, 30)])
+@pytest.mark.parametrize(
+    ("clock", "speed", "last"), [("simulated", 40.0, 12), ("realtime", 1.0, 12), ("realtime", 10.0, 30)]
+)
 def test_what_comes_late_by_the_clock_is_looked_for_at_the_speed_of_the_run(
     clock: str, speed: float, last: int
 ) -> None:
