@@ -23,9 +23,9 @@ class Outcome:
     """Notes for a person though the run went on: processes that died, messages that were dropped."""
     ticks: int
     start_s: float
-    """Wall time (s) until the first row."""
+    """Time (s) until the first row."""
     run_s: float
-    """Wall time (s) from the first row to the end."""
+    """Time (s) from the first row to the end."""
     pacing: Pacing | None = None
 
 

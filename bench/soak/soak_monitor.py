@@ -58,7 +58,7 @@ class SoakMonitor:
         """Take the status of an agent."""
         self._statuses[message.sender] = now, message
 
-    def wall_time(self, t: float) -> float:
+    def real_time(self, t: float) -> float:
         """Return the time (s, monotonic) of a run time (s)."""
         return t + min(self._offsets)
 

@@ -119,12 +119,12 @@ class SoakRun(WatchedRun):
         deaf = self._client.renewals
         if one.ends_itself:
             begin = self._from(self._command("link", "cut", *links, "--for", f"{one.seconds:g}"))
-            healed = self.monitor.wall_time(begin + one.seconds)
+            healed = self.monitor.real_time(begin + one.seconds)
             self.rest(max(0.0, healed - monotonic()))
         else:
             self._command("link", "cut", *links)
             self.rest(one.seconds)
-            healed = self.monitor.wall_time(self._from(self._command("link", "heal", *links)))
+            healed = self.monitor.real_time(self._from(self._command("link", "heal", *links)))
         self._wait("heal", lambda: self.monitor.use_each_other(some, others, healed), healed, one, deaf)
 
     def _impair(self, one: SoakAction) -> None:

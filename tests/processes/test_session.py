@@ -61,7 +61,7 @@ def take_one(session: Session) -> tuple[str, str, bytes]:
     return kind, key, payload
 
 
-def test_only_in_wall_clock_time_a_link_may_be_given_up_early_and_newest_values_dropped() -> None:
+def test_only_in_real_time_a_link_may_be_given_up_early_and_newest_values_dropped() -> None:
     """Lock-step drops nothing and waits Zenoh's 5 s; real time drops stale values and waits 200 ms."""
     found = {}
     for clock in ("simulated", "realtime"):

@@ -46,7 +46,7 @@ class Left(NamedTuple):
 
     record: RunRecord
     lost: float
-    """Wall time (s) from the record's last chunk to the kill; its nodes had kept the first of it for 0.2 s."""
+    """Time (s) from the record's last chunk to the kill; its nodes had kept the first of it for 0.2 s."""
 
 
 def killed(folder: Path, clock: Clock, after: float, who: str = "command", *, most: float) -> Left:

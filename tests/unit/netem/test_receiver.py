@@ -114,7 +114,7 @@ def test_a_cut_on_a_link_shifts_no_other_fate_on_it(kinds: set[str], start: int)
 
 @steady
 @given(st.sets(st.sampled_from(["delay", "loss", "duplicate", "corrupt"]), min_size=1), st.sets(st.integers(0, 99)))
-def test_a_message_fares_alike_in_simulated_and_wall_clock_time(kinds: set[str], missed: set[int]) -> None:
+def test_a_message_fares_alike_in_simulated_and_real_time(kinds: set[str], missed: set[int]) -> None:
     """Times that wander, a way that takes time and messages never seen change no fate, nor does another process."""
     fault = Fault(on="inv1 -> inv2", **{kind: KINDS[kind] for kind in kinds})
     simulated, realtime = receiver(fault), receiver(fault)

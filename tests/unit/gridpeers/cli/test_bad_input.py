@@ -21,7 +21,6 @@ MINE = "--listen tcp/127.0.0.1:0"  # a run of somebody may be at the default end
 MISTYPED = [
     ("rnu", 'no command "rnu"; did you mean "run"?\n'),
     ("link sett", 'no command "sett"; did you mean "set"?\n'),
-    ("link zebra", 'no command "zebra"; the commands are set, cut, heal'),
     ("run", "SCENARIO is missing: e.g. islanding, plug-n-play or partition; gridpeers list shows all"),
     ("run x --driver inproces", "'inprocess'; gridpeers run -h shows what can be given"),
     ("run x --seed -1", "invalid value for '--seed'"),
@@ -37,6 +36,7 @@ MISTYPED = [
     ("agent", "missing argument 'INVERTER'"),
 ]
 UNUSABLE = [
+    ("link zebra", 'no command "zebra"; the commands are set, cut, heal'),
     ("run islandin", 'no scenario "islandin"; did you mean "islanding"?'),
     ("run nowhere.toml", "nowhere.toml: there is no such file"),
     (f"check {'a' * 300}", "cannot be read: File name too long"),

@@ -98,7 +98,7 @@ def test_in_simulated_time_a_newcomer_is_not_given_its_predecessors_set_points()
     assert held[-1] == pytest.approx(0.98)
 
 
-def test_in_wall_clock_time_a_ghost_is_not_held_and_does_not_block_the_newcomer() -> None:
+def test_in_real_time_a_ghost_is_not_held_and_does_not_block_the_newcomer() -> None:
     """The new process counts from 0, in an epoch that is even lower; only what it says is held, once it is there."""
     lab = Lab(3, end=9.0, links=LATE)
     config = lab.node.config
