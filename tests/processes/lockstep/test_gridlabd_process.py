@@ -147,7 +147,7 @@ def test_gridlabd_keeps_no_real_time(tmp_path: Path) -> None:
     code, text = invoke("run", "islanding", "--plant", "gridlabd", "--clock", "realtime")
 
     assert code == 2
-    assert text == 'gridpeers: --clock realtime: the plant of "gridlabd" cannot run in real time; use --clock simulated\n'
+    assert text.startswith('gridpeers: --clock realtime: the plant of "gridlabd" cannot run in real time; use ')
     for live in ("plant", "up"):
         code, text = invoke(live, str(tmp_path / "mine.toml"), "--listen", "tcp/127.0.0.1:0")
         assert (code, text.count("\n")) == (2, 1)
