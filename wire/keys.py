@@ -202,8 +202,8 @@ KEY_SPECS = (
     ),
     KeySpec(
         "journal/<inverter>", "publication", "Journal", _AGENT, _PLANT,
-        "in a recorded run: with each change of the inputs of its decisions; real time: every 0.2 s (the plant "
-        "publishes it on telemetry)",
+        "in a recorded run: when ages, weights or reasons of the used states change; real time: every 0.2 s (the "
+        "plant publishes it on telemetry)",
     ),
     KeySpec(
         "link_request/<inverter>", "publication", "LinkRequest", _PLANT, _AGENT,

@@ -66,8 +66,8 @@ def test_a_feeder_says_its_own_nominal_frequency(tmp_path: Path) -> None:
     assert load_scenario(override)[1].f_nom == 60.0
 
 
-def test_an_inverter_without_agent_keeps_its_set_points_and_is_left_out_of_the_sharing(tmp_path: Path) -> None:
-    """It stays on droop at 0.647 pu while the others share what is left, and the numbers say who is meant."""
+def test_an_inverter_without_agent_keeps_its_set_points_and_does_not_share(tmp_path: Path) -> None:
+    """It stays on droop at 0.647 pu while the others share the rest; the numbers name the inverters that share."""
     text = ISLANDING.replace('secondary = "all"', 'secondary = "all"\nwithout_agent = ["inv2"]').replace("7.0", "4.2")
     path = written(tmp_path, text)
     scenario, feeder = load_scenario(path)
@@ -118,8 +118,8 @@ def test_agents_restore_and_share_on_single_phases(islanded: gp.Scenario) -> Non
     assert islanded.run("IV", "processes").sha256 == ran.sha256
 
 
-def test_what_gridlabd_cannot_do_with_single_phases_is_named_at_once(islanded: gp.Scenario) -> None:
-    """It takes one inverter a bus, and keeps no island alive whose GFM are all single-phase."""
+def test_limits_of_gridlabd_with_single_phases_are_named_at_once(islanded: gp.Scenario) -> None:
+    """GridLAB-D takes one inverter per bus, and keeps no island with single-phase GFM alone."""
     with pytest.raises(ValueError, match="takes one inverter a bus") as refused:
         islanded.replace({"plant.simulator": "gridlabd", "event[0].open": ["grid", "lateral"]})
 
@@ -153,7 +153,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Result:
 
 
 def test_the_events_of_a_run_have_its_loads(run: Result) -> None:
-    """Each is a row, at its time, with the power that the load has from then on."""
+    """Each change is a row with its time and the new power."""
     loads = run.events[run.events["kind"] == "load"]
 
     assert list(zip(loads["t"], loads["subject"], strict=True)) == [(0.6, "48"), (0.6, "76")]

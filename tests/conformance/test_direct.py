@@ -57,12 +57,12 @@ def test_every_graph_gives_the_same_telemetry(graph: GraphRule) -> None:
     ],
 )
 def test_every_option_for_degraded_communication_gives_the_same_telemetry(options: DegradedCommunication) -> None:
-    """Arrivals, ages, angles and saturation are as with messages."""
+    """Arrivals, ages, angles and saturation equal those with messages."""
     both(Control(secondary="all", graph="ring", degraded_communication=options))
 
 
 def test_a_law_that_keeps_quiet_is_counted_and_its_last_state_stays() -> None:
-    """Neighbours use the last state that was sent, and telemetry counts those that were not."""
+    """Neighbours use the last sent state, and telemetry counts the quiet ones."""
     telemetry, *_ = both(Control(secondary="all", graph="ring", law=LawChoice(use="event-triggered")))
 
     assert sum(count for message in telemetry for _, count in message.quiet) > 20
@@ -89,7 +89,7 @@ def test_the_feeder_gives_the_same_telemetry() -> None:
 
 @pytest.mark.usefixtures("no_bus")
 def test_a_run_in_which_messages_decide_nothing_has_none() -> None:
-    """It gets to its end without the bus."""
+    """The run ends without the bus."""
     assert told(*toy_configs(3), messages=False)[1] == ""
 
 

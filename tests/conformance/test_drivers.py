@@ -57,7 +57,7 @@ def driver(request: pytest.FixtureRequest, tmp_path: Path) -> Driver:
     return in_one_process if request.param == "inprocess" else with_processes
 
 
-def test_a_run_ends_well(driver: Driver) -> None:
+def test_a_run_ends_in_order(driver: Driver) -> None:
     """The last tick is reported, nothing is dropped, and islanding is an event."""
     ran = driver(*toy_configs(4))
 
@@ -71,7 +71,7 @@ def test_a_run_ends_well(driver: Driver) -> None:
 
 @pytest.mark.parametrize(("processes", "graph"), [(1, "ring"), (4, "full"), (6, "clustered")])
 def test_agents_find_the_same_neighbours_in_any_processes(processes: int, graph: GraphRule, tmp_path: Path) -> None:
-    """How agents are spread over processes decides nothing; discovery does as a bus that knows everybody."""
+    """The distribution of agents over processes decides nothing; discovery finds all neighbours."""
     plant, agents = toy_configs(6, Control(secondary="all", graph=graph))
     run = ProcessRun(plant, agents, tmp_path)
 
@@ -83,7 +83,7 @@ def test_agents_find_the_same_neighbours_in_any_processes(processes: int, graph:
 
 
 def test_a_plant_without_solution_breaks_the_run(driver: Driver) -> None:
-    """The outcome is what the plant said, and what came until then is there."""
+    """The outcome is the plant's message; the rows until then are kept."""
     ran = driver(*toy_configs(2, P_set0=1.5))
 
     assert ran.outcome.broke == "no solution at t = 0.1 s: P_set0 is 1.5 pu"
@@ -105,7 +105,7 @@ def test_neither_start_order_nor_hash_seed_matter(tmp_path: Path, monkeypatch: p
 
 
 def test_leaving_and_returning_give_the_same_rows(driver: Driver) -> None:
-    """It shows nowhere how long the new process of who returns took to come up, nor that of a spare that joins."""
+    """The start-up time of a returning agent or of a joining spare changes no row."""
     schedule: Schedule = ((0.2, "inv2", "leave"), (0.3, "inv2", "join"), (0.3, "inv4", "join"))
     plant, agents = toy_configs(4, schedule=schedule, spares=("inv4",))
     expected, ran = in_one_process(plant, agents), driver(plant, agents)

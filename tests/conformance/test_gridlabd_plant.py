@@ -113,7 +113,7 @@ def test_set_points_beyond_an_inverters_bounds_are_limited_on_gridlabd(three_isl
 
 
 def test_an_inverter_without_rest_is_a_warning_on_either_plant(islanding: gp.Scenario) -> None:
-    """inv6 hunts on the edge of its dead band from the start; who reads the events of either plant knows."""
+    """inv6 hunts on the edge of its dead band from the start; the events of both plants say so."""
     hunting = islanding.replace({"plant.gfl.db_UV_pu": 0.005, "plant.gfl.db_OV_pu": 0.005})
     config, _ = configs(hunting.spec, hunting.feeder, "IV")
     texts = []

@@ -22,7 +22,7 @@ def blackout() -> tuple[History, Outcome]:
 
 
 def test_a_blackout_does_not_end_the_run(blackout: tuple[History, Outcome]) -> None:
-    """The collapse, the island that is dead and the black start are events; the run is whole and reproducible."""
+    """Collapse, de-energised island and black start are events; the run is whole and reproducible."""
     history, outcome = blackout
     kinds = [event.kind for event in outcome.events]
 
@@ -33,7 +33,7 @@ def test_a_blackout_does_not_end_the_run(blackout: tuple[History, Outcome]) -> N
     assert any(event.text.startswith("black start by inv1") for event in outcome.events)
 
 
-def test_a_dead_island_reads_nothing_and_everything_in_the_history_is_finite(
+def test_a_de_energised_island_reads_zero_and_the_history_is_finite(
     blackout: tuple[History, Outcome],
 ) -> None:
     """While nothing feeds the island, power, voltage and frequency are 0: not 60 Hz, not a number that is none."""
@@ -105,7 +105,7 @@ def outside(case: str, since: float, until: float) -> Floats:
 
 @pytest.mark.parametrize("case", ["switches", "frequency"])
 def test_each_island_has_60_hz_and_shares_among_its_own(case: str) -> None:
-    """Full graph over three islands: who stands in another is left out, whether the agents are told or find out."""
+    """Full graph over three islands: agents leave out other islands, known by name or by frequency."""
     share = shares(case).reshape(3, 3)
 
     assert f_off(case, END - 0.001, END + 0.001)[1] == pytest.approx(0.0, abs=0.002)
@@ -114,15 +114,15 @@ def test_each_island_has_60_hz_and_shares_among_its_own(case: str) -> None:
     assert share[0, 0] - share[1, 0] > 0.1
 
 
-def test_islands_are_seen_by_frequency_almost_as_fast_as_they_are_told() -> None:
+def test_islands_are_found_by_frequency_almost_as_fast_as_by_switches() -> None:
     """Restored 0.60 s after the switches opened, instead of 0.50 s."""
     told, seen = (outside(case, EVENT, END)[-1] - EVENT for case in ("switches", "frequency"))
 
     assert told < seen < told + 0.2
 
 
-def test_who_was_out_of_step_is_tried_again_after_ten_seconds_and_left_out_again_within_one() -> None:
-    """Nothing else could show that islands are one again; it costs a dip of less than 0.1 Hz."""
+def test_an_agent_out_of_step_is_tried_again_after_ten_seconds_and_left_out_within_one() -> None:
+    """A trial shows whether islands are one again; it costs a dip of less than 0.1 Hz."""
     again = outside("frequency", END, 20.0)
 
     assert len(outside("switches", END, 20.0)) == 0
@@ -131,6 +131,6 @@ def test_who_was_out_of_step_is_tried_again_after_ten_seconds_and_left_out_again
 
 
 def test_without_either_an_error_of_frequency_and_voltage_stays() -> None:
-    """So the rule is needed: the islands would agree on set-points that fit none of them."""
+    """Without the rule the islands agree on set-points that suit none of them."""
     assert f_off("ignored", END - 0.001, END + 0.001)[1] > 0.02
     assert V_off("ignored") > 0.05

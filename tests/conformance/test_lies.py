@@ -63,7 +63,7 @@ def scenario(tmp_path: Path) -> Path:
     return path
 
 
-def test_lies_have_the_same_story_in_one_process_and_in_many(scenario: Path) -> None:
+def test_lies_act_alike_in_one_process_and_in_many(scenario: Path) -> None:
     """Histories, verdicts of links and events are the same with every kind of lie; the truth has another history."""
     alone, together = run(scenario, processes=False), run(scenario, processes=True)
     scenario.write_text(LIARS[: LIARS.index("[[node]]")], encoding="utf-8")
@@ -87,8 +87,8 @@ def test_lies_have_the_same_story_in_one_process_and_in_many(scenario: Path) -> 
     assert sorted(told) == sorted((t, name) for name, of in times.items() for t in of)
 
 
-def test_a_record_has_what_was_heard_of_liars(scenario: Path, tmp_path: Path) -> None:
-    """Decisions come again from the record to the last bit, and `why` says who lied, and how."""
+def test_a_record_has_the_received_lies(scenario: Path, tmp_path: Path) -> None:
+    """The record gives the decisions again to the last bit, and `why` names the liar and the lie."""
     record = recorded_run(scenario, "lies", tmp_path / "run")
 
     for agent in ("inv1", "inv2", "inv6", "inv8"):

@@ -109,7 +109,7 @@ def storm(folder: Path) -> Ran:
     return run(folder / "storm.toml", processes=False)
 
 
-def test_faults_have_the_same_story_in_one_process_and_in_many(folder: Path, storm: Ran) -> None:
+def test_faults_act_alike_in_one_process_and_in_many(folder: Path, storm: Ran) -> None:
     """Histories and the hash of all verdicts agree, with every kind of fault on links and agents at once."""
     again = run(folder / "storm.toml", processes=True)
 
@@ -121,7 +121,7 @@ def test_faults_have_the_same_story_in_one_process_and_in_many(folder: Path, sto
 
 
 def test_every_link_has_an_account_that_closes(storm: Ran) -> None:
-    """Sent and copied is delivered, dropped or on its way; all links are there, and what hurts them shows."""
+    """Sent plus copied equals delivered plus dropped plus pending on each link; faults of links show."""
     counts = storm.links.counts
     reasons = {reason for book in counts.values() for reason in book.dropped}
 
@@ -138,7 +138,7 @@ def _clear(counts: dict[tuple[str, str], LinkCounts]) -> int:
 
 
 def test_a_cut_elsewhere_changes_no_other_links_fate(folder: Path, storm: Ran) -> None:
-    """Each link looks its numbers up by itself: the verdicts of all links but the cut one stay, message by message."""
+    """Each link has its own random numbers: all other links keep the fate of each message."""
     (folder / "more.toml").write_text(STORM + '[[link]]\non = "inv1 -> inv4"\nfrom_s = 0.2\nto_s = 0.4\ncut = true\n')
     more = by_link(run(folder / "more.toml", processes=False).links)
     before = by_link(storm.links)
@@ -147,7 +147,7 @@ def test_a_cut_elsewhere_changes_no_other_links_fate(folder: Path, storm: Ran) -
 
 
 def test_a_paused_agent_holds_its_set_points_and_a_dead_ones_inverter_stays(storm: Ran) -> None:
-    """Nothing that a paused agent sends for the lock-step reaches the plant; after a death the last set-points stay."""
+    """The plant ignores states of a paused agent; after a death the last set-points stay."""
     P_set = {i: [(row[0], row[5 + 6 * (i - 1)]) for row in storm.rows] for i in (2, 3, 9)}
     paused = {value for t, value in P_set[3] if 1.3 <= t < 1.78}
     dead = {value for t, value in P_set[9] if t > 3.1}

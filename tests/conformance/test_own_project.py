@@ -93,7 +93,7 @@ def test_a_users_own_module_is_measured_and_judged_alike_in_one_process_and_in_t
 
 
 def test_a_sweep_takes_a_metric_as_a_function_and_varies_parameters(project: Path) -> None:
-    """A decorator's name is the column's; the reasons of what has no value stand beside."""
+    """The decorator names the column; missing values have their reasons beside."""
     scenario = gp.load(project / "jammed.toml").replace({"metrics": [], "claims": []})
     sys.modules.pop("my_study", None)
     import my_study  # type: ignore[import-not-found]

@@ -42,7 +42,7 @@ def test_islanding(tmp_path: Path) -> None:
 
 
 def test_emulated_links_and_nodes(tmp_path: Path) -> None:
-    """Delays, losses, copies, flipped bits, cuts, pauses, a kill and a slow clock: what arrived is in the record."""
+    """Delays, losses, copies, flipped bits, cuts, pauses, a kill, a slow clock: the record has all arrivals."""
     (tmp_path / "storm.toml").write_text(STORM, encoding="utf-8")
     record = recorded_run(tmp_path / "storm.toml", "storm", tmp_path / "storm")
 
@@ -126,7 +126,7 @@ class Counting(gp.Law):
 
 
 def test_each_process_of_an_agent_has_a_law_of_its_own(tmp_path: Path) -> None:
-    """Also one that does not forget at its start; what the last part of the journal would have had is left out."""
+    """Also a law that keeps its memory at the start; decisions of the lost last part of the journal are left out."""
     (tmp_path / "rejoin.toml").write_text(REJOIN, encoding="utf-8")
     (tmp_path / "counting.py").write_text(COUNTING, encoding="utf-8")
     record = recorded_run(tmp_path / "rejoin.toml", "case", tmp_path / "case")

@@ -62,8 +62,8 @@ def test_a_replay_gives_the_run(run: Result) -> None:
     assert {part.count for part in done.parts[1:]} == {50}
 
 
-def test_a_law_that_fails_in_what_would_have_been_fails_it(run: Result, elsewhere: Path) -> None:
-    """The command says so above the table and exits with 1, and Python warns: the numbers are those of droop."""
+def test_a_failing_law_fails_a_counterfactual(run: Result, elsewhere: Path) -> None:
+    """The command reports it above the table and exits with 1; Python warns."""
     law = "tests.conformance.laws.bad_laws:Failing"
     told = rf"inv1: law {law} \(\S*bad_laws.py:\d+\): step at t = 0.4 s raised AssertionError"
 
@@ -77,7 +77,7 @@ def test_a_law_that_fails_in_what_would_have_been_fails_it(run: Result, elsewher
 
 
 def test_a_replay_is_written_as_a_run_with_table_and_figure(run: Result, elsewhere: Path) -> None:
-    """The command prints what was beside what would have been, and the folder is one of a run."""
+    """The command prints both runs side by side, and writes a run folder."""
     code, text = invoke("replay", str(run.folder), "--set", "gains.k_p=0.002", "--out", "would")
 
     assert code == 0, text
@@ -92,8 +92,8 @@ def test_a_replay_is_written_as_a_run_with_table_and_figure(run: Result, elsewhe
     assert "NOTE" not in text
 
 
-def test_of_part_of_a_record_only_that_part_is_said_to_be_the_same(run: Result, tmp_path: Path) -> None:
-    """The sentence itself says that not all was compared, and notes say what; nothing differs: exit code 0."""
+def test_a_replay_of_a_part_claims_equality_of_that_part_alone(run: Result, tmp_path: Path) -> None:
+    """The sentence says that a part was compared, and notes name the rest; without a difference the exit code is 0."""
     whole = (run.folder / "IV" / "run.mcap").read_bytes()
     (tmp_path / "run.mcap").write_bytes(whole[: len(whole) * 17 // 20])
 
@@ -117,8 +117,8 @@ def test_of_part_of_a_record_only_that_part_is_said_to_be_the_same(run: Result, 
         (("--from", "0.5"), "nothing is changed from then on"),
     ],
 )
-def test_a_change_that_cannot_be_made_is_told(words: tuple[str, ...], told: str, run: Result, elsewhere: Path) -> None:
-    """In one line each, with exit code 2, and no folder is left that looks like a result."""
+def test_an_impossible_change_is_refused(words: tuple[str, ...], told: str, run: Result, elsewhere: Path) -> None:
+    """Each is one line with exit code 2; no folder of results remains."""
     code, text = invoke("replay", str(run.folder), *words)
 
     assert code == 2
@@ -128,8 +128,8 @@ def test_a_change_that_cannot_be_made_is_told(words: tuple[str, ...], told: str,
 
 
 @pytest.mark.parametrize("level", ["decisions", "physics"])
-def test_a_record_without_arrivals_is_told(level: RecordLevel, tmp_path: Path) -> None:
-    """Only what was given to the cores can be given to them again."""
+def test_a_record_without_arrivals_is_refused(level: RecordLevel, tmp_path: Path) -> None:
+    """A replay needs the recorded inputs of the cores."""
     (tmp_path / "short.toml").write_text(SHORT, encoding="utf-8")
     record = recorded_run(tmp_path / "short.toml", "IV", tmp_path / "out", level=level)
 
@@ -139,8 +139,8 @@ def test_a_record_without_arrivals_is_told(level: RecordLevel, tmp_path: Path) -
         gp.counterfactual(record)
 
 
-def test_the_file_of_what_would_have_been_gives_it_again(run: Result, tmp_path: Path) -> None:
-    """Cuts, losses and their times are in its scenario: run in simulated time, it is the same to the byte."""
+def test_the_scenario_of_a_counterfactual_gives_it_again(run: Result, tmp_path: Path) -> None:
+    """Its scenario has cuts, losses and times; a run in simulated time gives the same bytes."""
     done = gp.counterfactual(run, without="inv4 <-> inv7", since=0.5, folder=tmp_path / "would")
 
     again = gp.load(tmp_path / "would" / "scenario.toml").run("IV")
@@ -149,7 +149,7 @@ def test_the_file_of_what_would_have_been_gives_it_again(run: Result, tmp_path: 
     assert again.links["fate"].eq("cut").any()
 
 
-def test_a_folder_of_what_would_have_been_says_so(run: Result, tmp_path: Path) -> None:
+def test_the_folder_of_a_counterfactual_names_the_change(run: Result, tmp_path: Path) -> None:
     """The change is in the title of report and figures; the record's own path, driver and clock are in `[as_run]`."""
     (tmp_path / "latest").symlink_to(run.folder)
 

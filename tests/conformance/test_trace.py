@@ -66,7 +66,7 @@ def between_agents(found: list[Flow]) -> list[Flow]:
 
 
 def test_flows_are_those_of_the_ledger(lossy: RunRecord) -> None:
-    """As many arrive, and as many are lost, as the links have counted; one that arrives takes its delay."""
+    """Arrivals, losses and delays equal those of the links' ledgers."""
     found = between_agents(flows(lossy))
 
     arrived = [flow for flow in found if flow.arrived is not None]

@@ -97,7 +97,7 @@ def test_a_link_cut(faulty: RunRecord) -> None:
 
 
 def test_an_agent_that_was_not_there(faulty: RunRecord) -> None:
-    """A neighbour that has left is not met, and its last event says why; of itself its last decision is shown."""
+    """A neighbour that has left is named with its last event; its own last decision is shown."""
     other, own = explain(faulty, "inv4", 0.7), explain(faulty, "inv9", 0.7)
 
     gone = account(other, "inv9")
@@ -113,7 +113,7 @@ def test_an_agent_that_was_not_there(faulty: RunRecord) -> None:
 
 
 def test_a_limit_hit(tmp_path: Path) -> None:
-    """The terms would go beyond the limit: what it takes back is a number of its own."""
+    """The part of the step that the limit takes back is a term of its own."""
     record = run(tmp_path, "[gains]\nP_set_max_pu = 0.68\n", end=0.4)
 
     explanations = [explain(record, "inv1", t) for t in (0.22, 0.24, 0.26, 0.28, 0.3)]
@@ -128,7 +128,7 @@ def test_a_limit_hit(tmp_path: Path) -> None:
 
 
 def test_an_island_change(tmp_path: Path) -> None:
-    """Once microgrid 1 is an island of its own, the others are left out, with both islands by name."""
+    """After microgrid 1 becomes an island, other neighbours are left out, with both islands named."""
     record = run(tmp_path, '[[event]]\nlabel = "event2"\nt_s = 0.5\nopen = ["sw1_2"]\n', end=0.7)
 
     together, apart = explain(record, "inv4", 0.48), explain(record, "inv4", 0.66)
@@ -142,8 +142,8 @@ def test_an_island_change(tmp_path: Path) -> None:
     assert any(event.kind == "island" for event in apart.events)
 
 
-def test_what_was_not_decided_by_a_law(tmp_path: Path) -> None:
-    """On hold while grid-connected, no secondary control in this case, and nobody heard at the first tick."""
+def test_decisions_without_a_law(tmp_path: Path) -> None:
+    """On hold while grid-connected, without secondary control, and at the first tick."""
     record, file = run(tmp_path), tmp_path / "none.toml"
     file.write_text(ISLANDED.format(end=0.8).replace('secondary = "all"', 'secondary = "none"'), encoding="utf-8")
     none = recorded_run(file, "case", tmp_path / "none")
@@ -195,7 +195,7 @@ def test_the_command(islanded: RunRecord) -> None:
     ],
 )
 def test_bad_input(arguments: tuple[str, ...], complaint: str, islanded: RunRecord) -> None:
-    """One line says what is wrong, and what there is."""
+    """One line has the problem and the valid names."""
     code, printed = invoke("why", str(islanded.path.parent), *arguments)
 
     assert code == 2

@@ -37,13 +37,13 @@ def fmi3(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     return {"fmu": build(cc, folder), "folder": str(folder)}
 
 
-def test_a_class_of_anybody_gives_the_history_of_the_law_built_in() -> None:
+def test_a_foreign_class_gives_the_history_of_the_built_in_law() -> None:
     """Processes run a class in tests/unit/gridpeers/test_own_law.py, and a program in test_law_programs.py."""
     assert written("gridpeers.agents.laws.consensus:Consensus").sha256 == islanding(short=True).sha256
 
 
 def test_an_fmu_gives_the_history_of_the_class_and_has_the_parameters_that_it_declares(fmu: dict[str, str]) -> None:
-    """In one process and in ten. A scenario gives parameters as those of any law; an unknown one is told."""
+    """With both drivers. The scenario sets its parameters; an unknown one is a problem."""
     k_p = {"gains.k_p": 0.0014}
     slower = written({**fmu, **PATIENT, "k_p": 0.0014})
 
@@ -54,7 +54,7 @@ def test_an_fmu_gives_the_history_of_the_class_and_has_the_parameters_that_it_de
 
 
 def test_an_fmu_for_another_platform_is_refused_by_name(fmu: dict[str, str], tmp_path: Path) -> None:
-    """It cannot be loaded here: one line says for which it is, before anything starts."""
+    """One line names the platform of the FMU, before the run."""
     with zipfile.ZipFile(Path(fmu["folder"]) / fmu["fmu"]) as whole, zipfile.ZipFile(tmp_path / "x.fmu", "w") as other:
         for name in whole.namelist():
             if not name.startswith("binaries/") or "win64" in name:
@@ -67,7 +67,7 @@ def test_an_fmu_for_another_platform_is_refused_by_name(fmu: dict[str, str], tmp
 
 
 def test_an_fmu_of_fmi_3_gives_the_history_of_the_class(fmi3: dict[str, str]) -> None:
-    """With a parameter too, and after the reset that a second time on the grid brings."""
+    """Also with a parameter, and after a reset by a second grid connection."""
     k_p = {"gains.k_p": 0.0014}
     twice = [("event1", 1.0, "open"), ("back", 1.2, "close"), ("event2", 1.4, "open")]
     events = [{"label": label, "t_s": t, action: ["13-152"]} for label, t, action in twice]
@@ -77,7 +77,7 @@ def test_an_fmu_of_fmi_3_gives_the_history_of_the_class(fmi3: dict[str, str]) ->
     assert carried.sha256 == scenario.replace(k_p).run("IV").sha256
 
 
-def test_an_fmu_that_cannot_be_a_law_is_told_before_the_run(tmp_path: Path) -> None:
+def test_an_fmu_that_cannot_be_a_law_is_reported_before_the_run(tmp_path: Path) -> None:
     """A variable of another type: one line at its key, and no traceback."""
     fmpy, here = pytest.importorskip("fmpy"), Path.cwd()
     with zipfile.ZipFile(tmp_path / f"{NAME}.fmu", "w") as packed:

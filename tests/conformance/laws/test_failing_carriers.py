@@ -61,18 +61,18 @@ def two_steps(law: FmuLaw | ProgramLaw) -> float:
     (3, r"step at t = 0 s raised FMICallException: fmi2DoStep failed with status \d"),
     (4, r"FailingFmu.fmu ended at the step at t = 0 s with signal 6"),
 ])  # fmt: skip
-def test_an_fmu_that_fails_in_a_step_is_told(how: float, said: str, folder: Path, unpacked: Path) -> None:
-    """It hangs, gives nan, fails, or takes its process with it."""
+def test_a_failing_step_of_an_fmu_is_reported(how: float, said: str, folder: Path, unpacked: Path) -> None:
+    """The FMU hangs, returns nan, fails, or crashes its process."""
     with pytest.raises(LawError, match=said):
         steps(folder / NAME, how, time_limit=1.0 if how == 1 else 10.0)
 
 
-def test_what_an_fmu_prints_is_no_answer(folder: Path, unpacked: Path) -> None:
-    """It goes to standard error, and the decision is what it is."""
+def test_the_output_of_an_fmu_is_no_answer(folder: Path, unpacked: Path) -> None:
+    """Its output goes to standard error; the decision stays the same."""
     assert steps(folder / NAME, 5) == 0.5
 
 
-def test_an_fmu_that_cannot_be_loaded_is_told(
+def test_an_fmu_that_cannot_be_loaded_is_reported(
     folder: Path, unpacked: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     """Its library is spoilt, or its file is cut short since the scenario was checked."""
@@ -104,12 +104,12 @@ law = ProgramLaw(LawChoice(command=("sh", "-c", {STAYS!r})))
 
 @pytest.mark.parametrize("end", ["os.kill(os.getpid(), signal.SIGKILL)", "law.close()", "os._exit(1)"])
 def test_nothing_outlives_an_agent_however_it_ends(end: str) -> None:
-    """All of them hold the same pipe: its end comes once the last has gone."""
+    """All processes hold one pipe, which ends with the last of them."""
     subprocess.run([sys.executable, "-c", AGENT + end], stderr=subprocess.PIPE, timeout=30.0)
 
 
 def test_programs_that_ignore_the_end_of_their_input_are_waited_for_together() -> None:
-    """Each has 1 s to end, and so have all: one after the other they would have as many seconds as they are."""
+    """All programs together have 1 s to end, not 1 s each."""
     laws = [ProgramLaw(LawChoice(command=("sh", "-c", STAYS))) for _ in range(8)]
     began = monotonic()
 
@@ -142,8 +142,8 @@ def test_a_program_with_a_wrong_answer_fails_with_one_line(script: str, limit: f
         two_steps(ProgramLaw(choice))
 
 
-def test_a_law_that_was_closed_says_so(tmp_path: Path) -> None:
-    """It is called no more; and it can be closed twice."""
+def test_a_closed_law_raises_an_error(tmp_path: Path) -> None:
+    """A closed law raises an error when it is called, and can be closed twice."""
     law = ProgramLaw(LawChoice(command=("cat",), folder=str(tmp_path)))
     law.close()
     law.close()

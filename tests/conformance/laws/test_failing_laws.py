@@ -23,7 +23,7 @@ BAD = "tests.conformance.laws.bad_laws"
     ("leaves", r"step at t = 1.2 s raised SystemExit: 3"),
     ("hangs in spite of all", r"step at t = 1.2 s took longer than time_limit_s = 0.3 s"),
 ])  # fmt: skip
-def test_a_class_that_fails_is_named_and_the_run_goes_on(how: str, said: str) -> None:
+def test_a_failing_class_is_named_and_the_run_continues(how: str, said: str) -> None:
     """A failing step gives one line of every agent in events.csv, primary droop from then on, a history to the end."""
     limit = {"time_limit_s": 0.3} if how.startswith("hangs") else {}  # the default is out of a starved machine's reach
     result = failed({"use": f"{BAD}:Failing", "how": how, **limit})
@@ -83,7 +83,7 @@ def test_a_law_that_fails_ends_the_run_where_the_scenario_wants_that(mine: str) 
 
 
 def test_a_sweep_whose_law_fails_has_no_numbers(mine: str) -> None:
-    """Its row says `law failed` and why; without their own law they would be droop's. It warns once of all runs."""
+    """The row has the status `law failed`, a reason and no numbers; one warning covers all runs."""
     law = {"use": "early_laws:Mine", "folder": mine}
     base = gp.load("islanding").replace({"case.IV.law": law, **SHORT})
 
@@ -99,7 +99,7 @@ def test_a_sweep_whose_law_fails_has_no_numbers(mine: str) -> None:
 
 
 def test_a_graph_that_fails_in_a_run_is_a_failure_like_a_law(mine: str) -> None:
-    """The scenario kills an agent: the roster that is left is one that its check has not seen."""
+    """The scenario kills an agent, and the check has not seen the remaining roster."""
     dies = {"name": "inv9", "kill": True, "from_s": 1.2}
     graph = {"use": "late_laws:star", "folder": mine}
     scenario = gp.load("islanding").replace({**SHORT, "case.IV.graph": graph, "node": [dies]})
@@ -151,7 +151,7 @@ def _text(path: Path) -> str:
     ({"fmu": __file__, "folder": "/"}, r"case.IV.law.fmu: test_failing_laws.py is no FMU: BadZipFile"),
 ])  # fmt: skip
 def test_a_law_that_cannot_work_is_refused_before_anything_starts(law: Any, said: str) -> None:
-    """Each problem with its key, and what would be right."""
+    """Each problem has its key and a remedy."""
     with pytest.raises(gp.ScenarioError) as refused:
         gp.load("islanding").replace({"case.IV.law": law, **SHORT}).check()
 
@@ -171,7 +171,7 @@ def test_a_program_that_the_system_cannot_run_is_refused(text: str, tmp_path: Pa
 
 
 def test_gains_of_the_papers_law_in_a_case_of_another_are_refused() -> None:
-    """They would do nothing, and nobody would know."""
+    """Such gains would have no effect."""
     with pytest.raises(gp.ScenarioError, match=r'\[gains\] belong to the law "consensus", and this case has dapi'):
         gp.load("islanding").replace({"case.IV.law": "dapi", "case.IV.gains": {"k_p": 0.001}}).check()
     weights = {"weights": "degree-normalised"}
@@ -182,7 +182,7 @@ def test_gains_of_the_papers_law_in_a_case_of_another_are_refused() -> None:
 
 
 def test_a_module_that_ends_python_while_it_is_imported_is_refused(tmp_path: Path) -> None:
-    """A script without the guard of its main part; it stands outside of the tests, which pytest imports."""
+    """A script without a `__main__` guard, outside of the tests that pytest imports."""
     (tmp_path / "leaving_law.py").write_text("import sys\nsys.exit(3)\n")
 
     with pytest.raises(gp.ScenarioError, match="importing leaving_law failed: SystemExit: 3"):
@@ -190,7 +190,7 @@ def test_a_module_that_ends_python_while_it_is_imported_is_refused(tmp_path: Pat
 
 
 def test_a_module_that_was_edited_is_read_again(tmp_path: Path) -> None:
-    """A law that is changed between two runs of a notebook takes effect, in process as with processes."""
+    """A law that changes between two runs of a notebook takes effect with both drivers."""
     text = "import gridpeers as gp\nclass Hold(gp.Law):\n    def step(self, own, neighbours, T):\n        return "
     module = tmp_path / "edited_law.py"
     law = {"use": "edited_law:Hold", "folder": str(tmp_path)}
@@ -210,7 +210,7 @@ class Wanders(gp.Law):
         return gp.SetPoints(own.P_set, own.V_set)
 
 
-def test_the_run_is_written_where_it_was_to_be_and_read_from_there(
+def test_the_run_is_written_into_its_folder_and_read_from_there(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A folder is where it was when it was named."""

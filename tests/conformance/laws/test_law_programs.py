@@ -87,7 +87,7 @@ def test_a_program_begins_anew_with_other_parameters(command: tuple[str, ...]) -
 
 
 def test_a_line_without_numbers_is_an_error(in_c: tuple[str, ...]) -> None:
-    """The program in C, whose reader of JSON is its own, answers nonsense with an error and goes on."""
+    """The program in C, with a JSON reader of its own, answers nonsense with an error and continues."""
     start, _, step, decision = re.findall(r"```json\n(.*)\n```", PAGE)
     odd = ['{"type":"step"}', '{"type":"step","own":{"P_set":"x"},"neighbours":[{}]}', "[", '{"a', "{}", ""]
     got = answers(in_c, start, *odd, step)

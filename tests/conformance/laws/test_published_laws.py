@@ -41,7 +41,7 @@ def test_dapi_shares_vars_exactly_or_regulates_voltage_or_makes_a_compromise() -
 
 
 def test_central_control_leaves_vars_to_droop_and_depends_on_its_centre() -> None:
-    """One controller restores all and shares no vars; if its links are cut after event 1, nobody is restored again."""
+    """One controller restores all and shares no vars; without its links after event 1 the frequency stays wrong."""
     fault = [{"on": "inv1 -> *", "cut": True, "from_s": 3.0}]
     alone = gp.load("islanding").replace({"case.IV.law": "centralised", "case.IV.link": fault, "paper": ""}).run("IV")
 
@@ -50,8 +50,8 @@ def test_central_control_leaves_vars_to_droop_and_depends_on_its_centre() -> Non
     assert alone.metrics["MPSI"]["event2"] > 0.1
 
 
-def test_event_triggered_consensus_tells_less() -> None:
-    """Neighbours keep the last state; messages saved are a metric; in lock-step tokens keep time, to the byte."""
+def test_event_triggered_consensus_sends_less() -> None:
+    """Neighbours keep the last state, saved messages are a metric, and both drivers give the same bytes."""
     result = islanding("event-triggered", short=True)
 
     assert (islanding("event-triggered").metrics["messages_saved"] > 0.5).all()
@@ -142,7 +142,7 @@ def test_event_based_broadcasting_agrees_within_its_radius_with_few_messages() -
     assert told < agreement(lambda: EventTriggered(c_0=0.1 * c_0, c_1=0.0), P_SET, links, T, steps)[1]
 
 
-def test_without_tolerance_every_change_is_told() -> None:
+def test_without_tolerance_every_change_is_sent() -> None:
     """Then event-based broadcasting is the periodic law."""
     links, T = ring(6), 0.002
     y, told = agreement(lambda: EventTriggered(c_0=0.0, c_1=0.0), P_SET, links, T, 200)

@@ -35,7 +35,7 @@ def met(control: Control = ALL_FULL, name: str = "inv1") -> Agent:
 
 
 def test_a_tick_is_the_law_in_per_unit() -> None:
-    """SI on the wire, per unit inside: set-points are those of the law, times the own bases."""
+    """Messages are in SI units: the set-points are those of the law, times the own bases."""
     agent = met()
     agent.meet(plate("inv3", P_rated=50e3))
     agent.hear(state("inv2", P_set=60e3, Q=10e3))
@@ -62,8 +62,8 @@ def test_on_hold_an_agent_follows_the_plant() -> None:
     assert (first.P_set, first.V_set) == (pytest.approx(64.7e3), pytest.approx(280.0))
 
 
-def test_out_of_service_an_agent_stands_still_and_begins_again_from_what_the_plant_holds() -> None:
-    """While the inverter is off there is nothing to control; then the law starts from the held set-points."""
+def test_an_agent_out_of_service_is_idle_and_restarts_from_the_held_set_points() -> None:
+    """The agent is idle while the inverter is off; then the law starts from the held set-points."""
     agent = met()
     agent.tick(measurement())
     off = agent.tick(measurement(1, island=OFF, V=0.0, f=0.0, P=0.0, Q=0.0, P_set=0.0, V_set=277.0))
@@ -76,7 +76,7 @@ def test_out_of_service_an_agent_stands_still_and_begins_again_from_what_the_pla
 
 @pytest.mark.parametrize("islands", ["switches", "frequency", "ignored"])
 def test_a_neighbour_that_is_out_of_service_is_left_out(islands: Literal["switches", "frequency", "ignored"]) -> None:
-    """It has no power to share, so its 0 var would bias the others: however islands are told apart."""
+    """Its 0 var would bias the others; the rule holds for islands by name and by frequency."""
     control = replace(ALL_FULL, degraded_communication=DegradedCommunication(islands=islands))
     agent = met(control)
     agent.hear(state("inv2"))
@@ -87,7 +87,7 @@ def test_a_neighbour_that_is_out_of_service_is_left_out(islands: Literal["switch
 
 
 def test_a_law_that_changes_what_a_neighbour_shares_fails() -> None:
-    """All agents of a process see one state: a law that changed it would couple them, but not in many processes."""
+    """Agents of one process read the same state, so a change by a law would couple them."""
 
     class Touching(Law):
         def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:

@@ -11,7 +11,7 @@ PAGE = Path(__file__).parents[3] / "docs" / "architecture.md"
 
 
 def test_the_page_shows_all_phases_and_the_way_out_of_each() -> None:
-    """An agent can end in any phase; after that nothing happens."""
+    """An agent can end in any phase, and stays ended."""
     assert diagram(AGENT_PHASES) in PAGE.read_text(encoding="utf-8")
     assert [phase for phase, events in AGENT_PHASES.items() if "end" not in events] == ["over"]
     assert not AGENT_PHASES["over"]

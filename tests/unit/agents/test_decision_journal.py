@@ -68,7 +68,7 @@ def test_in_ticks_each_change_is_noted(what: str) -> None:
 
 
 def test_in_real_time_each_decision_is_noted_with_its_reasons() -> None:
-    """Ages tell who was silent and who was stale; a young state that is in no sum is of another island."""
+    """Ages show silent and stale neighbours; a young state outside the sums is of another island."""
     agent = Deciding()
     agent.hear(7, "inv2", "inv4", "inv5")
     agent.use("inv2")

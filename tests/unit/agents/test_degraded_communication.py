@@ -57,8 +57,8 @@ def test_a_neighbour_that_sent_nothing_new_is_skipped() -> None:
     assert holds.tick(measured(2), ROSTER[1:]).P_set / 1e5 == pytest.approx(moved(first, 0.7, 2 * KAPPA), rel=1e-12)
 
 
-def test_what_came_while_on_hold_is_not_new_afterwards() -> None:
-    """A tick without the law uses up what has arrived, too."""
+def test_a_state_that_arrives_on_hold_is_not_new_afterwards() -> None:
+    """A tick without the law also uses up the arrived states."""
     it = agent(stale="skip")
     it.hear(state("inv2", 0))
     it.tick(measured(1, grid_connected=True), ROSTER[1:])
@@ -83,7 +83,7 @@ def test_a_state_fades_beside_the_usual_age_of_its_own_link() -> None:
 
 
 def test_a_neighbour_older_than_max_age_is_none() -> None:
-    """Beyond max_age it is left out of the sums and of the degree; by default the last value counts for ever."""
+    """Beyond max_age it is out of the sums and of the degree; by default the last value counts for ever."""
     for degraded_communication, P_bar, rate in (
         ({}, 0.7, 2 * KAPPA),
         ({"max_age": 0.1}, 0.6, KAPPA),
@@ -131,7 +131,7 @@ def test_without_limits_p_set_winds_up() -> None:
 
 
 def test_a_saturated_leader_stops_after_t_sat_and_goes_on_as_a_follower() -> None:
-    """With "conditional" it no more integrates the low frequency, but agrees with its neighbours."""
+    """With "conditional" it stops integrating the low frequency, and agrees with its neighbours."""
     wide = replace(agent_config("inv1").control.gains, P_set_max=50.0)
     control = Control(
         secondary="all",
@@ -156,7 +156,7 @@ def test_a_saturated_leader_stops_after_t_sat_and_goes_on_as_a_follower() -> Non
 
 
 def test_vars_that_do_not_follow_stop_v_set_on_that_side_only() -> None:
-    """A GFL at its var limit leaves V_set where it is while that is to rise, and lets it fall at once."""
+    """At its var limit a GFL holds a V_set that would rise, and lets it fall at once."""
     it = agent("inv2", anti_windup="conditional")
     V, held = [], 277.0
     for k in range(60):
@@ -172,7 +172,7 @@ def test_vars_that_do_not_follow_stop_v_set_on_that_side_only() -> None:
 
 @given(st.floats(0.01, 0.4), st.booleans())
 def test_a_slow_inverter_is_not_saturated(lag: float, up: bool) -> None:
-    """A first-order lag below T_sat is off its characteristic for seconds, but on the way to it."""
+    """A first-order lag is off its characteristic for seconds, but moves towards it."""
     follows, sign = SaturationDetector(T_sat=0.5), 1 if up else -1
     does = [sign * (1.0 - exp(-k * T / lag)) for k in range(300)]
 
@@ -184,8 +184,8 @@ def test_a_slow_inverter_is_not_saturated(lag: float, up: bool) -> None:
     ("islands", "told", "used"),
     [("switches", ("mg1", False), False), ("frequency", ("", True), True), ("ignored", ("", False), True)],
 )
-def test_what_is_told_of_the_own_island_and_made_of_anothers(islands: Any, told: Any, used: bool) -> None:
-    """Its name, or the own angle, or nothing; and a neighbour that names another island is out by the switches only."""
+def test_the_island_of_a_state_and_the_use_of_it(islands: Any, told: Any, used: bool) -> None:
+    """The own island by name, by angle, or not at all; a neighbour's name of an island counts for the switches only."""
     it = agent(islands=islands)
     it.tick(measured(0, island="mg1"), ("inv2",))
     it.hear(replace(state("inv2", 0), island="mg2"))
@@ -198,7 +198,7 @@ def test_what_is_told_of_the_own_island_and_made_of_anothers(islands: Any, told:
 
 
 def test_a_neighbour_out_of_step_is_left_out_until_the_grid_is_back() -> None:
-    """At 59 Hz it slips by 0.02 cycles in a period; on the grid all are in step, and nothing of it is kept."""
+    """At 59 Hz it slips by 0.02 cycles in a period; on the grid all are in step, and the memory is cleared."""
     it, angles = agent(islands="frequency"), IslandDetector(60.0, 0.01)
     shared = []
     for k in range(6):

@@ -55,13 +55,13 @@ def rule(graph: GraphRule) -> Control:
     ],
 )
 def test_each_rule_gives_the_neighbours_it_is_named_for(graph: GraphRule, name: str, expected: set[str]) -> None:
-    """The rules, on the paper's nine inverters (its section 4)."""
+    """Each rule, on the paper's nine inverters (its section 4)."""
     assert set(in_neighbours(rule(graph), name, PAPER)) == expected
 
 
 @given(st.permutations([f"inv{i}" for i in range(1, 13)]))
 def test_a_ring_runs_in_natural_order(names: list[str]) -> None:
-    """The ring joins inv2 to inv3 and inv10 to inv9 and inv11, in whatever order the roster is written."""
+    """The ring joins inv2 to inv3, and inv10 to inv9 and inv11, for any order of the roster."""
     members = {name: SimpleNamespace(kind="GFL", microgrid="mg1") for name in names}
     ring = Control(secondary="all", graph="ring")
 
@@ -70,7 +70,7 @@ def test_a_ring_runs_in_natural_order(names: list[str]) -> None:
 
 
 def test_missing_links_are_left_out_of_any_rule_both_ways() -> None:
-    """The full graph less the link 4-7, the paper's link failure: neither hears the other, everybody else hears all."""
+    """The full graph without the link 4-7, the paper's link failure: only these two agents miss each other."""
     control = Control(secondary="all", graph="full", without=(("inv4", "inv7"),))
 
     missing = {
@@ -121,7 +121,7 @@ def nameplates(n: int) -> dict[str, object]:
 
 
 def test_a_function_and_a_class_with_parameters_are_rules(folder: str) -> None:
-    """A rule need not be symmetric, is never taken for pairwise, and `without` still takes links out."""
+    """A rule need not be symmetric or pairwise; `without` still removes links."""
     star, following = control("my_graphs:star", folder), control("my_graphs:Next", folder, k=2)
     members = nameplates(4)
 
@@ -140,8 +140,8 @@ def test_a_function_and_a_class_with_parameters_are_rules(folder: str) -> None:
         ("rings", 'there is no graph "rings"; did you mean "ring"? The graphs are full, none, GFM-only, clustered'),
     ],
 )
-def test_a_rule_that_cannot_be_is_told_in_one_line(folder: str, use: str, said: str) -> None:
-    """What is wrong with the rule, and what would be right."""
+def test_an_impossible_rule_is_refused_in_one_line(folder: str, use: str, said: str) -> None:
+    """The problem of the rule, and a remedy."""
     (wrong,) = plugin_problems(GRAPHS, plugin_of({"use": use}, folder))
     make_graph(Plugin(use="my_graphs:star", folder=folder))
 
@@ -162,7 +162,7 @@ def test_a_rule_that_cannot_be_is_told_in_one_line(folder: str, use: str, said: 
         ),
     ],
 )
-def test_what_is_no_graph_is_told_in_one_line(rule: object, said: str) -> None:
+def test_a_result_that_is_no_graph_is_reported_in_one_line(rule: object, said: str) -> None:
     """The error names the agent, and what the rule returned or raised."""
     with pytest.raises(GraphError) as caught:
         check_graph(rule, nameplates(2), "mine")  # type: ignore[arg-type]
@@ -171,8 +171,8 @@ def test_what_is_no_graph_is_told_in_one_line(rule: object, said: str) -> None:
     assert "\n" not in str(caught.value)
 
 
-def test_an_agent_whose_rule_fails_in_a_run_stands_still_and_says_so(folder: str) -> None:
-    """The run goes on: its state tells the fault once, and is idle until the rule works with the roster again."""
+def test_an_agent_with_a_failing_rule_is_idle_and_reports_it(folder: str) -> None:
+    """The run continues: one state reports the fault, and the agent is idle until the rule works again."""
     agent = Agent(agent_config("inv1", control("my_graphs:of_three", folder)))
     for name in ("inv2", "inv3"):
         agent.meet(Agent(agent_config(name)).nameplate)
@@ -192,7 +192,7 @@ def test_an_agent_whose_rule_fails_in_a_run_stands_still_and_says_so(folder: str
 
 
 def test_two_modules_of_one_name_are_not_taken_for_each_other(folder: str, tmp_path: Path) -> None:
-    """A module of the same name in another scenario's folder is refused, not silently the first one again."""
+    """A module of the same name in another scenario's folder is refused."""
     other = tmp_path / "other"
     other.mkdir()
     (other / "my_graphs.py").write_text("def star(members):\n    return {}\n", encoding="utf-8")

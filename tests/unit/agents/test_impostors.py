@@ -7,7 +7,7 @@ from tests.unit.agents.realtime_lab import Lab
 
 
 def test_a_neighbour_whose_certificate_no_link_has_is_not_used() -> None:
-    """Its nameplate is an impostor's: it gets no epoch, so that none of its messages counts; both are reported."""
+    """Its nameplate is an impostor's, so none of its messages counts; both are reported."""
     lab = Lab()
     lab.side.post.vouches = {"plant", "inv2"}.__contains__
     lab.token("plant")
@@ -25,7 +25,7 @@ def test_a_neighbour_whose_certificate_no_link_has_is_not_used() -> None:
 
 
 def test_a_plant_whose_certificate_no_link_has_commands_nobody() -> None:
-    """Its measurements are counted and dropped; the agent goes on waiting for a plant."""
+    """The agent counts and drops its measurements, and waits for a plant."""
     lab = Lab()
     lab.side.post.vouches = {"inv2"}.__contains__
     lab.token("plant")

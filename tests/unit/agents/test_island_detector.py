@@ -18,7 +18,7 @@ def pair(slip_max: float = SLIP_MAX) -> tuple[IslandDetector, IslandDetector]:
 
 
 @given(st.integers(0, 10_000))
-def test_in_one_island_nobody_is_apart_whatever_becomes_of_messages(seed: int) -> None:
+def test_within_one_island_no_agent_is_apart_even_with_lost_and_late_messages(seed: int) -> None:
     """Frequency swings by 2 Hz, the angle between them by 3 degrees; nine of ten states are lost, all are late."""
     rng = random.Random(seed)
     here, there = pair()
@@ -49,7 +49,7 @@ def test_another_frequency_is_seen_as_soon_as_the_slip_is_too_large(difference: 
     assert SLIP_MAX / abs(difference) <= k * T <= 1.1 * SLIP_MAX / abs(difference) + 3 * T
 
 
-def test_whoever_was_apart_is_tried_again_ever_more_rarely() -> None:
+def test_an_agent_apart_is_tried_again_ever_more_rarely() -> None:
     """After 10 s, then 20 s and so on up to ten minutes, as long as it does not stay in step."""
     here, there = pair()
     left, was_apart = [], False

@@ -199,7 +199,7 @@ def test_voltage_and_vars_rest_where_the_papers_continuous_law_rests(
 
 @given(st.floats(0.9, 1.1), st.floats(0.1, 30.0), PERIODS)
 def test_an_adaptive_alpha_rests_where_it_stands_against_the_vars(v: float, d: float, T: float) -> None:
-    """A leader stands still where alpha(v) (v - 1) + beta d (z - z_bar) = 0, with the alpha in force there."""
+    """A leader rests where alpha(v) (v - 1) + beta d (z - z_bar) = 0, with the alpha in force there."""
     gains = Gains(alpha=4.0, alpha_min=0.25, V_full=0.02, beta_GFM=2.0)
     z_bar = 0.01
     z = z_bar - alpha_in_force(gains, v) * (v - 1.0) / (gains.beta_GFM * d)
@@ -249,7 +249,7 @@ def test_frequency_and_sharing_rest_where_the_papers_law_rests(
 
 
 def test_the_papers_law_has_the_parameters_and_defaults_of_its_table() -> None:
-    """`[gains]` and the class that takes them are declared apart, and say the same."""
+    """The declarations of `[gains]` and of its class agree."""
     defaults = {field.name: field.default for field in fields_of(Consensus)}
 
     assert defaults.pop("kappa_c") == 0.0

@@ -53,8 +53,8 @@ def raises(error: BaseException) -> Any:
     (lambda: shares({f"x{i}": 0.0 for i in range(17)}), r"shares .*; share at most 16 numbers by name"),
     (lambda: shares({"a b": 1.0}), r"shares 'a b'; a name has up to 32 letters, digits and _"),
 ])  # fmt: skip
-def test_a_step_that_is_no_decision_is_told_in_one_line(answer: Callable[[], Any], said: str) -> None:
-    """What a class can do wrong by problem; `tests/conformance/laws` has what becomes of the run."""
+def test_a_wrong_decision_is_reported_in_one_line(answer: Callable[[], Any], said: str) -> None:
+    """The errors of a class, one by one; `tests/conformance/laws` tests their effect on a run."""
 
     class Answers(Law):
         def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
@@ -71,7 +71,7 @@ def compute_without_end() -> None:
 
 
 def test_a_call_is_limited_in_processor_time_and_tenfold_in_real_time() -> None:
-    """A machine that does other things makes no law fail; one that computes or waits without end does."""
+    """Load on the machine fails no law; a law that computes or waits without end fails."""
     never = Event()
     with limited("it", 0.05, "its limit"):
         never.wait(0.1)

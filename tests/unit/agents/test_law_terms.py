@@ -88,7 +88,7 @@ class Summed(Law):
 
 
 def test_terms_alone_are_a_step() -> None:
-    """The agent adds them up to the set-points before, and limits the sums; so they cannot differ from the step."""
+    """The agent adds the terms to the set-points and limits the sums."""
     own = Own("inv1", True, 1.0, 0.5, 0.0, 1.0, 0.0, 0.0, 0.5, 1.0, 0.01, 0.05, 6e5, 277.0, 60.0)
 
     decided = decide(Summed(), own, (), 0.02)

@@ -24,7 +24,7 @@ NAMES = ("inv1", "inv2", "inv3", "inv4")
 
 
 def test_a_token_that_was_lost_and_comes_back_must_prove_itself_anew() -> None:
-    """A link that was cut may have lost the subscription."""
+    """A cut link may have lost the subscription."""
     lab = Lab()
     lab.meet("inv2")
     lab.prepare(0, "inv2")
@@ -40,7 +40,7 @@ def test_a_token_that_was_lost_and_comes_back_must_prove_itself_anew() -> None:
 
 
 def test_a_prepare_that_comes_again_is_answered_again() -> None:
-    """Its first `Ready` may be lost; the roster and the wait for the first measurement stay as they are."""
+    """The first `Ready` may be lost; roster and wait stay as they are."""
     lab = Lab()
     lab.meet("inv2")
     lab.prepare(0, "inv2")
@@ -53,8 +53,8 @@ def test_a_prepare_that_comes_again_is_answered_again() -> None:
     assert [state.seq for state in lab.decided] == [0]
 
 
-def test_who_leaves_gets_ready_for_no_roster() -> None:
-    """A run that breaks before its agents are ready: what was asked for is still on its way, and is no error."""
+def test_a_leaving_agent_gets_ready_for_no_roster() -> None:
+    """A run breaks before its agents are ready: late answers are no errors."""
     lab = Lab(links=EmulatedLinks("inv1", EmulationConfig(netem=Netem(), microgrids={"inv1": "mg1", "inv2": "mg1"})))
     lab.token("inv2")
     lab.prepare(0, "inv2")
@@ -78,8 +78,8 @@ def test_who_leaves_gets_ready_for_no_roster() -> None:
         (4, {"inv1": "another", "inv2": "b"}, "unexpected"),
     ],
 )
-def test_a_roster_that_cannot_be_meant_changes_nothing(number: int, roster: dict[str, str], kind: str) -> None:
-    """One that is old, or without this process."""
+def test_an_old_or_foreign_roster_changes_nothing(number: int, roster: dict[str, str], kind: str) -> None:
+    """An old roster, or a roster without this process."""
     lab = Lab()
     lab.meet("inv2")
     lab.prepare(3, "inv2")
@@ -91,8 +91,8 @@ def test_a_roster_that_cannot_be_meant_changes_nothing(number: int, roster: dict
 
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from(["full", "none", "GFM-only", "clustered", "ring"]))
-def test_whatever_comes_first_it_is_ready_in_the_end(seed: int, graph: GraphRule) -> None:
-    """Tokens and the roster in any order, answers in any order: one Ready, after a proof from each neighbour."""
+def test_an_agent_gets_ready_for_any_order_of_messages(seed: int, graph: GraphRule) -> None:
+    """Tokens, roster and answers in any order give one Ready, after a proof from each neighbour."""
     rng, lab = random.Random(seed), Lab(graph)
     events = [*NAMES[1:], ""]
     rng.shuffle(events)
@@ -122,8 +122,8 @@ def test_whatever_comes_first_it_is_ready_in_the_end(seed: int, graph: GraphRule
 
 
 @pytest.mark.parametrize("order", list(permutations(("plant", "inv2", "inv3"))))
-def test_a_tick_is_done_with_whatever_comes_last(order: tuple[str, ...]) -> None:
-    """Measurement and states in any order: nothing before all are there, and `wanted` counts them down."""
+def test_a_tick_is_due_after_the_last_message_in_any_order(order: tuple[str, ...]) -> None:
+    """Measurement and states come in any order; the tick is due after the last, and `wanted` counts down."""
     lab, wanted = ticking("inv2", "inv3", tick=5), []
     for sender in order:
         assert lab.decided == []
@@ -149,8 +149,8 @@ def test_a_state_that_comes_too_early_is_kept_for_its_tick() -> None:
     assert decided[0] == decided[1]
 
 
-def test_who_is_off_the_roster_is_not_awaited() -> None:
-    """A roster without it ends the wait, though its token may still be there."""
+def test_an_agent_off_the_roster_is_not_awaited() -> None:
+    """A roster without the agent ends the wait, even while its token is there."""
     lab = ticking("inv2", "inv3", tick=5)
     lab.state("inv2", 4)
     lab.prepare(1, "inv2")
@@ -160,7 +160,7 @@ def test_who_is_off_the_roster_is_not_awaited() -> None:
 
 
 def test_a_dead_neighbours_last_value_counts_once_more() -> None:
-    """The wait ends with the token of the process that is awaited, not with a namesake's."""
+    """The token of the awaited process ends the wait, not that of another process of the name."""
     lab = ticking("inv2", tick=5)
     lab.measure(5)
     lab.token("inv2", "impostor", gone=True)
@@ -171,8 +171,8 @@ def test_a_dead_neighbours_last_value_counts_once_more() -> None:
     assert not lab.node.failed
 
 
-def test_what_is_missing_is_named_in_the_order_of_the_neighbours() -> None:
-    """First the measurement, then the states; and the deadline says it."""
+def test_missing_messages_are_named_in_the_order_of_the_neighbours() -> None:
+    """First the measurement, then the states, as the error at the deadline names them."""
     lab = ticking("inv2", "inv3", tick=5)
     assert lab.missing == [("Measurement(5)", "plant")]
     lab.measure(5)
@@ -193,7 +193,7 @@ def test_a_measurement_of_another_tick_is_refused(k: int, kind: str) -> None:
 
 
 def test_a_first_measurement_whose_time_is_not_that_of_its_tick_is_refused() -> None:
-    """The agent would take its own times from the tick, and send messages of later than any message may be."""
+    """The agent takes its times from the tick, and would send messages beyond the largest time."""
     lab = Lab()
     lab.meet("inv2")
     lab.prepare(0, "inv2")
@@ -205,7 +205,7 @@ def test_a_first_measurement_whose_time_is_not_that_of_its_tick_is_refused() -> 
 
 
 def test_a_state_of_a_later_tick_is_left_alone() -> None:
-    """The others can only go on without an agent that is off the roster; the plant's word of it may come later."""
+    """The others continue without an agent off the roster; the plant's roster may come later."""
     lab = ticking("inv2", tick=5)
     lab.state("inv2", 6)
     lab.measure(5)

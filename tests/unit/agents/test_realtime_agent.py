@@ -13,7 +13,7 @@ from tests.unit.agents.realtime_lab import KEYS, Lab, running
 
 
 def test_it_waits_visibly_for_a_plant_and_joins_when_it_measures() -> None:
-    """Seeking, waiting, running: each is said once and stands in the status; no state is sent before."""
+    """Seeking, waiting, running: the log has each once, the status the present one; no state goes out before."""
     lab = Lab(deadline=0.0)
     lab.go(0.5)
     first = lab.status()
@@ -33,7 +33,7 @@ def test_it_waits_visibly_for_a_plant_and_joins_when_it_measures() -> None:
 
 
 def test_without_any_plant_it_gives_up_after_the_deadline() -> None:
-    """The message says which run was sought and how long."""
+    """The message names the run and the wait."""
     lab = Lab(deadline=3.0)
     lab.go(2.9)
     assert not lab.side.finished
@@ -44,7 +44,7 @@ def test_without_any_plant_it_gives_up_after_the_deadline() -> None:
 
 
 def test_ticks_keep_their_schedule_and_missed_ones_are_counted() -> None:
-    """Due times are n T_c / speed from the middle between two measurements; a late wake does one tick, not many."""
+    """Ticks are due n T_c / speed after the middle between two measurements; a late wake makes one tick."""
     lab = running(speed=2.0)
     start = 100.005
     lab.go(0.015)
@@ -57,7 +57,7 @@ def test_ticks_keep_their_schedule_and_missed_ones_are_counted() -> None:
 
 
 def test_a_silent_neighbour_is_out_after_max_age_and_back_with_its_next_state() -> None:
-    """Age counts from the arrival, on the own clock; a frozen process keeps its token."""
+    """Age counts from the arrival on the own clock; a frozen process keeps its token."""
     lab = running("inv2")
     lab.state("inv2", 0)
     lab.measure(1)
@@ -92,7 +92,7 @@ def test_the_age_at_which_a_state_is_out_is_an_option(max_age: float, pulls: boo
 
 
 def test_a_neighbour_in_another_island_is_left_out() -> None:
-    """Its state says where it stands; the status shows it as a neighbour that is not used."""
+    """Its state names its island; the status shows an unused neighbour."""
     lab = running("inv2", "inv3")
     for k in range(1, 30):
         lab.measure(k)
@@ -106,7 +106,7 @@ def test_a_neighbour_in_another_island_is_left_out() -> None:
 
 
 def test_a_restarted_neighbour_is_heard_again_and_its_ghost_is_not() -> None:
-    """A new process counts from 0 again; what its former life still sends is dropped."""
+    """A new process counts from 0 again; messages of the former one are dropped."""
     lab = running("inv2")
     lab.state("inv2", 500)
     lab.token("inv2", gone=True)
@@ -125,7 +125,7 @@ def test_a_restarted_neighbour_is_heard_again_and_its_ghost_is_not() -> None:
     assert lab.side.rejects.counts["ghost"] == 1
 
 
-def test_it_holds_while_no_measurement_comes_and_returns_from_what_the_plant_holds() -> None:
+def test_it_holds_without_measurements_and_restarts_from_the_held_set_points() -> None:
     """No state goes out on old readings; the return starts from the set-points of the measurement."""
     lab = running()
     for k in range(1, 5):
@@ -147,8 +147,8 @@ def test_it_holds_while_no_measurement_comes_and_returns_from_what_the_plant_hol
     ]
 
 
-def test_it_survives_the_plants_death_and_follows_its_new_life() -> None:
-    """Nothing is decided between; the new plant begins at t = 0 with other set-points, the old one is a ghost."""
+def test_it_survives_the_plants_death_and_follows_the_next_plant() -> None:
+    """It decides nothing in between; the new plant begins at t = 0, and messages of the old one are ghosts."""
     lab = running()
     lab.measure(500)
     lab.token("plant", gone=True)
@@ -166,7 +166,7 @@ def test_it_survives_the_plants_death_and_follows_its_new_life() -> None:
 
 
 def test_it_leaves_properly() -> None:
-    """Leave goes out, of itself or at the plant's word; it closes when the plant answers; refused, it just closes."""
+    """It sends Leave at SIGTERM or at a Stop, and closes at the answer; a refused agent closes at once."""
     asked, stopped, refused = running(), running(), Lab()
     refused.token("plant")
     asked.side.leave("asked to leave: SIGTERM")
@@ -189,8 +189,8 @@ def test_it_leaves_properly() -> None:
     assert [len(leave) for leave in leaves] == [1, 1, 0]
 
 
-def test_who_leaves_and_is_not_answered_closes_after_a_second() -> None:
-    """A plant that is frozen keeps nobody; where there is none, nothing is waited for."""
+def test_an_agent_that_leaves_without_an_answer_closes_after_a_second() -> None:
+    """A frozen plant holds it for a second at most; without a plant it closes at once."""
     frozen, alone = running(), Lab()
     frozen.side.leave("asked to leave: SIGTERM")
     alone.side.leave("asked to leave: SIGTERM")
@@ -203,7 +203,7 @@ def test_who_leaves_and_is_not_answered_closes_after_a_second() -> None:
 
 
 def test_a_nameplate_that_does_not_come_is_asked_for_again() -> None:
-    """A question can die with the link it went over, though the other's token stays; the answer ends the asking."""
+    """A query can be lost with its link while the token stays; the answer ends the repetition."""
     lab = running()
     lab.token("inv2")
     lab.go(0.5)
@@ -216,7 +216,7 @@ def test_a_nameplate_that_does_not_come_is_asked_for_again() -> None:
 
 
 def test_a_message_on_which_the_agent_fails_costs_only_itself() -> None:
-    """The last line of defence: an error of ours is counted and logged once, with its traceback; the agent goes on."""
+    """An error of gridpeers is counted and logged once, with its traceback; the agent continues."""
     lab = running("inv2")
 
     def broken(*_: object) -> None:

@@ -32,8 +32,8 @@ class Divides(Law):
         return SetPoints(0.5 / (2 - self.steps), 1.0)
 
 
-def test_who_does_not_tell_tells_the_plant_alone_and_gives_a_sign_before_it_counts_as_silent() -> None:
-    """Neighbours drop a state after 0.25 s: at half of that they are told, and which numbers they did not miss."""
+def test_a_quiet_agent_sends_to_the_plant_alone_and_shows_itself_before_it_counts_as_silent() -> None:
+    """Neighbours drop a state after 0.25 s: at half of that they get a state that counts the quiet ones."""
     lab = running(law=Quiet())
     for k in range(1, 14):
         lab.measure(k)
@@ -51,8 +51,8 @@ def test_who_does_not_tell_tells_the_plant_alone_and_gives_a_sign_before_it_coun
     )
 
 
-def test_a_law_that_fails_is_told_once_and_the_agent_says_nothing_more() -> None:
-    """The plant hears why in a last state, which nobody uses; the log has it too.
+def test_a_failing_law_is_reported_once_and_its_agent_sends_nothing_more() -> None:
+    """The plant gets the reason in a last state, which no neighbour uses; the log has it too.
 
     That the plant does not hear it from then on is no reason for a new session.
     """

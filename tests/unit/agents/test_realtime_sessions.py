@@ -8,7 +8,7 @@ from tests.unit.agents.realtime_lab import KEYS, Lab, running
 
 
 def test_an_agent_whose_plant_is_there_but_mute_begins_again_with_a_new_session() -> None:
-    """A link half renewed after a cut can mislead messages for good; before the first measurement one waits."""
+    """A half-renewed link after a cut can lose messages for ever; before the first measurement the agent waits."""
     lab = Lab()
     lab.token("plant")
     for _ in range(20):
@@ -35,7 +35,7 @@ def test_an_agent_whose_plant_is_there_but_mute_begins_again_with_a_new_session(
         (("inv2", "inv3"), ("inv2", "inv3"), "the plant is heard, but does not hear this agent"),
     ],
 )
-def test_whoever_hears_less_than_the_plant_opens_a_new_session(
+def test_an_agent_that_hears_less_than_the_plant_opens_a_new_session(
     roster: tuple[str, ...], heard: tuple[str, ...], why: str
 ) -> None:
     """The plant hears a neighbour, met or not, and the agent does not; or the plant does not hear the agent."""
@@ -54,7 +54,7 @@ def test_whoever_hears_less_than_the_plant_opens_a_new_session(
 
 
 def test_a_neighbour_that_the_plant_does_not_hear_either_is_no_reason_for_a_new_session() -> None:
-    """A neighbour that is frozen, dead or waiting is silent for everybody, and no reason for a new session."""
+    """A frozen, dead or waiting neighbour is silent for all agents."""
     lab = running("inv2", "inv3")
     for k in range(1, 400):
         lab.measure(k, roster=("inv1", "inv2"))
@@ -65,7 +65,7 @@ def test_a_neighbour_that_the_plant_does_not_hear_either_is_no_reason_for_a_new_
 
 
 def test_an_agent_that_has_lost_its_plant_seeks_it_with_new_sessions_now_and_then() -> None:
-    """A half renewed link can hide a plant that is there; each new session is given twice the time, up to a minute."""
+    """A half-renewed link can hide a plant; each new session waits twice as long, up to a minute."""
     lab = Lab()
     lab.token("plant")
     lab.measure(1)
@@ -85,7 +85,7 @@ def test_an_agent_that_has_lost_its_plant_seeks_it_with_new_sessions_now_and_the
 
 
 def test_a_plant_that_says_it_waits_is_not_silent() -> None:
-    """A new plant measures nothing until all are there: agents keep their sessions and tell for whom it waits."""
+    """A new plant sends no measurement until all agents are there: they keep their sessions and name the missing."""
     lab = Lab()
     lab.token("plant")
     lab.measure(1)

@@ -85,14 +85,14 @@ def test_where_robustness_is_missing_the_honest_may_never_agree() -> None:
 
 
 def test_without_defences_it_is_the_paper_s_law() -> None:
-    """F = 0 and nothing else gives the paper's step, bit by bit."""
+    """F = 0 alone gives the paper's step, bit by bit."""
     around = [neighbour("a", 0.9, 0.3), neighbour("b", 0.1, -0.2)]
 
     assert Resilient(F=0).step(own(0.4, 0.1), around, T)[:4] == Consensus().step(own(0.4, 0.1), around, T)[:4]
 
 
 def test_a_state_that_no_inverter_can_have_does_not_count() -> None:
-    """Beyond the limits of P_set, of what droop makes of it at the own frequency, or of vars, give or take 0.1 pu."""
+    """P_set, the power on droop at the own frequency, or vars are beyond their limits by 0.1 pu."""
     law = Resilient(F=0, tolerance=0.1)
 
     def counts(n: Neighbour, e: float = 0.0) -> bool:
@@ -123,7 +123,7 @@ def test_a_rate_limit_holds_vars_as_well_and_grows_with_the_time_of_silence() ->
         assert V_set(-0.9, silent) == pytest.approx(V_set(-most, silent), abs=1e-12)
 
 
-def test_who_is_implausible_ages_out_and_comes_back_slowly() -> None:
+def test_an_implausible_neighbour_ages_out_and_returns_slowly() -> None:
     """After three times T_out its weight is e^-3; a start forgets it."""
     law, T_out = Resilient(F=0, tolerance=0.1, T_out=0.2), 0.2
     steps = round(3 * T_out / T)
@@ -154,7 +154,7 @@ def test_a_neighbour_that_was_only_ever_implausible_is_held_back_if_it_is_distru
 
 
 def test_distrust_without_a_tolerance_is_refused() -> None:
-    """Nobody would ever be implausible, so that T_out did nothing."""
+    """Without a tolerance no state is implausible, so T_out has no effect."""
     with pytest.raises(ValueError, match=r"has T_out = 0\.5 s without a tolerance, so no state is ever implausible"):
         Resilient(T_out=0.5, rate=1.0)
 

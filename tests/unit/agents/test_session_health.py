@@ -40,7 +40,7 @@ SOME = ("inv1", "inv2", "inv3", "inv4", "inv6")
     ],
     ids=["unheard by all", "of all that miss it", "smaller of two", "other of two", "most", "all", "unheard there"],
 )
-def test_whose_session_is_to_blame_opens_a_new_one_first(
+def test_the_agent_with_the_broken_session_opens_a_new_one_first(
     own: str, silent: tuple[str, ...], names: tuple[str, ...], longer: float
 ) -> None:
     """One new session instead of nine at once; of two that miss only each other the one with the smaller name's."""

@@ -72,7 +72,7 @@ def test_a_class_declares_by_fields_that_are_no_parameters() -> None:
 
 
 def test_a_name_of_the_plant_is_taken() -> None:
-    """A record has both."""
+    """A record has quantities of the plant and of laws."""
     ((key, text),) = law_problems({"use": f"{__name__}:Taken"})
 
     assert (key, text) == ("use", "shares V, a quantity of the plant; give it another name")
@@ -88,7 +88,7 @@ def test_a_scenario_declares_for_a_program_and_for_no_other_carrier() -> None:
 
 
 def test_the_configuration_carries_what_a_law_declares() -> None:
-    """So every process, and the record, has units and ranges without the law; the scenario as run has them too."""
+    """Every process, the record and the scenario as run have units and ranges without the law."""
     scenario = gp.load("islanding")
 
     assert law_of(scenario.replace({"law": f"{__name__}:Shares"}).spec, "IV").shared[0] == OMEGA
@@ -97,7 +97,7 @@ def test_the_configuration_carries_what_a_law_declares() -> None:
 
 
 def test_an_fmu_declares_by_its_outputs(tmp_path: Path) -> None:
-    """By their unit, min, max and description."""
+    """Unit, min, max and description of the outputs count."""
     pytest.importorskip("fmpy")
     variable = '<ScalarVariable name="{}" valueReference="{}" causality="output"{}><Real{}/></ScalarVariable>'
     omega = variable.format("shared_Omega", 2, ' description="Integral."', ' unit="pu" min="-0.05" max="0.05"')
@@ -134,7 +134,7 @@ def test_a_law_that_shares_a_value_beyond_its_range_or_another_name_fails(then: 
 
 
 def test_a_state_with_a_value_beyond_its_range_is_dropped_and_counted() -> None:
-    """The last good one stays; a value that nobody declared has no range."""
+    """The last good state stays; an undeclared value has no range."""
     it = agent()
 
     assert it.hear(sharing(1, 0.05))

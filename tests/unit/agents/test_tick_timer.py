@@ -27,7 +27,7 @@ def phases(timer: TickTimer, first: float, count: int, *, drift: float = 0.0, ji
 
 @pytest.mark.parametrize("offset", [i / 16 for i in range(1, 17)])
 def test_from_the_second_tick_on_an_agent_keeps_to_the_middle_between_two_measurements(offset: float) -> None:
-    """Wherever in the period it happens to begin; and it ticks once a period, not more, not less."""
+    """It ticks exactly once a period, from any start within the period."""
     timer = TickTimer(T)
     timer.start(5.0)
     seen = phases(timer, 5.0 - offset * T, 200)
@@ -47,8 +47,8 @@ def test_a_clock_that_drifts_against_the_plants_is_led_back_to_the_middle() -> N
     assert max(seen[1:]) - min(seen[1:]) > 0.2, "it drifts"
 
 
-def test_a_clock_that_is_to_drift_drifts() -> None:
-    """The ticks of an emulated drifting clock are left alone: the drift is what is studied."""
+def test_an_emulated_drift_is_not_corrected() -> None:
+    """The timer does not correct the ticks of an emulated drifting clock."""
     timer = TickTimer(T, keeps_clear=False)
     timer.start(5.0)
     seen = phases(timer, 4.999, 3000, drift=1e-3)

@@ -27,7 +27,7 @@ TABLES = {
 
 
 def test_one_slip_is_one_problem() -> None:
-    """A wrong end of the run is reported once, not for each link; a mistake of `replace` is reported as its own."""
+    """A wrong end of the run is reported once, not for each link; a mistake of `replace` has its own line."""
     case = {"IV": {"secondary": "all", "graph": "full", "link": [{"on": "* <-> *", "loss": 0.1}]}}
     with pytest.raises(gp.ScenarioError) as caught:
         gp.Scenario(time={"end_s": "7"}, case=case)
@@ -50,7 +50,7 @@ def test_a_scenario_of_keyword_tables_is_the_scenario_of_the_same_file(tmp_path:
 
 
 def test_a_problem_that_a_change_makes_elsewhere_keeps_its_line() -> None:
-    """A key that was not changed is found in the file."""
+    """An unchanged key keeps its line in the file."""
     with pytest.raises(gp.ScenarioError, match=r"islanding\.toml:\d+: event\[1\]\.t_s"):
         gp.load("islanding").replace({"time.end_s": 2.0})
 

@@ -65,7 +65,7 @@ def test_a_program_shares_what_the_class_does(law: dict[str, str], tmp_path: Pat
 
 
 def test_an_export_has_a_table_of_it(law: dict[str, str], tmp_path: Path) -> None:
-    """The same numbers, in a column for each inverter with name and unit."""
+    """A column for each inverter, with name and unit, has the same numbers."""
     result = gp.load("islanding").replace({**SHORT, "case.IV.law": law}).run("IV")
 
     files = export(result.run_record, "csv", tmp_path)
