@@ -31,7 +31,7 @@ class Gains(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     beta_GFL: Annotated[float, Plausible("gain beta_GFL", 0.0, 1e4)] = 1.0
     """Weight of the var-sharing sum of a GFL, (14). The paper has 1."""
     alpha_min: Annotated[float, Below("alpha", only_with="V_full"), Plausible("gain alpha_min", 0.0, 1e4)] = 0.0
-    """Least weight of a small voltage error, for V_full; below alpha."""
+    """Least weight of a small voltage error, with V_full; below alpha."""
     V_full: Annotated[float, Unit("pu"), Plausible("a voltage error", 0.0, 0.2)] = 0.0
     """Voltage error (pu) from which on alpha counts in full; a smaller one counts in proportion, but not below
     alpha_min. 0: always in full, the paper's way."""
@@ -72,7 +72,7 @@ class DegradedCommunication(msgspec.Struct, frozen=True, forbid_unknown_fields=T
     T_sat: Annotated[
         float, Unit("s"), Plausible("a time until an inverter counts as saturated", 1e-3, 60.0, above_zero=True)
     ] = 0.5
-    """Time (s) of no progress towards its droop characteristic after which an inverter counts as saturated, for
+    """Time (s) without progress towards its droop characteristic, after which an inverter counts as saturated, for
     "conditional"."""
     islands: Literal["switches", "frequency", "ignored"] = "switches"
     """How an agent detects neighbours in another island, to leave them out: by the positions of switches ("switches"),

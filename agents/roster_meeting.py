@@ -102,7 +102,7 @@ class RosterMeeting:
             self._ask_again(now)
             return
         if self.roster is not None and message.seq <= self.roster.seq:
-            raise RejectedError("stale", f"roster {message.seq}, {self.roster.seq} is known")
+            raise RejectedError("stale", f"roster {message.seq}, but roster {self.roster.seq} is known")
         processes = self._known.processes(message)
         if processes.get(self._post.name) != self._instance:
             raise RejectedError("unexpected", f"roster {message.seq} is without this process")

@@ -9,9 +9,9 @@ Nobody grants a tick. At each one the agent uses
 
 Ages are s of run time. Tokens say who exists, never who works: a frozen process keeps its token for seconds.
 
-**When a tick is late** it is done at once, and the ticks missed meanwhile are left out: the schedule does not move. If
-it is late by more than `max_age` (the process was frozen, or starved), the agent drops what it knew, holds its
-set-points, and waits for news. Nobody waits for it: its neighbours go on without its state once that is too old.
+**A late tick** is done at once, and the ticks missed meanwhile are left out: the schedule does not move. If it is late
+by more than `max_age` (the process was frozen, or starved), the agent forgets its neighbours' states, holds its
+set-points and waits for new messages. Nobody waits for it: its neighbours continue without its state.
 
 The worst time to tick is just as the next measurement comes, now before it and now after: the set-points then miss the
 plant's step, so that the loop is one period longer. With the paper's gains the vars of a returning inverter then ring
@@ -225,7 +225,7 @@ class AgentTimer:
             self.upkeep.missed += skipped
             self.upkeep.lateness = max(self.upkeep.lateness, late)
             if late * config.speed > config.max_age:
-                self.hold(f"woken {late:.2f} s late; waits for news")
+                self.hold(f"woke {late:.2f} s late; waits for new messages")
         self._shown = self.upkeep.shown
         return TickVerdict("tick")
 

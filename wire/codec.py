@@ -38,7 +38,7 @@ KINDS = {
     "stale": "about a past tick or roster",
     "excess": "dropped unread, or unanswered: more came than this process takes at once",
     "unexpected": "well-formed, but not for this receiver at this time",
-    "failed": "it raised an error of ours, see the traceback",
+    "failed": "its handling raised an error of gridpeers, see the traceback",
 }
 
 _encoder = msgspec.msgpack.Encoder()

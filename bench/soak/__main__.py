@@ -1,4 +1,4 @@
-"""Soak: an hour by the clock of the paper's feeder, an agent a process, disturbed every few seconds.
+"""Soak: an hour of the paper's feeder in real time, a process per agent, disturbed every few seconds.
 
     python -m bench.soak                                          an hour
     python -m bench.soak --hours 0.05 --seed 2                    three minutes
@@ -46,10 +46,10 @@ from gridpeers.scenarios.schema import load_scenario
 from gridpeers.wire.messages import PLANT
 
 TOLD = 10
-"""Actions after which progress is told."""
+"""Actions between two reports of progress."""
 
 SMALL = 100_000
-"""Size (bytes) up to which a file is not worth a word."""
+"""Size (bytes) from which a file is listed."""
 
 
 class StopRequest:
@@ -74,13 +74,11 @@ class StopRequest:
 
 
 def main(
-    hours: Annotated[float, typer.Option(min=10.0 / 3600.0, max=48.0, help="Length by the clock.")] = 1.0,
-    seed: Annotated[int, typer.Option(help="Of the actions.")] = 1,
-    keep: Annotated[
-        Path | None, typer.Option(help="Keep record, logs and sizes.csv in this folder, which is new.")
-    ] = None,
+    hours: Annotated[float, typer.Option(min=10.0 / 3600.0, max=48.0, help="Length (h), in real time.")] = 1.0,
+    seed: Annotated[int, typer.Option(help="Seed of the actions.")] = 1,
+    keep: Annotated[Path | None, typer.Option(help="Keep record, logs and sizes.csv in this new folder.")] = None,
 ) -> None:
-    """Run the paper's feeder by the clock, disturb it every few seconds, and print the table of what was found."""
+    """Run the paper's feeder in real time, disturb it every few seconds, and print the results."""
     if keep is not None:
         try:
             keep.mkdir(parents=True)
@@ -154,9 +152,9 @@ def judged(run: SoakRun, end: SoakEnd, others: float) -> list[Finding]:
     found = [judge_late(run.late, run.steps, others)]
     for what, name, limit in (
         ("heal", "end of a cut or freeze until both sides use each other", HEAL),
-        ("told", "kill -9 until the plant tells it and nobody uses the agent", None),
+        ("told", "kill -9 until the plant reports it and nobody uses the agent", None),
         ("joined", "start of an agent until it and all others use each other", None),
-        ("restored", "frequency out of its band of 0.01 Hz, until it held", PATIENCE),
+        ("restored", "frequency out of its band of 0.01 Hz, until it stays within", PATIENCE),
     ):
         of_kind = [timed for timed in run.times if timed.what == what]
         deaf = sum(timed.deaf for timed in of_kind)

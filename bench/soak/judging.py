@@ -11,7 +11,7 @@ import pandas as pd
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict, Violation, summary
 
 FLAT = 0.05
-"""Growth of memory or files, as a part, that counts as none."""
+"""Growth of memory or files, as a part, that counts as flat."""
 
 HEAL = 6.0
 """Longest time (s) from the end of a cut until both sides use each other's new values."""
@@ -29,7 +29,7 @@ LEAST = 300.0
 """Shortest run (s) whose growth says anything."""
 
 LAST_WORDS = "last_words"
-"""The check that names agents which end for no reason that the run knows."""
+"""The check that names agents that end without a reason in the record."""
 
 FREQUENCY = "frequency"
 """The check of the band of frequency."""
@@ -158,7 +158,7 @@ def judge_times(what: str, seconds: Sequence[float], limit: float | None, deaf: 
     Finding(what='heal', limit='under 6 s', found='3: p50 0.20, p95 0.29, worst 0.30 s', verdict='PASS')
     """
     words = "" if limit is None else f"under {limit:g} s"
-    left_out = f"; {deaf} not counted, as this program was deaf" if deaf else ""
+    left_out = f"; {deaf} not counted, as this program lost its session" if deaf else ""
     if not seconds:
         return Finding(what, words, f"none{left_out}", "-")
     worst = max(seconds)

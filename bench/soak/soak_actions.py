@@ -32,7 +32,7 @@ LASTS: dict[Kind, tuple[float, float]] = {
     "load": (5.0, 6.0),
     "zone": (5.0, 6.0),
 }
-"""Shortest and longest time (s) of each. Zenoh gives a silent link up after 2 s: a freeze is shorter or longer."""
+"""Shortest and longest time (s) of each. Zenoh closes a silent link after 2 s: a freeze is shorter or longer."""
 
 SETTLE = 5.0
 """Time (s) before a load or a switch changes. Such a change ends a window, at whose end the checks judge steady values,

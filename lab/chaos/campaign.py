@@ -161,7 +161,7 @@ class Campaign:
                 yield f"{name:18} {passed + len(failed):7} {len(failed):9}  {first}".rstrip()
         collapses = sum(bool(row.collapse) for row in rows)
         beyond = f"; {collapses} with a lasting collapse that no control prevents" if collapses else ""
-        yield f"{self.violated} of {len(rows)} runs violated anything; {sum(row.trips for row in rows)} trips{beyond}"
+        yield f"{self.violated} of {len(rows)} runs violated a check; {sum(row.trips for row in rows)} trips{beyond}"
         for name, (found, simplest, file) in self.failures.items():
             # of the run as found if the simplest one passes the next time
             yield f"{name}, run {found.number}: {simplest.violated.get(name, found.violated[name])}"
@@ -207,7 +207,7 @@ class Campaign:
             f"Found by chaos: {simplest.violated.get(violated, row.violated[violated])}"[:300],
             f"{self.command}, run {row.number}, seed of the messages {seed}"
             + (f", shrunk from {len(row.schedule)} disturbances to {len(schedule)}" if fewer else ""),
-            f"Once more: {again(file)}",
+            f"Repeat: {again(file)}",
             *(f"  {it}" for it in in_order(schedule)),
         ]
         scenario = msgspec.structs.replace(

@@ -279,7 +279,7 @@ def chaos_checks(
 
 MOST_LOAD, LEAST_LOAD = 0.97, 0.05
 """Load of an island, as parts of the ratings of its inverters that control: above, losses and vars take what is left,
-below, its inverters are at their lower limit, which is no business of the control law."""
+below, its inverters are at their lower limit, which is outside of the control law."""
 
 KILLED = 0.5
 """Part of its rating that an inverter is counted with whose agent has been killed: it stays at its last set-points."""

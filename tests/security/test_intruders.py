@@ -46,7 +46,7 @@ def test_without_a_certificate_nobody_gets_a_link(town: Town) -> None:
 
 
 def test_with_a_certificate_of_another_site_nobody_gets_a_link(town: Town, tmp_path: Path) -> None:
-    """Though it has the same names."""
+    """The other site has members of the same names."""
     other = tmp_path / "lab"
     make_site(other)
     issue(other, "inv3")
@@ -58,7 +58,7 @@ def test_with_a_certificate_of_another_site_nobody_gets_a_link(town: Town, tmp_p
 
 
 def test_with_an_expired_certificate_nobody_gets_a_link(town: Town, lab: Path, tmp_path: Path) -> None:
-    """One of our own site, that ended a day ago."""
+    """The certificate is of this site and ended a day ago."""
     site = tmp_path / "lab"
     shutil.copytree(lab, site)
     issue(site, "inv3", days=1.0, now=datetime.now(UTC) - timedelta(days=2))  # noqa: TID251
@@ -91,7 +91,7 @@ def lies_in(town: Town) -> list[tuple[float, ...]]:
 
 
 def test_an_agent_cannot_speak_as_another(town: Town, lab: Path) -> None:
-    """With the certificate of inv3 a state of inv1, in inv1's epoch and with its next numbers, reaches nobody."""
+    """inv3 sends a state of inv1, with inv1's epoch and its next numbers. It reaches nobody."""
     with Intruder(town.endpoint, credentials(lab, "inv3")) as intruder:
         attack(town, intruder, town.keys.state("inv1"), *many(state_of(town, "inv1", 10**6)))
 
@@ -100,7 +100,7 @@ def test_an_agent_cannot_speak_as_another(town: Town, lab: Path) -> None:
 
 
 def test_without_certificates_an_agent_can_speak_as_another(tmp_path: Path) -> None:
-    """The same attack on a run with open links: it is the certificates that keep the intruder out."""
+    """The same attack succeeds on open links, so the certificates stop it."""
     with Town(2, tmp_path).all() as open_town, Intruder(open_town.endpoint, None) as intruder:
         attack(open_town, intruder, open_town.keys.state("inv1"), *many(state_of(open_town, "inv1", 10**6)))
 
@@ -123,7 +123,7 @@ def asks(intruder: Intruder, question: str, key: str, lies: Sequence[Message]) -
 
 
 def test_an_agent_cannot_publish_a_measurement(town: Town, lab: Path) -> None:
-    """With the certificate of inv3 a measurement for inv2 does not arrive, whatever it says of its sender."""
+    """A measurement for inv2 from the session of inv3 does not arrive, whatever sender it names."""
     assert town.telemetry is not None
     lies = [
         Measurement(
@@ -170,7 +170,7 @@ def test_a_revoked_member_gets_a_link_and_nothing_on_it(town: Town, lab: Path) -
 
 
 def test_an_agent_whose_certificate_is_issued_later_joins_the_run(tmp_path: Path) -> None:
-    """The others began with a list that does not have it; they use its values, and it theirs."""
+    """The others started with an older list. They use its values, and it uses theirs."""
     lab = tmp_path / "lab"
     make_site(lab)
     for name in ("inv1", "inv2"):

@@ -61,7 +61,7 @@ def test_nobody_sees_a_token_that_a_member_holds_for_another(town: Town, lab: Pa
 
 
 def test_an_agent_gets_no_configuration_but_its_own(town: Town, lab: Path) -> None:
-    """It asks for another's and for all before its own, which alone is answered."""
+    """It asks for another configuration, for all, and for its own. Only the last is answered."""
     own, others = town.keys.config("inv3"), (town.keys.config("inv1"), town.keys.config("*"))
     for name in ("inv1", "inv3"):
         town.session.answer(town.keys.config(name), b"{}")

@@ -39,7 +39,7 @@ def named(error: BaseException) -> str:
     try:
         text = str(error)
     except ANYTHING:
-        text = "its text cannot be had"
+        text = "its text cannot be read"
     return printable(f"{type(error).__name__}: {text}", 200)
 
 

@@ -35,7 +35,7 @@ def setup(*, nodes: tuple[NodeFault, ...] = (), **netem: tuple[Fault | Partition
 
 
 def verdicts(trace: LinkTrace) -> list[tuple[float, Outcome]]:
-    """Of each message of a link when it was sent (s) and what became of it; each was judged once."""
+    """Return the time (s) and the fate of each message of a link; each has one fate."""
     assert len({*zip(trace.seq, trace.t, strict=True)}) == len(trace.seq)
     return list(zip(trace.t, trace.outcome, strict=True))
 

@@ -1,4 +1,4 @@
-"""The record of runs in real time: what arrived when, what came of it, and what a dead process leaves behind."""
+"""The record of runs in real time: arrivals, decisions, and the record after a process died."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> RunRecord:
 
 
 def test_every_decision_can_be_made_again(record: RunRecord) -> None:
-    """From what had arrived by then the same core decides the same to the byte; also around a pause and a restart."""
+    """From the same arrivals the core makes the same decision, byte for byte, also around a pause and a restart."""
     assert record.complete
     for agent in record.agents:
         again = list(recomputed(record, agent))
@@ -78,7 +78,7 @@ def test_every_decision_can_be_made_again(record: RunRecord) -> None:
 
 
 def test_a_decision_says_whom_it_left_out_and_why(record: RunRecord) -> None:
-    """In a partition and in a pause the states of the others grow old; of a killed neighbour no more is known."""
+    """In a partition and in a pause the states of the others grow old. A killed neighbour has no state."""
 
     def reasons(agent: str, other: str, since: float, until: float) -> set[str]:
         return {

@@ -104,7 +104,7 @@ def test_terminals_in_the_order_of_people(desk: Desk) -> None:
 
 
 def status_of_another_run(endpoint: str) -> tuple[int, str]:
-    """Ask for a run that is not there, for longer if the machine is too busy for a link to the one that is."""
+    """Ask for a run that does not exist, longer if the machine is too busy for a link to the other run."""
     for wait in ("1", "8", "40"):
         code, text = invoke("status", "--run", "other", "--connect", endpoint, "--wait", wait)
         if "runs there" in text:
@@ -113,7 +113,7 @@ def status_of_another_run(endpoint: str) -> tuple[int, str]:
 
 
 def test_what_is_not_there_is_told_in_one_line(desk: Desk) -> None:
-    """An agent without inverter, a second one of a name, no such switch, no such run, one that is there: exit 2."""
+    """No inverter, a second agent of a name, no such switch, no such run, a run that exists: exit code 2."""
     plant_of(desk)
     desk.open("agent", "inv2").expect("inv2: joins at t = ")
     endpoint = desk.options[-1]
@@ -189,7 +189,7 @@ def test_a_log_that_the_end_of_up_names_is_there(desk: Desk) -> None:
 
 
 def test_a_plant_and_an_agent_go_on_when_nobody_reads_their_log(desk: Desk) -> None:
-    """They serve until the run is ended, as if somebody read, and complain nowhere."""
+    """They serve until the end of the run, as if somebody read, and print no error."""
     endpoint = desk.options[-1]
     reading, closed_pipe = os.pipe()
     os.close(reading)

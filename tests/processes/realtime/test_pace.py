@@ -129,9 +129,9 @@ def test_agents_of_one_process_live_and_leave_as_others_do(tmp_path: Path) -> No
 
 
 def test_a_plant_that_freezes_or_dies_is_held_out_for_and_has_its_agents_again(tmp_path: Path) -> None:
-    """SIGSTOP: agents hold; SIGCONT: it does not rush through what it missed, and says how much it was.
+    """SIGSTOP: agents hold. SIGCONT: the plant does not rush through the missed time, and says how long it was.
 
-    Kill -9 of the plant, which is the rendezvous too: agents hold and seek; a new plant has them all again.
+    Kill -9 of the plant, which is the rendezvous too: agents hold and look for it. They all join a new plant.
     """
     with Town(4, tmp_path).all() as town:
         settled(town)

@@ -81,7 +81,7 @@ MOST = 4.0
 
 @pytest.mark.parametrize(("who", "clock"), [("plant", "realtime"), ("inv1", "simulated")])
 def test_a_killed_process_leaves_a_record(who: str, clock: Clock, tmp_path: Path) -> None:
-    """Decisions are made again from all that is there, if what it records was killed."""
+    """Every recorded decision can be made again, whichever process was killed."""
     assert_usable(killed(tmp_path / "run", clock, 1.3, who, most=MOST), complete=who == "plant")
 
 
@@ -123,7 +123,7 @@ ROOM = 180_000
 def test_a_run_without_room_for_its_record_ends_and_has_what_came_until_then(
     words: tuple[str, ...], said: str, elsewhere: Path
 ) -> None:
-    """Its last words name the reason, no file is empty, and what is in the record can be read."""
+    """Its last line names the reason, no file is empty, and the record can be read."""
     (elsewhere / "calm.toml").write_text(CALM)
     command, *options = words
     unlimited = resource.getrlimit(resource.RLIMIT_FSIZE)

@@ -1,4 +1,4 @@
-"""Runs in real time, replayed: the same cores decide the same, and what would have been follows from it."""
+"""Replay of runs in real time: the same cores decide the same, and a counterfactual follows from them."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_a_replay_gives_the_set_points_of_the_run(run: Result) -> None:
 
 
 def test_a_loop_without_a_change_gives_the_run_back(run: Result) -> None:
-    """What each process hears is what the others send in the replay; so nothing of the record is needed but times."""
+    """Each process hears what the others send in the replay. The replay needs only the times of the record."""
     done = gp.counterfactual(run)
 
     assert done.difference is None

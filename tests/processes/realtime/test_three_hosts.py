@@ -118,7 +118,7 @@ def desk(tmp_path: Path, router: Router) -> Iterator[Desk]:
 
 
 def test_all_meet_at_a_router_that_comes_last_dies_and_comes_back(desk: Desk, router: Router) -> None:
-    """All know the router alone. Who was there before it waits; while it is dead nobody is heard; then all go on."""
+    """All processes know only the router. Earlier ones wait for it. Without it nobody is heard; then all continue."""
     agents = {name: desk.open("agent", name) for name in ("inv1", "inv4", "inv7")}
     for name, agent in agents.items():
         agent.expect(f"{name}: no plant yet")

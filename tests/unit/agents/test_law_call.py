@@ -43,7 +43,7 @@ def raises(error: BaseException) -> Any:
     (lambda: SetPoints("0.5", 1.0), r"returned P_set = '0.5'; it must be a number"),  # type: ignore[arg-type]
     (lambda: SetPoints(0.5, [1.0]), r"returned V_set = \[1.0\]; it must be a number"),  # type: ignore[arg-type]
     (lambda: SetPoints(10**400, 1.0), r"returned P_set = 10{96}...; it must be a number"),
-    (lambda: raises(UntoldError()), r"raised UntoldError: its text cannot be had"),
+    (lambda: raises(UntoldError()), r"raised UntoldError: its text cannot be read"),
     (Unshown, r"returned a Unshown that cannot be shown; return SetPoints"),
     (lambda: (SetPoints(0.5, 1.0) for _ in "1"), r"returned <generator object .*>>; return "),
     (lambda: SetPoints(0.5, 1.0, {}, np.array([1.0, 2.0])),  # type: ignore[arg-type]

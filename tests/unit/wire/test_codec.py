@@ -36,7 +36,7 @@ def refusal(payload: bytes) -> str:
 
 @pytest.mark.parametrize("kind", MESSAGES)
 def test_every_field_has_bounds_and_only_what_is_within_is_believed(kind: type[Message]) -> None:
-    """At its bounds a value is taken; below, beyond, of another type or missing, the message is refused."""
+    """A value at its bounds is accepted. The message is refused if a value is outside, missing or of another type."""
     tried = 0
     for case in cases(kind):
         refused = refusal(case.payload)
@@ -48,7 +48,7 @@ def test_every_field_has_bounds_and_only_what_is_within_is_believed(kind: type[M
 
 
 def test_no_field_is_without_bounds() -> None:
-    """Numbers, texts, bytes and lists are all bounded; but the recorder is told of whatever number the plant has."""
+    """Numbers, texts, bytes and lists are bounded. Only the rows for the recorder may hold any number."""
 
     def unbounded(type_: Any, path: str) -> list[str]:
         type_ = plain(type_)
@@ -89,7 +89,7 @@ def test_no_field_is_without_bounds() -> None:
     ],
 )
 def test_what_a_message_says_twice_must_agree(kind: type[Message], changes: dict[str, Any]) -> None:
-    """Rosters without doubles, lists that belong together equally long, rows in order of time."""
+    """Rosters have no name twice, related lists have one length, and rows are in order of time."""
     assert refusal(packed(sound(kind, **changes))) == "implausible"
 
 
@@ -123,7 +123,7 @@ def test_every_flipped_bit_is_caught() -> None:
 
 
 def test_lines_are_printable_whatever_was_sent() -> None:
-    """A log is read on terminals: nobody's bytes clear the screen there, or forge a line."""
+    """People read logs on terminals: no received bytes may clear the screen or forge a line."""
     rejects = RejectedMessages("inv1")
     rejects.add("unknown", "some/key", "type \x1b[2J\n2026-01-01 ERROR \u202egnorw si lla")
     rejects.add("failed", "some/key", "KeyError: '\x1b'", "Traceback\n" + "  at \x1b[31m\n" * 1000)
@@ -136,7 +136,7 @@ def test_lines_are_printable_whatever_was_sent() -> None:
 
 
 def test_a_process_that_decodes_ends_well() -> None:
-    """Msgspec 0.22 corrupts memory over some unions of bounded types, which shows at the end of the process only."""
+    """Msgspec 0.22 corrupts memory for some unions of bounded types. The process crashes only at its end."""
     done = subprocess.run(
         [sys.executable, "-c", "import gridpeers.wire.codec, gridpeers.scenarios.emulation.link_data"], check=False
     )

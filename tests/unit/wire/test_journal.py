@@ -1,4 +1,4 @@
-"""A journal: what is noted of messages and tokens, in parts, with a bound on what it holds."""
+"""A journal notes messages and tokens, in parts, and has a bound on its size."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def timed(**options: Any) -> tuple[Traffic, JournalBuffer]:
 
 
 def test_in_real_time_each_call_has_its_time() -> None:
-    """A message that is sent, and a line of the log, have that of the call in which they come about."""
+    """A sent message and a line of the log have the time of the call that makes them."""
     traffic, journal = timed()
     traffic.process("start", "instance a", 9.0)
     traffic.token(KEYS.alive_agent("inv2", "b"), 9.5, appeared=True)
@@ -100,7 +100,7 @@ def test_in_real_time_each_call_has_its_time() -> None:
 
 
 def test_the_bytes_of_a_message_are_noted_once() -> None:
-    """By its sender, and by the plant; whoever else hears a sound one notes its number, also of one that is stale."""
+    """The sender and the plant note the bytes. Other receivers note only the number, also of a stale message."""
     for whole, rejected, entry in (
         (False, "", MessageReference(1.0, "state/inv2", 3, 5)),
         (False, "stale", MessageReference(1.0, "state/inv2", 3, 5, "stale")),
@@ -126,7 +126,7 @@ def test_of_a_rejected_message_the_beginning_is_noted() -> None:
 
 
 def test_what_the_record_has_anyway_is_not_noted() -> None:
-    """What the plant publishes for recorders, but for a message that was rejected; of a status what the plant hears."""
+    """Not noted: messages that the plant publishes for recorders. Noted: rejected ones, and statuses at the plant."""
     for whole in (False, True):
         traffic, journal = timed(whole=whole)
         for key in (KEYS.telemetry, KEYS.journal("inv2"), KEYS.report("inv2"), KEYS.status("inv1"), KEYS.answer("z")):
@@ -143,7 +143,7 @@ def test_what_the_record_has_anyway_is_not_noted() -> None:
 
 
 def test_in_ticks_the_plant_notes_a_tick_as_one_entry() -> None:
-    """Measurements and states in their order; all else one by one, and a tick in which nothing came not at all."""
+    """The entry has measurements and states in order. Other messages have own entries; an empty tick has none."""
     journal = JournalBuffer()
     traffic = TickTraffic(KEYS, ("inv1", "inv2"), journal)
     traffic.sent(KEYS.measurement("inv1"), b"m1")
@@ -188,7 +188,7 @@ def test_the_messages_of_many_agents_are_several_entries(count: int) -> None:
 
 
 def test_a_flood_of_rejected_messages_does_not_fill_the_journal() -> None:
-    """The first since the journal was taken are noted with their bytes, the number of the others by key and kind."""
+    """The first ones are noted with their bytes, the others only as a number for each key and kind."""
     journal = JournalBuffer()
     for traffic, at in ((Traffic(KEYS, journal), 10.0), (TickTraffic(KEYS, ("inv2",), journal), None)):
         for _ in range(2):

@@ -49,7 +49,7 @@ def test_the_bytes_on_the_page_are_those_of_the_codec() -> None:
 
 @pytest.mark.parametrize("message", NEEDED)
 def test_every_field_that_an_agent_meets_is_on_the_page(message: type[Message]) -> None:
-    """Whoever adds a field to a message says on the page what an agent of other people has to do with it."""
+    """A new field of a message needs a sentence on the page for authors of other agents."""
     assert message.__name__ in words(SECTION)
     assert set(message.__struct_fields__) - words(SECTION) == set()
 
@@ -64,7 +64,7 @@ def test_every_field_of_the_configuration_is_on_the_page(config: type[AgentConfi
 
 
 def test_every_key_of_an_agent_is_on_the_page() -> None:
-    """Keys that an agent publishes on, subscribes to, asks or answers, without those that the page calls optional."""
+    """These are all keys on which an agent publishes, subscribes, asks or answers, except the optional ones."""
     kinds = {spec.expression.split("/")[2] for spec in KEY_SPECS if "agent" in (*spec.writers, *spec.readers)}
     told = {word.split("/")[0] for word in words(SECTION)}
 
@@ -80,14 +80,14 @@ def test_names_that_zenoh_would_refuse_or_hide_are_refused(bad: str) -> None:
 
 @given(st.from_regex(r"[A-Za-z0-9_.-]{1,64}", fullmatch=True))
 def test_every_name_that_is_accepted_makes_a_key(name: str) -> None:
-    """Zenoh takes what we take."""
+    """Zenoh accepts every name that gridpeers accepts."""
     check_name("run", name)
 
     zenoh.KeyExpr(Keys(name).state(name))
 
 
 def test_tokens_are_told_from_texts_that_somebody_has_made_up() -> None:
-    """The longest names make tokens; what no process of a run holds is none."""
+    """The longest names make tokens. A text that no process of a run could hold is no token."""
     keys = Keys("d" * 64)
     tokens = keys.alive_plant(1), keys.alive_agent("n" * 64, "a" * 64), keys.alive_recorder("r" * 64)
     made_up = f"{tokens[0]}/{'x' * 65}", f"{tokens[1]}/more", f"{tokens[2]}/", "x/" * 1_000
@@ -96,6 +96,6 @@ def test_tokens_are_told_from_texts_that_somebody_has_made_up() -> None:
 
 
 def test_parts_are_those_of_the_own_run_only() -> None:
-    """A key of another run, even of one whose name begins alike, has no parts."""
+    """A key of another run has no parts, even if the names of the runs begin alike."""
     assert Keys("demo").parts(Keys("demo").state("inv1")) == ("state", "inv1")
     assert Keys("demo").parts(Keys("demo2").state("inv1")) == ()

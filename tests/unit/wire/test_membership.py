@@ -1,4 +1,4 @@
-"""Which process speaks for a name, what it has said it is, and which of its messages count."""
+"""Membership: the process of each name, its nameplate, and the messages that count."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def members(*instances: str) -> tuple[Membership, Admission]:
 
 
 def test_of_two_processes_of_a_name_the_first_counts_until_it_is_gone() -> None:
-    """Then the other speaks, in its own epoch, without being asked again."""
+    """Then the other process counts, in its own epoch, without a further question."""
     made, admission = members("a", "b")
     assert (made.instance("inv2"), admission.epochs.get("inv2")) == ("a", 1)
 
@@ -92,7 +92,7 @@ def test_the_process_that_counts_is_there_and_its_nameplate_is_its_own(seed: int
 
 
 def test_tokens_of_anybody_cost_no_more_than_so_many_questions() -> None:
-    """Of a name a few processes are noted, of names as many as a run may have; the first ones go on to count."""
+    """A few processes of each name are noted, and as many names as a run may have. The first ones still count."""
     made, _ = members("a")
     for i in range(1_000):
         for name in ("inv2", f"who{i}"):
@@ -129,7 +129,7 @@ def refusal(admission: Admission, message: State) -> str:
 
 @pytest.mark.parametrize("epochs", [(5,), (4, 5), (9, 5)])
 def test_the_epoch_of_the_process_that_is_there_counts_and_no_other(epochs: tuple[int, ...]) -> None:
-    """Whether its clock is ahead of its predecessor's or behind: what is greater does not matter."""
+    """A greater epoch means nothing: the clock of the new process may be ahead or behind."""
     admission = bound(*epochs)
 
     assert refusal(admission, state(0, 5)) == ""
@@ -138,7 +138,7 @@ def test_the_epoch_of_the_process_that_is_there_counts_and_no_other(epochs: tupl
 
 
 def test_who_is_gone_is_a_ghost_until_it_is_back() -> None:
-    """A token that was lost and comes back finds its numbers where they were."""
+    """After a token is lost and returns, the numbers of its messages continue."""
     admission = bound(5)
     assert admission.take(state(7)) == 0
     assert admission.passes(state(7))

@@ -61,7 +61,7 @@ def group(*nodes: Node) -> NodeGroup:
 
 
 def test_a_message_goes_to_every_node_with_a_route_for_it() -> None:
-    """From outside and from inside; a node's own publication goes out once, and not back to it."""
+    """The message may come from outside or from another node. A node's own message goes out once and not back to it."""
     a, b = Node("a", "state/b", "state/c"), Node("b", "state/a", "state/c", "measurement/b")
     both = group(a, b)
     a.to_do = [Publish("state/a", b"1")]
@@ -98,7 +98,7 @@ def test_a_query_is_shared_unless_a_subscription_was_declared_in_between() -> No
 
 
 def test_nodes_inside_meet_without_the_session() -> None:
-    """Each knows the tokens of the others from the start, and has their nameplates at once."""
+    """Nodes of one group know the tokens and nameplates of each other from the start."""
     a, b = Node("a"), Node("b")
     both = group(a, b)
     a.to_do = [Fetch("nameplate/b")]
@@ -113,7 +113,7 @@ def test_nodes_inside_meet_without_the_session() -> None:
 
 
 def test_a_node_that_has_finished_takes_its_token_along() -> None:
-    """The others go on; the group has finished with the last of them."""
+    """The other nodes continue. The group finishes with its last node."""
     a, b = Node("a"), Node("b")
     both = group(a, b)
     a.finished, a.to_do = True, [Publish("state/a", b"last")]
@@ -126,7 +126,7 @@ def test_a_node_that_has_finished_takes_its_token_along() -> None:
 
 
 def test_a_broken_session_is_renewed_for_all() -> None:
-    """One node that hears nothing has the session closed; then every node that has not finished begins again."""
+    """If one node hears nothing, the session is closed, and every unfinished node starts again."""
     a, b, c = Node("a"), Node("b"), Node("c")
     all_three = group(a, b, c)
     c.finished = True

@@ -30,7 +30,7 @@ def test_a_missing_package_is_named_with_what_to_install(
 
 
 def test_a_package_that_does_not_load_is_named_with_its_reason(tmp_path: Path) -> None:
-    """A library of the system is missing, or half of an installation: to install it once more is what helps."""
+    """A system library or a part of the installation is missing. The message says to install it again."""
     said = not_importable(error_of(tmp_path, "from json import no_such_name"))
 
     assert said.startswith("json is installed, but cannot be imported (ImportError: cannot import name")

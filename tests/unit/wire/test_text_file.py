@@ -21,7 +21,7 @@ def test_bytes_of_a_code_page_are_named_with_their_line(encoding: str) -> None:
 
 @pytest.mark.parametrize("separator", [",", ";", "\t", "|"])
 def test_any_separator_is_read(separator: str) -> None:
-    """Spreadsheets part cells by what their country does."""
+    """The separator of a spreadsheet depends on its country."""
     lines = [separator.join(cells) for cells in (["bus", "kW"], ['"a,b;c"', "1.5"])]
 
     table = read_table_text("\n".join(lines).encode(), ["bus", "kW"], ["kW"])
@@ -30,7 +30,7 @@ def test_any_separator_is_read(separator: str) -> None:
 
 
 def test_decimal_commas_are_points_where_numbers_stand() -> None:
-    """A comma in a name stays; one cell that cannot part thousands says so for all."""
+    """A comma in a name stays. One cell whose comma cannot separate thousands decides for its column."""
     data = b"bus;kW;kvar\n1,5;12,5;1,500\n2;-0,3e2;7\n"
 
     assert read_table_text(data, ["bus", "kW", "kvar"], ["kW", "kvar"]).rows == [
@@ -40,7 +40,7 @@ def test_decimal_commas_are_points_where_numbers_stand() -> None:
 
 
 def test_decimal_commas_of_one_column_are_no_separators() -> None:
-    """Read by its commas, each number of 12 ms would be 0, and nothing would say so."""
+    """With the comma as separator, 12 ms would be read as 0, without an error."""
     assert read_table_text(b"delay_s\n0,012\n0,5\n", ["delay_s"], ["delay_s"]).rows == [(2, ["0.012"]), (3, ["0.5"])]
 
 

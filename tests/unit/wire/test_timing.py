@@ -1,4 +1,4 @@
-"""What a tick waits for, the sentence when it waits too long, and lines of a log that come again and again."""
+"""Deadlines of a tick, the message when one passes, and repeated lines of a log."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def barrier() -> TickBarrier:
 
 
 def test_the_complaint_names_what_and_whom_and_the_last_sign_of_life() -> None:
-    """Also of who has never been heard."""
+    """It also names a sender that was never heard."""
     made = barrier()
     made.last_heard["inv1"] = 3, 2.0
 
@@ -29,7 +29,7 @@ def test_the_complaint_names_what_and_whom_and_the_last_sign_of_life() -> None:
 
 
 def test_who_looks_long_after_the_deadline_has_stood_still_itself() -> None:
-    """A deadline has passed at its time or a little later; much later it counts anew, once for each standstill."""
+    """A deadline passes at its time or a little later. If the process looks much later, the deadline starts again."""
     made = barrier()
     made.renew(0.0)
     due = made.deadline or 0.0
@@ -48,7 +48,7 @@ def counted(lines: list[str]) -> int:
 
 
 def test_a_flood_is_thinned_out_and_every_line_is_counted() -> None:
-    """Kinds do not get in each other's way, however many there are."""
+    """One kind does not hide another, whatever their number."""
     limit = RateLimit(burst=3, interval=10.0)
     said = [line for i in range(1000) if (line := limit.admit(f"late by {i}.5 ms", now=0.1 * i))]
     other = limit.admit("inv1 joined", now=100.0)
@@ -61,7 +61,7 @@ def test_a_flood_is_thinned_out_and_every_line_is_counted() -> None:
 
 
 def test_a_log_leaves_out_what_repeats_itself(caplog: pytest.LogCaptureFixture) -> None:
-    """Whoever writes to it; a second limit on the same log changes nothing."""
+    """The limit holds for every writer. A second limit on the same log changes nothing."""
     log = logging.getLogger("test_rate_limit")
     limit = limit_log(log)
     assert limit_log(log) is limit

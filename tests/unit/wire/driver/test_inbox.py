@@ -1,4 +1,4 @@
-"""What waits for a process that somebody floods with messages or tokens, and what wakes it."""
+"""The inbox of a process: floods of messages or tokens, and the end of a wait."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def test_messages_are_taken_once_as_many_as_are_wanted_wait_or_the_time_is_over(
 
 @pytest.mark.parametrize("factor", [1, LOSSLESS])
 def test_a_flood_on_one_key_displaces_nothing_on_another(factor: int) -> None:
-    """As many as there is room for wait, and each other key has room of its own; in simulated time there is more."""
+    """Messages wait up to the common room; then each key has a small room of its own. Simulated time has more room."""
     inbox = Inbox(lossless=factor > 1)
     for _ in range(3 * factor * ROOM):
         inbox.put(("message", "state/inv2", b"x"))
@@ -44,7 +44,7 @@ def test_a_flood_on_one_key_displaces_nothing_on_another(factor: int) -> None:
 
 
 def test_long_messages_have_room_of_their_own() -> None:
-    """Short ones wait beside them; one above the longest never does."""
+    """Short messages wait beside long ones. A message above the limit is dropped."""
     inbox = Inbox()
     for _ in range(2 * BYTES // LONGEST_MESSAGE):
         inbox.put(("message", "telemetry", LONG))
@@ -59,7 +59,7 @@ def test_long_messages_have_room_of_their_own() -> None:
 
 
 def test_no_token_is_lost_in_a_flood_of_them() -> None:
-    """Each comes in, and so does its end, in the order in which they came."""
+    """Each token and its end arrive, in their order."""
     inbox = Inbox()
     tokens = [f"who{i}" for i in range(3 * ROOM)]
     for key in tokens:

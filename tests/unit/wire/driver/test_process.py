@@ -46,7 +46,7 @@ def test_signals_end_a_process_once_for_each_request(ignored: bool, monkeypatch:
 
 
 def test_a_thread_that_never_ends_does_not_hold_up_the_end() -> None:
-    """What is to be done at the end is done, and the exit status is that of the process."""
+    """The work of the end is done, and the exit status is that of the process."""
     script = """
 import atexit, threading
 from gridpeers.wire.driver.ending import leave

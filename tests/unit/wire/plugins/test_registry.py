@@ -25,7 +25,7 @@ def entry_points(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 def test_an_entry_point_adds_to_a_registry(entry_points: None) -> None:
-    """Its name stands behind ours, and leads to the object."""
+    """Its name is listed after those of gridpeers, and leads to the object."""
     assert GRAPHS.names[:6] == ("full", "none", "GFM-only", "clustered", "ring", "links")
     assert GRAPHS.names[-2:] == ("round", "broken")
     assert made(GRAPHS, Plugin(use="round")) is ring
@@ -42,7 +42,7 @@ def test_an_entry_point_that_leads_nowhere_is_told_where_it_is_used_and_listed(e
 
 
 def test_a_default_may_be_anything_of_its_type() -> None:
-    """None where the type has it, as no file can write it; a value that is not of the type is refused."""
+    """None is accepted if the type has it, because no file can write it. A value of another type is refused."""
 
     class Star:
         hub: str | None = None

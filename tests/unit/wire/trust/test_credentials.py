@@ -1,4 +1,4 @@
-"""What a process shows, whom it believes, what each member may say, and what is told of strangers."""
+"""Credentials: certificates, access rules of each role, and reports on strangers."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def puts(sender: SiteMember, receiver: SiteMember, *, star: bool = False) -> set
 
 @pytest.mark.parametrize("star", [False, True])
 def test_both_ends_of_a_link_allow_the_same_and_no_two_rules_can_apply_to_one_message(star: bool) -> None:
-    """What one end lets out the other lets in; the keys of two rules for one message have nothing in common."""
+    """A message that one end sends is accepted by the other. The keys of two rules for one message never overlap."""
     for own, other in permutations(ALL, 2):
         here, there = rules_between(own, other, star=star), rules_between(other, own, star=star)
 
@@ -68,7 +68,7 @@ def test_the_order_of_members_decides_nothing(members: list[SiteMember], own: Si
 
 
 def test_each_role_publishes_only_what_is_its_own() -> None:
-    """An agent its own keys, the plant measurements and what it says of the run, an operator commands."""
+    """An agent publishes on its own keys, the plant measurements and reports of the run, an operator commands."""
     assert puts(INV1, PLANT) == {
         "ready/inv1", "state/inv1", "set_points/inv1", "report/inv1", "journal/inv1", "link_acknowledgement/inv1",
         "leave/inv1", "status/inv1", "request",
@@ -95,7 +95,7 @@ def test_a_relay_passes_on_to_each_what_it_may_hear_and_takes_from_each_its_own(
 
 @pytest.mark.parametrize("role", ["plant", "agent", "operator", "viewer"])
 def test_nobody_holds_a_token_or_answers_a_query_for_another(role: Role) -> None:
-    """Of tokens an agent holds its own; a nameplate is the agent's, a configuration the plant's, to whom it is for."""
+    """An agent holds its own token and answers for its own nameplate. Only its agent gets a configuration."""
     member = SiteMember(name="inv1" if role == "agent" else role, role=role)
     rules = rules_between(INV2, member)
     held = {key for key in CONCRETE if allowed(rules, "ingress", "liveliness_token", key)}
@@ -113,7 +113,7 @@ def test_nobody_holds_a_token_or_answers_a_query_for_another(role: Role) -> None
 
 @pytest.mark.parametrize("star", [False, True])
 def test_an_agent_asks_for_no_configuration_but_its_own(star: bool) -> None:
-    """Operators and viewers ask for all; of nameplates an agent asks for those of the others."""
+    """Operators and viewers ask for all configurations. An agent asks for the nameplates of the others."""
 
     def asked(member: SiteMember, of: SiteMember) -> set[str]:
         rules = rules_between(of, member, star=star)
@@ -128,7 +128,7 @@ def test_an_agent_asks_for_no_configuration_but_its_own(star: bool) -> None:
 
 
 def test_a_revoked_name_has_no_rule_until_its_next_certificate() -> None:
-    """Its common name is no subject any more; the one of the next generation is, before and after it is issued."""
+    """Its common name has no rule. The next generation has rules, before and after its certificate is issued."""
     revoked = SiteMember(name="inv1", role="agent", revoked=True)
     again = SiteMember(name="inv1", role="agent", generation=2)
 

@@ -50,7 +50,7 @@ def test_a_site_is_private_and_its_members_are_listed(lab: Path) -> None:
 
 
 def test_the_certificate_of_a_member_signs_no_other(lab: Path) -> None:
-    """A member that issues certificates by its own key is no authority to anybody."""
+    """Nobody accepts a certificate that a member signed with its own key."""
     from cryptography import x509
 
     extensions = x509.load_pem_x509_certificate((lab / "inv1.pem").read_bytes()).extensions
@@ -74,7 +74,7 @@ def test_a_host_needs_four_files_and_no_more(lab: Path, tmp_path: Path) -> None:
 
 
 def test_without_a_name_the_first_role_counts_whose_key_is_there(lab: Path) -> None:
-    """A command takes the operator's certificate, and the viewer's where there is no other, or it was revoked."""
+    """A command uses the operator's certificate. It uses the viewer's if there is no other, or if that was revoked."""
 
     def first(folder: Path) -> str:
         return open_credentials(folder, ("operator", "viewer"), now=NOW)[0].own.name
@@ -129,7 +129,7 @@ def test_every_wrong_file_is_refused_in_one_line(lab: Path, what: str) -> None:
 
 
 def test_time_decides_whether_a_certificate_counts(lab: Path) -> None:
-    """Before its first day and after its last one it is refused; in its last 30 days its end is told."""
+    """It is refused before its start and after its end. In its last 30 days a note gives its end."""
     late = NOW + timedelta(days=366)
     assert "inv1.pem: expired on 2027-11-23 12:00 UTC; gridpeers keys issue inv1 makes a new one" in refusal(
         lab, now=late
@@ -142,7 +142,7 @@ def test_time_decides_whether_a_certificate_counts(lab: Path) -> None:
 
 
 def test_a_name_and_a_role_that_do_not_fit_are_refused(lab: Path) -> None:
-    """An unknown name, a viewer as an agent, a second role for a name, a name that is none."""
+    """An unknown name, a viewer as an agent, a second role for a name, and an invalid name are refused."""
     assert 'no certificate was issued to "inv7"; those of role agent: inv1, inv2; gridpeers keys issue inv7' in refusal(
         lab, "inv7"
     )
@@ -195,7 +195,7 @@ def served(site: Path) -> Iterator[int]:
 
 
 def test_the_end_that_refuses_a_link_and_its_reason_are_told(tmp_path: Path) -> None:
-    """Two sites of the same name are two; where both ends agree, or nobody answers, nothing is said."""
+    """Two sites of one name stay distinct. If both ends agree, or nobody answers, there is no message."""
     lab, other, late = tmp_path / "lab", tmp_path / "other" / "lab", tmp_path / "late"
     for site in (lab, other):
         make_site(site)
