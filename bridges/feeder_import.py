@@ -1,4 +1,4 @@
-"""A feeder that another program has read: what its reader collects, in our words, and the checks of every import."""
+"""A feeder that another program has read: its rows, notes and problems, and the checks of every import."""
 
 from __future__ import annotations
 
@@ -61,8 +61,8 @@ class FeederImport:
 
     def refuse_class(self, name: str) -> None:
         """Refuse an element of a class that has no counterpart here."""
-        remedy = f'leave it out (leave_out=["{name}"]), and put an inverter there if it generates'
-        self.refuse(name, f"class {name.partition('.')[0]} is not taken over; {remedy}")
+        remedy = f"leave it out (--leave-out {name}), and add an inverter at its bus if it generates"
+        self.refuse(name, f"class {name.partition('.')[0]} has no counterpart in gridpeers; {remedy}")
 
     def raise_problems(self) -> None:
         if self.problems:
@@ -85,7 +85,7 @@ class FeederImport:
                 found[name] = new
                 taken.add(new)
         if renamed := [f'"{name}" is {found[name]}' for name in plain if found[name] != name]:
-            self.notes.append(f"buses have other names here, without blanks: {first_of(renamed, SHOWN_BUSES)}")
+            self.notes.append(f"buses are renamed, as a name has no blanks: {first_of(renamed, SHOWN_BUSES)}")
             places = {f"bus {name}": f"bus {new}" for name, new in found.items()}
             self.places = {places.get(name, name): place for name, place in self.places.items()}
         return found
@@ -104,7 +104,7 @@ class FeederImport:
     def expect_frequency(self, f_nom: float | None, remedy: str) -> None:
         """Refuse a nominal frequency (Hz) other than that of the other program; `remedy` has "{:g}" in its place."""
         if f_nom is not None and f_nom != self.f_nom:
-            text = f"{self.file} is solved at {self.f_nom:g} Hz, got {f_nom:g}; its reactances hold there alone"
+            text = f"{self.file} is solved at {self.f_nom:g} Hz, got {f_nom:g}; its reactances hold only there"
             self.refuse("f_nom", f"{text}; {remedy.format(f_nom)}, or leave f_nom out")
 
     def add_element(self, name: str, nodes: Sequence[Node], Y: Any) -> None:
@@ -170,12 +170,12 @@ class FeederImport:
             try:
                 worst, (bus, letter) = difference(feeder, self.V)
             except ArithmeticError as error:
-                self.refuse(self.file, f"{program} solves it, our {error}")
+                self.refuse(self.file, f"{program} solves it, but our {error}")
                 self.raise_problems()
             at = f"at node {node_name(letter)}, more than anywhere else"
             text = f"our power flow differs from {program}'s by {worst:.2g} pu {at}"
             if worst > MATCH and strict:
-                self.refuse(f"bus {bus}", f"{text}; something there acts that is not taken over")
+                self.refuse(f"bus {bus}", f"{text}; an element there has an effect that the import lacks")
             elif worst > MATCH:
                 feeder = replace(feeder, notes=(*feeder.notes, f"bus {bus}: {text}"))
         self.raise_problems()
@@ -232,7 +232,7 @@ class FeederImport:
         if sum(parts[k].S.real for k in lost) > MOST_UNFED * sum(part.S.real for part in parts):
             for section in sections:
                 first, named = _named(feeder, section & supported, node_name)
-                text = "no path to the source, even with all switches closed; connect or leave out what is there"
+                text = "no path to the source, even with all switches closed; connect it, or leave its elements out"
                 self.refuse(f"bus {first}", text, named=named)
             gone, lost, sections, idle = frozenset(), set(), [], set()
         self.load_parts = [part for k, part in enumerate(parts) if k not in lost]
@@ -245,8 +245,8 @@ class FeederImport:
             which = ", ".join(map(node_name, sorted(letters, key=NODES.index)))
             self.refuse(
                 name,
-                f"node {which} of bus {bus} is connected to nothing but loads: a "
-                "phase that does not come there, or an open neutral; connect or ground it",
+                f"only loads are connected to node {which} of bus {bus}: its phase is missing "
+                "there, or the neutral is open; connect or ground it",
             )
         for section in sections:
             load = sum(parts[k].S.real for k in lost if ends[k][0] in section)
@@ -254,7 +254,7 @@ class FeederImport:
             named = _named(feeder, section, node_name)[1]
             self.notes.append(f"{named}: no path to the source; left out{with_load}")
         if names := list(dict.fromkeys(parts[k].name for k in sorted(idle))):
-            self.notes.append(f"{first_of(names, SHOWN_NAMES)}: at a node to which nothing else leads; left out")
+            self.notes.append(f"{first_of(names, SHOWN_NAMES)}: nothing else is connected to the node; left out")
         self.elements = [row for row in self.elements if not set(row.nodes) & gone]
         switches = (
             replace(row, phases="".join(p for p in row.phases if (row.from_bus, p) not in gone))

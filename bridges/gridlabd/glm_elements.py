@@ -63,7 +63,7 @@ class GlmBranches:
         elif kind == "fuse":
             self._add(branch, _diagonal(branch, closed))
         elif branch["open"]:
-            self._found.refuse(name, f'status OPEN; leave it out (leave_out=["{name}"]), or put a switch there')
+            self._found.refuse(name, f"has status OPEN; leave it out (--leave-out {name}), or make it a switch")
         elif wanted:
             self.used |= wanted
             self._add(branch, self._matrix(branch), self._letters(branch, "from"), closed=True)

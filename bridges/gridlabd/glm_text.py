@@ -56,7 +56,7 @@ class GlmText:
         for number, whole in enumerate(text.split("\n"), start=1):
             line, where = COMMENT.split(whole, maxsplit=1)[0], f"{path.name}:{number}"
             if command := RUNNING.match(line):
-                self.problems.append(f"{where}: {command[0].strip()} would run or load a program; take this line out")
+                self.problems.append(f"{where}: {command[0].strip()} would run or load a program; remove this line")
             self._objects += [(kind, where) for kind in OBJECT.findall(line)]
             for name in NAMED.findall(line):
                 self._places.setdefault("".join(name).strip(), where)

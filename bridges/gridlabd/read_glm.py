@@ -1,8 +1,8 @@
 """Read a feeder that is written for GridLAB-D.
 
 GridLAB-D itself reads the model and solves its power flow at the first moment, or where its controls rest. Then every
-branch comes over by the admittances that its solver uses, with regulators at their taps; loads come over as what they
-take: constant power, current or impedance. What comes out is solved here, too, and must have GridLAB-D's voltages.
+branch is taken over by the admittances that its solver uses, with regulators at their taps, and every load by its
+constant power, current and impedance. The feeder is then solved here, too, and must have GridLAB-D's voltages.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ LIVE = 0.5
 BALANCED = 1e-7  # largest unbalance (pu) of the substation's voltage that is rounding
 OBJECT = re.compile(r"\(obj=\d+;([^)]+)\)")  # an object in a message of GridLAB-D's
 
-NOTED = {"volt_var_control": "what it controls stays as it is", "fuse": "stays as it is"}
+NOTED = {"volt_var_control": "its elements stay as they are", "fuse": "stays as it is"}
 KNOWN = DATA | WATCHING | LINEAR | SWITCHES | NOTED.keys() | set(CHILD_OF_BUS)
 
 
@@ -50,7 +50,7 @@ def read_glm(
 ) -> Tables:
     """Return the feeder of a model for GridLAB-D (`gridpeers.Feeder.read`).
 
-    Its `notes` list what was done instead of what the model says.
+    Its `notes` list every departure from the model.
     """
     path = file_of(path)
     text = GlmText(path)
@@ -77,12 +77,14 @@ def solved_model(path: Path, text: GlmText) -> dict[str, Any]:
         printed = messages(engine.printed)
     if not model.get("has_powerflow", True):
         raise FeederError(
-            path.name, (f"{path.name}: does not load GridLAB-D's powerflow; a feeder has a line module powerflow;",)
+            path.name, (f"{path.name}: does not load GridLAB-D's module powerflow; write a line module powerflow;",)
         )
     if said:
         problems = printed or [said]
         if (method := model.get("method", "NR")) != "NR":
-            problems.append(f"{path.name}: has solver_method {method}, and is solved with NR here; try NR there, too")
+            problems.append(
+                f"{path.name}: has solver_method {method}, but is solved with NR here; try NR in GridLAB-D, too"
+            )
         places = [text.place(match[1]) if (match := OBJECT.search(problem)) else "" for problem in problems]
         placed = (f"{at}: {problem}" if at else problem for at, problem in zip(places, problems, strict=True))
         raise FeederError(path.name, tuple(placed))
@@ -127,11 +129,11 @@ class _GlmReader:
         self._add_loads()
         V = {(bus, p): V for bus, each in self._buses.items() for p, V in voltages_of(each).items()}
         if (lost := [node for node, each in V.items() if not isfinite(abs(each))]) and not found.problems:
-            (bus, letter), more = lost[0], f", and so at {len(lost) - 1} nodes more" if len(lost) > 1 else ""
+            (bus, letter), more = lost[0], f", nor at {len(lost) - 1} more nodes" if len(lost) > 1 else ""
             found.refuse(
                 self._called(bus),
                 f"GridLAB-D found no solution: it has no voltage in phase {letter}{more}; "
-                "look for a value that is no number, or an impedance of 0, there or before it",
+                "look for a value that is not a number, or an impedance of 0, at the bus or before it",
             )
         found.raise_problems()
         self._add_source(branches)
@@ -161,7 +163,7 @@ class _GlmReader:
             return
         if not settling["rest"]:
             text = f"regulators and capacitors still move at {time}, an hour after the first moment"
-            notes.append(f"{file}: {text}; they stay as then")
+            notes.append(f"{file}: {text}; they stay at those positions")
         elif settling["seconds"]:
             notes.append(f"{file}: as GridLAB-D has it at {time}, when its regulators and capacitors rest")
 
@@ -179,7 +181,7 @@ class _GlmReader:
                 mended = False
                 self._found.refuse(self._called(name), f"nominal_voltage must be above 0 V, got {stated:g} V")
             elif usual and not (stated > 0.0 and 1.0 / FAR < usual / stated < FAR):
-                text = f"nominal_voltage {stated:g} V, and {usual:.0f} V in the power flow; the latter is taken"
+                text = f"nominal_voltage is {stated:g} V, but {usual:.0f} V in the power flow, which the import takes"
                 self._found.notes.append(f"{self._called(name)}: {text}")
                 bus["V_nom"] = usual
         return mended
@@ -195,7 +197,7 @@ class _GlmReader:
             if bus is None:
                 continue
             if name in tainted:
-                text = "what it takes itself is not taken over; GridLAB-D adds to it what is left out"
+                text = "its own load is not taken over, because GridLAB-D adds the elements that are left out to it"
                 self._found.notes.append(f"{called}: {text}")
             elif self._classes[name] == "capacitor":
                 self._found.add_element(called, *shunt(bus["bus"], takes[name]))
@@ -216,11 +218,11 @@ class _GlmReader:
             if bus["type"] == PV or name in given[1:]:
                 found.refuse(self._called(name), "a second source; make its bustype PQ")
         if not given:
-            found.refuse("no bus with bustype SWING", "a feeder has one, its substation")
+            found.refuse("no bus with bustype SWING", "a feeder needs one, its substation")
             return
         bus, called = self._buses[given[0]], self._called(given[0])
         if letters_of(bus["phases"]) != "ABC" or bus["phases"] & SPLIT:
-            found.refuse(called, "a source has phases A, B and C")
+            found.refuse(called, "a source needs phases A, B and C")
             return
         V = bus["V"] / bus["V_nom"]
         balanced = np.exp(-2j * np.pi / 3.0 * np.arange(3))

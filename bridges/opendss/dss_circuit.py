@@ -24,8 +24,8 @@ LINEAR = frozenset({"line", "transformer", "autotrans", "reactor", "capacitor", 
 """Classes that a primitive admittance matrix describes."""
 
 NOTED = {  # classes that change others by themselves, and what becomes of these
-    **dict.fromkeys(("invcontrol", "expcontrol"), "what it controls stays as in the snapshot"),
-    **dict.fromkeys(("fuse", "recloser", "relay", "swtcontrol"), "what it controls stays as it is"),
+    **dict.fromkeys(("invcontrol", "expcontrol"), "its elements stay as in the snapshot"),
+    **dict.fromkeys(("fuse", "recloser", "relay", "swtcontrol"), "the element that it controls stays as it is"),
 }
 
 SILENT = METERS | {"regcontrol", "capcontrol", "load"}
@@ -83,7 +83,7 @@ def read_circuit(request: dict[str, Any], tell: Tell) -> FeederImport:
         if name.lower() not in lines:
             found.refuse("switches", f'there is no line "{name}"; {suggestion(name.lower(), lines, "lines")}')
     if not any(name.startswith("vsource.") for name in there):
-        found.refuse("no Vsource", "a circuit has one, its substation")
+        found.refuse("no Vsource", "a circuit needs one, its substation")
     note_unusual_voltages(found)
     if left_out:  # the voltages are those of another circuit
         found.V = {}
@@ -144,11 +144,11 @@ class DssElements:
         nodes = self._nodes(element)
         bus = self.bus_names[bus_of(element.BusNames[0])]
         if found.source is not None:
-            problem = f'a second source; leave it out (leave_out=["{name}"]), or put an inverter there'
+            problem = f"a second source; leave it out (--leave-out {name}), or add an inverter at its bus"
         elif (
             vsource.Phases != 3 or sorted(nodes[:3]) != [(bus, p) for p in "ABC"] or any(node[1] for node in nodes[3:])
         ):
-            problem = "a source has three phases between nodes 1, 2, 3 of its bus and ground"
+            problem = "a source needs three phases between nodes 1, 2, 3 of its bus and ground"
         elif not (E := 1e3 * vsource.pu * vsource.BasekV / sqrt(3.0)) > 0.0:
             problem = f"pu and basekv must be above 0, got {vsource.pu:g} and {vsource.BasekV:g} kV"
         else:
@@ -165,8 +165,8 @@ class DssElements:
             found.source = Source(bus=stiff, V_pu=E / V_nom, angle=radians(vsource.AngleDeg))
             if vsource.Frequency != found.f_nom:
                 problem = (
-                    f"is of {vsource.Frequency:g} Hz, and the circuit is solved at {found.f_nom:g} Hz, so that the "
-                    f"engine has 0 V; write Set DefaultBaseFrequency={found.f_nom:g} before New Circuit"
+                    f"has {vsource.Frequency:g} Hz, but the circuit is solved at {found.f_nom:g} Hz, so the "
+                    f"engine finds 0 V; write Set DefaultBaseFrequency={found.f_nom:g} before New Circuit"
                 )
         if problem:
             found.refuse(name, problem)

@@ -82,9 +82,9 @@ class DssEngine:
         self._run(path, path.name, depth=0)
         problems += [f"{where}: {message}" for message, where in self._problems.items()]
         if not self._engine.NumCircuits:
-            problems[FEW:] = [f"{path.name}: makes no circuit; a script has a line New Circuit.name"]
+            problems[FEW:] = [f"{path.name}: makes no circuit; write a line New Circuit.name"]
         elif (more := len(problems) - MOST) > 0:
-            problems[MOST:] = [f"and {more} problems more"]
+            problems[MOST:] = [f"and {more} more problems"]
         found.raise_problems()
         found.notes[:0] = [f"{where}: {verb} was not run" for verb, where in self._not_run.items()]
         for command in SETTLE:
@@ -99,7 +99,10 @@ class DssEngine:
         self._refuse_impossible_values()
         found.raise_problems()
         if not self.circuit.Solution.Converged:
-            found.refuse(path.name, "the engine's power flow does not converge; it would not in OpenDSS either")
+            found.refuse(
+                path.name,
+                "the power flow does not converge in the engine, nor would it in OpenDSS; correct the circuit there",
+            )
             found.raise_problems()
         for command in EXACT:  # may end at rounding instead: not every circuit allows its tolerance
             self.execute(command, path.name)
@@ -165,7 +168,7 @@ class DssEngine:
         if verb in INCLUDING:
             path = found_file(self._folder / bare(rest))
             if path is None:
-                text = f"{bare(rest)} is included, and there is no such file in {self._folder}"
+                text = f"includes {bare(rest)}, which does not exist in {self._folder}"
                 self._problems.setdefault(text, where)
             else:
                 self._run(path, where, depth + 1)
@@ -257,8 +260,8 @@ def note_unusual_voltages(found: FeederImport) -> None:
     if far:
         name, more = next(iter(far)), f" (and {len(far) - 1} more)" * (len(far) > 1)
         found.notes.append(
-            f"{name}{more}: has {far[name]:.2g} times its kv, and beyond Vminpu and Vmaxpu a load does not take its "
-            "kw; correct kv, or what feeds it"
+            f"{name}{more}: its voltage is {far[name]:.2g} times its kv, and beyond Vminpu and Vmaxpu a load does not "
+            "take its kw; correct kv, or the network before it"
         )
 
 

@@ -99,7 +99,7 @@ def read_loads(
         if int(load.Model) == FIXED_Q and load.kvar and not impedances:
             found.notes.append(
                 f"{name}: model=6 takes less Q just below Vminpu, and more just above Vmaxpu: where its voltage "
-                "crosses one of them, no power flow has a solution, and an island is de-energised; model=1 has none"
+                "crosses one of these limits, the power flow has no solution and an island is de-energised; use model=1"
             )
         if year and str(load.Growth):
             text = f"growth={load.Growth}: growth by a GrowthShape is not supported; leave out set year"
@@ -163,7 +163,7 @@ def read_generation(engine: DssEngine, name: str, bus_names: Mapping[str, str], 
     """Return the parts of an element of `GENERATION`: loads of negative power, the same in each phase.
 
     The power is that of the engine's solution, the law beyond `vminpu` and `vmaxpu` that of the element's model.
-    Above 1.2 pu it drops out, which the engine does not know. Problems take an element that the engine lets deliver
+    Above 1.2 pu it drops out; the engine has no such limit. Problems take an element that the engine lets deliver
     another current (unequal phases, another control).
     """
     engine.circuit.SetActiveElement(name)
@@ -212,12 +212,12 @@ def read_generation(engine: DssEngine, name: str, bus_names: Mapping[str, str], 
     if np.abs(of_parts - current).max() > CLOSE * np.abs(current).max():
         found.refuse(
             name,
-            "delivers no constant power, or not the same in each phase (another "
-            f'control); leave it out (leave_out=["{name}"]) or put an inverter there',
+            "its power is not constant, or differs between phases (another control); "
+            f"leave it out (--leave-out {name}), or add an inverter at its bus",
         )
         return []
     kW, kvar = (round(power / 1e3, 3) + 0.0 for power in (total.real, total.imag))
     words = "as an impedance" if kind == "impedance" else "constant"
-    found.notes.append(f"{name}: delivers the {kW:g} kW and {kvar:g} kvar of the snapshot, {words}")
+    found.notes.append(f"{name}: delivers {kW:g} kW and {kvar:g} kvar as in the snapshot, {words}")
     usual = float(np.abs(across).max()) / branches.V_nom
     return branches.parts(name, laws, cut_off(usual) if total.real > 0.0 else 0.0)

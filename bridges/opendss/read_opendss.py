@@ -1,8 +1,8 @@
 """Read a feeder that is written for OpenDSS.
 
-The engine parses the script and solves it once, so that its regulators and capacitor controls stand where they would.
-Then every linear element comes over by its primitive admittance matrix, which holds lines of any geometry and
-transformers of any connection; loads come over by the law of their `model`. What comes out is solved here, too.
+The engine parses the script and solves it once, so that its regulators and capacitor controls act.
+Then every linear element is taken over by its primitive admittance matrix, which holds lines of any geometry and
+transformers of any connection; loads are taken over by the law of their `model`. The feeder is then solved here, too.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def read_opendss(
 ) -> Tables:
     """Return the feeder of a script for OpenDSS (`gridpeers.Feeder.read`).
 
-    Its `notes` list what was done instead of what the script says.
+    Its `notes` list every departure from the script.
     """
     path = file_of(path)
     try:
@@ -44,13 +44,13 @@ def read_opendss(
 
 
 def crashed(how: str, at: str, name: str) -> str:
-    """Return one line on an engine that ended while it read a script, or was loaded, where `at` is empty."""
+    """Return one line on an engine that ended while it read a script, or while it loaded, where `at` is empty."""
     if not at:
         return damaged("dss", f"its process {how}", "the import of .dss files")
     where, _, command = printable(at).partition(": ")
     memory = ", as where memory runs out" if signal.SIGKILL.name in how else ""
     shown = command if len(command) <= SHOWN else f"{command[:SHOWN]}..."
     return (
-        f"{where or name}: the OpenDSS engine itself crashes (its process {how}{memory}); change this, or take it out; "
-        f"if it is sound, take out what comes before it, half by half, to find the cause: {shown}"
+        f"{where or name}: the OpenDSS engine itself crashes (its process {how}{memory}); change this command or "
+        f"remove it; if it is correct, remove the commands before it, half by half, to find the cause: {shown}"
     )

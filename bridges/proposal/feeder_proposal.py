@@ -214,9 +214,7 @@ class NoSwitchError(NoProposalError):
 
     def __init__(self, lines: Sequence[str]) -> None:
         self.lines = tuple(lines)
-        hint = (
-            f"name a line to be one, such as {', '.join(lines)}" if lines else "no single three-phase line does either"
-        )
+        hint = f"make a line a switch, e.g. --switch {lines[0]}" if lines else "no single three-phase line does either"
         super().__init__(f"no switch cuts half of the load off the substation; {hint}")
 
 

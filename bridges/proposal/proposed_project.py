@@ -70,7 +70,7 @@ def propose_project(folder: Path, script: Path, switches: list[str], leave_out: 
             if not error.lines:
                 raise
             line = error.lines[0]
-            typer.echo(f"NOTE  no switch cuts half of the load off the substation; {line} is made one")
+            typer.echo(f"NOTE  no switch cuts half of the load off the substation, so {line} becomes a switch")
             feeder = read_script(script, [*switches, line], leave_out)
             proposal = propose(feeder)
     except NoProposalError as error:

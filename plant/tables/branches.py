@@ -68,7 +68,7 @@ class BusTable:
         V_from, V_to = (bus.V_nom * sqrt(3.0) / 1000.0 for bus in (ends[0], ends[1]))
         if what and abs(V_from - V_to) > 1e-6 * V_from:
             row.problem(
-                f"a {what} between buses of {V_from:g} kV and {V_to:g} kV; it joins equal nominal voltages only, use "
+                f"a {what} between buses of {V_from:g} kV and {V_to:g} kV; it joins only equal nominal voltages; use "
                 "transformers.csv"
             )
         return ends[0], ends[1]
@@ -86,7 +86,7 @@ def require_ground(row: CsvRow[Any], bus: Bus, what: str, floating: Container[st
     """Note a problem if something connected to ground is behind a delta winding."""
     if bus.name in floating:
         row.problem(
-            f'bus "{bus.name}" stands behind a delta winding without ground, and {what} needs ground; use delta loads '
+            f'bus "{bus.name}" is behind a delta winding without ground, and {what} needs ground; use delta loads '
             "there, or a Yg-Yg transformer"
         )
 

@@ -42,7 +42,7 @@ class CsvRow(Generic[C]):
     def is_new(self, what: str, name: str, known: Container[str]) -> bool:
         """Note a problem if there is one of this name already; return whether there is none."""
         if name in known:
-            self.problem(f'{what} "{name}": there is one of this name already; names must differ')
+            self.problem(f'{what} "{name}" exists already; names must differ')
         return name not in known
 
     def require(self, column: str, plausible: Plausible) -> None:
@@ -112,7 +112,7 @@ class CsvTable(Generic[C]):
             values = dict(zip(self._header, cells, strict=False))
             row = CsvRow(self._columns, f"{self._file} row {number}", values, self._problems)
             if (surplus := len(cells) - len(self._header)) > 0:
-                row.problem(f"{surplus} cells more than the header has columns; quote texts that have commas")
+                row.problem(f"{surplus} more cells than columns in the header; quote texts with commas")
             yield row
 
     def __len__(self) -> int:
@@ -135,6 +135,6 @@ def _read(
     except TextFileError as error:
         return [], [], [str(error)]
     found = table.header
-    problems = [f'column "{key}" stands there twice; keep one' for key in keys if found.count(key) > 1]
+    problems = [f'column "{key}" appears twice; keep one' for key in keys if found.count(key) > 1]
     problems += [f'no column "{key}"; {suggestion(key, found, "columns")}' for key in keys if key not in found]
     return found, [] if problems else table.rows, problems

@@ -43,7 +43,7 @@ class BusColumns(msgspec.Struct, frozen=True, kw_only=True):
     """buses.csv: the order of the rows is the order of the nodes everywhere."""
 
     bus: Annotated[str, "Name."]
-    phases: Annotated[str, PhaseLetters(stand_in="ABC"), "Phases that it has."]
+    phases: Annotated[str, PhaseLetters(stand_in="ABC"), "Its phases."]
     V_nom_kV_LL: Annotated[float, Unit("kV", in_key=False), Plausible("a nominal voltage", 0.1, 800.0, above_zero=True)]
     """Nominal voltage, line-to-line."""
     zone: Annotated[str, "Part of the feeder."] = ""
@@ -54,7 +54,7 @@ class BusColumns(msgspec.Struct, frozen=True, kw_only=True):
 class ImportedBusColumns(BusColumns, frozen=True, kw_only=True):
     """buses.csv of a feeder with elements.csv: neutrals and the like are further letters of `phases`, 4, 5, ...."""
 
-    phases: Annotated[str, PhaseLetters(stand_in="ABC", others=True), "Phases and further nodes that it has."]
+    phases: Annotated[str, PhaseLetters(stand_in="ABC", others=True), "Its phases and further nodes."]
 
 
 class LineColumns(msgspec.Struct, frozen=True, kw_only=True):
@@ -63,7 +63,7 @@ class LineColumns(msgspec.Struct, frozen=True, kw_only=True):
     line: Annotated[str, "Name."]
     from_bus: Annotated[str, "One end."]
     to_bus: Annotated[str, "The other end."]
-    phases: Annotated[Phases, "Phases that it carries."]
+    phases: Annotated[Phases, "Its phases."]
     config: Annotated[str, "Its impedances, by their name in line_configs.csv."]
     length_m: Annotated[float, Unit("m"), Plausible("the length of a line", 0.1, 1e5, above_zero=True), "Length."]
 
@@ -80,12 +80,12 @@ class LineConfigColumns(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class SwitchColumns(msgspec.Struct, frozen=True, kw_only=True):
-    """switches.csv: a switch is called by its buses, "13-152", or by its alias, "sw1_2"."""
+    """switches.csv: the name of a switch is its two buses, "13-152", or its alias, "sw1_2"."""
 
     from_bus: Annotated[str, "One end."]
     to_bus: Annotated[str, "The other end."]
     phases: Annotated[str, PhaseLetters(others=True)]
-    """Phases that it switches, and further nodes where its buses have some."""
+    """Phases that it switches, and further nodes of its buses."""
     state: Annotated[Literal["closed", "open"], Label("state of a switch"), "Position at the start."]
     alias: Annotated[str, "Second name."] = ""
 
@@ -159,12 +159,12 @@ class InverterColumns(msgspec.Struct, frozen=True, kw_only=True):
     m_q_pu: Annotated[float, Unit("pu"), Plausible("a Q-V droop", 0.001, 0.5, above_zero=True)]
     """Q-V droop (pu voltage per pu reactive power)."""
     phases: Literal["ABC", "A", "B", "C"] = "ABC"
-    """Phases of the bus at which it stands: all three, or one for a single-phase inverter."""
-    spare: Annotated[Literal["", "yes"], '"yes" if it stands by, switched off, until an agent comes for it.'] = ""
+    """Phases of the bus to which it is connected: all three, or one for a single-phase inverter."""
+    spare: Annotated[Literal["", "yes"], '"yes" if it is switched off until an agent joins for it.'] = ""
     parameters: str = ""
     """Name of a published set of parameters, "regfm_a1"; empty: those of its kind."""
     neutral: str = ""
-    """Node of the bus to which its phases return, or "earth"; empty: the neutral to which loads return, else earth."""
+    """Node of the bus to which its phases return, or "earth"; empty: the neutral of the loads, else earth."""
 
 
 class SourceColumns(msgspec.Struct, frozen=True, kw_only=True):
@@ -177,7 +177,7 @@ class SourceColumns(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ElementColumns(msgspec.Struct, frozen=True, kw_only=True):
-    """elements.csv: linear elements of a feeder that comes from another program, by their admittances."""
+    """elements.csv: linear elements of a feeder of another program, by their admittances."""
 
     element: Annotated[str, 'Name, as in that program: "transformer.sub".']
     nodes: Annotated[str, "Its nodes, bus.phase, with spaces between them."]
@@ -185,7 +185,7 @@ class ElementColumns(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class LoadPartColumns(msgspec.Struct, frozen=True, kw_only=True):
-    """load_parts_SET.csv: loads of such a feeder, each phase by itself; its power goes with powers of the voltage."""
+    """load_parts_SET.csv: loads of such a feeder, phase by phase; their power depends on powers of the voltage."""
 
     load: Annotated[str, "Name, as in that program."]
     bus: Annotated[str, "Its bus."]
@@ -196,19 +196,19 @@ class LoadPartColumns(msgspec.Struct, frozen=True, kw_only=True):
     V_nom_kV: Annotated[float, Unit("kV", in_key=False), Plausible("a nominal voltage", 0.01, 150.0, above_zero=True)]
     """Nominal voltage across it."""
     n_P: Exponent = 0.0
-    """Power of the voltage with which P goes: 0 constant power, 1 constant current, 2 constant impedance."""
+    """Exponent of the voltage in P: 0 constant power, 1 constant current, 2 constant impedance."""
     n_Q: Annotated[Exponent, "The same for Q."] = 0.0
     V_low_pu: Annotated[LimitOfV, "Voltage below which it is its nominal impedance."] = 0.0
     V_min_pu: LimitOfV = 0.0
-    """Voltage below which it turns into that impedance, or whose current it keeps if V_low is the same; 0: nowhere."""
-    V_max_pu: Annotated[LimitOfV, "Voltage above which it is an impedance; 0: nowhere."] = 0.0
+    """Voltage below which it becomes that impedance, or keeps its current if V_low is the same; 0: no limit."""
+    V_max_pu: Annotated[LimitOfV, "Voltage above which it is an impedance; 0: no limit."] = 0.0
     edge: Annotated[Exponent, "Exponent by which its current meets these limits."] = 0.0
     V_off_pu: Annotated[LimitOfV, "Voltage below which it drops out; 0: it never does."] = 0.0
     V_off_above_pu: Annotated[LimitOfV, "Voltage above which it drops out; 0: it never does."] = 0.0
 
 
 class Manifest(msgspec.Struct, frozen=True, kw_only=True):
-    """feeder.toml, which may be missing: what holds for the feeder as a whole."""
+    """feeder.toml, which may be missing: data of the whole feeder."""
 
     f_nom_Hz: Annotated[float, Unit("Hz"), Plausible("a nominal frequency", 16.0, 400.0)] = F_NOM
     """Nominal frequency, at which the impedances are given."""

@@ -1,4 +1,4 @@
-"""Tables of what stands at one bus: loads and their parts, capacitors, inverters, the source."""
+"""Tables of the equipment at one bus: loads and their parts, capacitors, inverters, the source."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from gridpeers.wire.wording import suggestion
 TAKEN = {
     PLANT: "the plant sends under it",
     "grid": "it is the island that the substation feeds",
-    OFF: "it stands in place of an island for an inverter that is out of service",
+    OFF: "it is the island of an inverter that is out of service",
 }
 """Names that no inverter can have, and why."""
 
@@ -151,7 +151,7 @@ def problems_of(inverter: InverterRow, bus: Bus, feeder: Tables) -> list[str]:
     others = (*feeder.inverters, *feeder.spares)
     row = CsvRow(columns.InverterColumns, f'inverter "{inverter.name}"', inverter_cells(inverter), problems)
     if any(inverter.name == other.name for other in others):
-        row.problem("there is one of this name already; names must differ")
+        row.problem("exists already; names must differ")
     places = InverterPlaces(
         sum(feeder.load_by_bus().values()),
         {(other.bus, phase): other.name for other in others for phase in other.phases},
@@ -177,7 +177,7 @@ def _check_place(row: CsvRow[columns.InverterColumns], bus: Bus | None, neutral:
     elif it.parameters and (wrong := foreign(PUBLISHED_SETS[it.parameters], it.kind)):
         row.problem(f'parameters "{it.parameters}": a {it.kind} has no {", ".join(wrong)}')
     if it.name in TAKEN:
-        row.problem(f'name "{it.name}" is taken: {TAKEN[it.name]}; name the inverter otherwise')
+        row.problem(f'name "{it.name}" is taken: {TAKEN[it.name]}; choose another name')
     elif it.name and it.name.isprintable():
         try:
             check_name("name", it.name)
@@ -213,7 +213,7 @@ def read_source(buses: BusTable) -> Source | None:
     for row in buses.table("source.csv", columns.SourceColumns):
         bus = buses.find(row)
         if found is not None:
-            row.problem("a second source; a feeder has one at most")
+            row.problem("a second source; a feeder has at most one")
         if bus is not None:
             require_phases(row, bus, "ABC")
             found = found or Source(bus=bus.name, V_pu=row.columns.V_pu, angle=radians(row.columns.angle_deg))

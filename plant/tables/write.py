@@ -19,7 +19,7 @@ Row = Sequence[Any]  # cells in the order of a table's columns
 
 
 def write_feeder(feeder: Tables, folder: Path) -> None:
-    """Write a feeder's tables into a folder, which is made if need be; they replace those of a feeder that is there.
+    """Write a feeder's tables into a folder, which is created if needed; they replace the tables in it.
 
     Numbers are converted to the units of the tables, so what is read back may differ in the last digit.
     """

@@ -55,7 +55,7 @@ def _parent(tree: Tree, way: list[str | int], *, whole: bool) -> Any:
                 there = f"{of} has {count} entries, from {of}[0]" if count else f"give {of} as a list first"
                 raise PathError(f"there is no {here}; {there}")
         elif not isinstance(node, dict):
-            raise PathError(f"{_written(way[:depth])} is no table, so that it has no key {step}")
+            raise PathError(f"{_written(way[:depth])} is not a table, so it has no key {step}")
         elif depth == 1 and way[0] in _named_tables() and step not in node and not (whole and following is None):
             known = suggestion(step, node, f"tables of {way[0]}")
             raise PathError(f"there is no {here}; {known}; a new one is given as a whole table, at {here}")

@@ -66,7 +66,7 @@ class SweepFolder:
                 raise
         except OSError as error:
             raise FolderError(
-                f"{folder}: cannot be made or written: {error.strerror}; give another folder by --out"
+                f"{folder}: cannot be created or written: {error.strerror}; give another folder by --out"
             ) from None
 
     def __enter__(self) -> SweepFolder:
@@ -102,17 +102,17 @@ def _check(folder: Path, whole: Mapping[str, object]) -> bool:
         known = (LOCK, "sweep.toml", "scenario.toml")
         rest = [path.name for path in folder.iterdir() if path.name not in known] if folder.is_dir() else []
         if any(not name.endswith(".partial") for name in rest):
-            raise FolderError(f"{where}: there are other things in it ({min(rest)}); give a new folder, or a sweep's")
+            raise FolderError(f"{where}: it holds other files ({min(rest)}); give a new folder, or that of a sweep")
         return False
     try:
         found = json.loads(manifest.read_text(encoding="utf-8"))
-        other = [f"{key} {found.get(key)}, here is {now}" for key, now in whole.items() if found.get(key) != now]
+        other = [f"{key} is {found.get(key)}, not {now}" for key, now in whole.items() if found.get(key) != now]
     except (ValueError, AttributeError):
         raise FolderError(f"{where}: its {MANIFEST} cannot be read; give another folder by --out") from None
     if other:
         raise FolderError(
-            f"{where}: holds another sweep, or this one before its file, scenario, feeder or a version changed, so "
-            f"that rows of both would not compare: {'; '.join(other)}; give another folder by --out, or remove this one"
+            f"{where}: holds another sweep, or this one with another file, scenario, feeder or version: "
+            f"{'; '.join(other)}; give another folder by --out, or remove this one"
         )
     return True
 

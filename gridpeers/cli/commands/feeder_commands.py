@@ -34,7 +34,7 @@ def import_(
     switch: Switches = None,
     leave_out: LeaveOut = None,
 ) -> None:
-    """Read a feeder that was written for OpenDSS or GridLAB-D, and write it as tables that a scenario can name.
+    """Read a feeder of OpenDSS or GridLAB-D, and write it as tables for a scenario.
 
     Example:  gridpeers feeder import Master.dss --out my-feeder
     """
@@ -55,7 +55,7 @@ def import_(
 
 @app.command()
 def check(feeder: FeederName, load_set: LoadSet = None, switch: Switches = None, leave_out: LeaveOut = None) -> None:
-    """Check a feeder; say what it has, and what opening each switch would cut off.
+    """Check a feeder; show its size, and the load that each switch cuts off.
 
     Example:  gridpeers feeder check microgrid123
     """
@@ -63,12 +63,12 @@ def check(feeder: FeederName, load_set: LoadSet = None, switch: Switches = None,
     _describe(tables)
     graph, load_by_bus = Connectivity(tables), tables.load_by_bus()
     for each in tables.switches:
-        state = "open" if not each.closed else "closed; there is another way around it"
+        state = "open" if not each.closed else "closed; opening it cuts nothing off"
         if each.closed and (behind := graph.cut_off(each)):
             kW = sum(load_by_bus.get(bus, 0.0) for bus in behind) / 1e3
             cut = [counted(len(behind), "bus", "buses"), f"{kW:.0f} kW of load"]
             cut += [row.name for row in tables.inverters if row.bus in behind]
-            state = f"closed; open, it cuts off {', '.join(cut)}"
+            state = f"closed; opening it cuts off {', '.join(cut)}"
         typer.echo(f"switch {each.alias or each.name}: {state}")
 
 
@@ -99,7 +99,7 @@ def solve(
     if dead := len(phases) - len(live):
         text += f", {dead} without, as the substation does not reach {'it' if dead == 1 else 'them'}"
     if others := len(table) - len(phases):
-        text += f"; {counted(others, 'node')} beside phases A, B and C (neutrals) not counted"
+        text += f"; {counted(others, 'further node')} (neutrals) not counted"
     typer.echo(text)
     live = live[~live["bus"].map(is_behind).astype(bool)]  # an import's own buses stand beside one that the script has
     V_pu = live["V_pu"].round(9)  # nodes with the same voltage: the first, whatever the last digits
@@ -115,9 +115,9 @@ def solve(
 
 
 def read_script(file: Path, switches: list[str] | None, leave_out: list[str] | None) -> Feeder:
-    """Read a feeder that was written for another program."""
+    """Read a feeder of another program."""
     if not is_foreign(file):
-        fail(f"{file}: a feeder is a .dss file (OpenDSS) or a .glm file (GridLAB-D), by the end of its name")
+        fail(f"{file}: the file of a feeder ends in .dss (OpenDSS) or .glm (GridLAB-D)")
     return Feeder.read(file, switches=switches or (), leave_out=leave_out or ())
 
 
@@ -133,7 +133,7 @@ def save_readable(feeder: Feeder, folder: Path, script: str) -> None:
 
 
 def folder_of(name: str) -> str:
-    """Return the name of a folder for a feeder, whose name comes from a script and may be any text.
+    """Return a folder name for a feeder, whose own name may be any text.
 
     >>> folder_of("ieee13"), folder_of("../up and away")
     ('ieee13', '_up_and_away')

@@ -1,4 +1,4 @@
-"""The command `gridpeers init`: a project of one's own, from a template that runs as it is."""
+"""The command `gridpeers init`: a project of your own, from a template that runs unchanged."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def init(
     """
     if feeder is None:
         if switch or leave_out:
-            fail("--switch and --leave-out go with --feeder")
+            fail("--switch and --leave-out need --feeder")
         with whole_folder(folder):
             shutil.copytree(TEMPLATE, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
         following = command_line("run", "mine.toml", "--driver", "inprocess")

@@ -33,15 +33,13 @@ if TYPE_CHECKING:
 
 def sweep(
     file: Annotated[str, argument("FILE", "Path of a sweep file, or a name, e.g. gains, topology.")],
-    out: Annotated[
-        Path | None, option("DIR", "Folder, new or this sweep's from before; runs/sweeps/NAME when left out.")
-    ] = None,
+    out: Annotated[Path | None, option("DIR", "Folder, new or of this sweep; runs/sweeps/NAME when left out.")] = None,
     jobs: Annotated[int | None, option("N", "Processes; one per core when left out.", min=1)] = None,
-    dry_run: Annotated[bool, flag("Check everything, tell the size, and run nothing.", "--dry-run")] = False,
+    dry_run: Annotated[bool, flag("Check every run, print their number, and run nothing.", "--dry-run")] = False,
 ) -> None:
     """Run a scenario many times over values of its keys.
 
-    What comes of it is one table. The same command resumes it.
+    The result is one table. The same command resumes an interrupted sweep.
 
     Example:  gridpeers sweep topology --jobs 2
     """
@@ -76,9 +74,9 @@ def read(file: str) -> Plan:
 
 
 def finish(file: str, plan: Plan, path: Path, jobs: int | None, again: Sequence[str]) -> Summary:
-    """Do what is left of a sweep, showing how far it is; whatever ends it early ends the command.
+    """Run the rest of a sweep and show its progress; an error ends the command.
 
-    `again` has the words of the command that goes on with what was interrupted.
+    `again` has the words of the command that resumes it.
     """
     from gridpeers.scenarios.sweep.study import SweepFolder, study
 
@@ -94,7 +92,7 @@ def finish(file: str, plan: Plan, path: Path, jobs: int | None, again: Sequence[
                     jobs=jobs or cores(),
                 )
         except (KeyboardInterrupt, OSError, WorkersError) as error:
-            kept = f"{folder.kept} of {size} runs are kept in {shown(path)}/; go on with: {command_line(*again)}"
+            kept = f"{folder.kept} of {size} runs are kept in {shown(path)}/; continue with: {command_line(*again)}"
             if isinstance(error, KeyboardInterrupt):
                 fail(f"interrupted; {kept}", code=exit_code(error))
             fail(refusal(path, error) if isinstance(error, OSError) else str(error), kept, code=BROKEN)

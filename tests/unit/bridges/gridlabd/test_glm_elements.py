@@ -97,7 +97,7 @@ def test_a_nominal_voltage_that_is_wrong_is_told_and_mended(tmp_path: Path) -> N
 
     feeder = read_glm(path)
 
-    assert any(note.startswith("load.ne: nominal_voltage 12470 V, and 72") for note in feeder.notes)
+    assert any(note.startswith("load.ne: nominal_voltage is 12470 V, but 72") for note in feeder.notes)
     assert next(bus.V_nom for bus in feeder.buses if bus.name == "ne") == pytest.approx(7250.0, rel=0.01)
     assert sum(feeder.load_by_bus().values()) == pytest.approx(2.9e5)
 

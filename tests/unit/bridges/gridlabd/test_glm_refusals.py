@@ -36,7 +36,7 @@ def problems(path: Path, **options: list[str]) -> tuple[str, ...]:
 
 ONE_LINE = {
     "no module": ("object node { name a; }\n", "feeder.glm:1: class 'node' is not known"),
-    "nothing of a feeder": ("module tape;\n", "feeder.glm: does not load GridLAB-D's powerflow"),
+    "nothing of a feeder": ("module tape;\n", "feeder.glm: does not load GridLAB-D's module powerflow"),
     "an include that is not there": (
         HEAD + '#include "gone.glm"\n',
         "feeder.glm:9: #include failed",
@@ -50,27 +50,27 @@ ONE_LINE = {
     "a substation of one phase": (
         HEAD.split("object line_configuration")[0].replace("ABCN", "AN")
         + "object load { name l1; phases AN; parent sub; nominal_voltage 7200; constant_power_A 1e4; }\n",
-        "node.sub: a source has phases A, B and C",
+        "node.sub: a source needs phases A, B and C",
     ),
     "a house": (
         "module residential { implicit_enduses NONE; }\n"
         + HEAD
         + CENTRE_TAP
         + "object house { name h1; parent tm; }\n",
-        'feeder.glm:24: house.h1: class house is not taken over; leave it out (leave_out=["house.h1"])',
+        "feeder.glm:24: house.h1: class house has no counterpart in gridpeers; leave it out (--leave-out house.h1)",
     ),
     "an inverter": (
         "module generators;\n"
         + HEAD
         + "object inverter_dyn { name i1; parent b; control_mode GRID_FORMING; rated_power 1e5; Pref 1e4; }\n",
-        "feeder.glm:10: inverter_dyn.i1: class inverter_dyn is not taken over; leave it out",
+        "feeder.glm:10: inverter_dyn.i1: class inverter_dyn has no counterpart in gridpeers; leave it out",
     ),
     "an open line": (
         HEAD
         + NODE.replace("NAME", "d")
         + line("l2", "b", "d")
         + line("l3", "b", "d").replace("phases", "status OPEN; phases"),
-        "feeder.glm:11: overhead_line.l3: status OPEN; leave it out",
+        "feeder.glm:11: overhead_line.l3: has status OPEN; leave it out",
     ),
     "a line of no length": (HEAD + NODE.replace("NAME", "d") + line("l2", "b", "d", "0"), "zero length"),
     "no nominal voltage": (
@@ -79,7 +79,7 @@ ONE_LINE = {
     ),
     "voltages that are no numbers": (
         HEAD.replace("voltage_A 7300", "voltage_A nan") + LOAD,
-        "feeder.glm:3: node.sub: GridLAB-D found no solution: it has no voltage in phase A, and so at 3 nodes more",
+        "feeder.glm:3: node.sub: GridLAB-D found no solution: it has no voltage in phase A, nor at 3 more nodes",
     ),
     "no solution": (HEAD + LOAD.replace("1e4", "1e9"), "convergence iteration limit reached"),
 }
@@ -123,7 +123,7 @@ def test_all_that_is_not_supported_comes_at_once(tmp_path: Path) -> None:
 
     said = refused.value.problems
     assert len(said) == 4
-    assert any("player.p1: class player is not taken over; leave it out" in problem for problem in said)
+    assert any("player.p1: class player has no counterpart in gridpeers; leave it out" in problem for problem in said)
     feeder = read_glm(path, leave_out=["player.*", "load.delta"])
     assert {part.S for part in feeder.load_parts if part.name == "load.wye"} >= {9e4 + 1e4j}
     assert all(part.name != "load.delta" for part in feeder.load_parts)
@@ -155,7 +155,7 @@ def test_a_load_to_which_gridlabd_adds_what_is_left_out_is_told(tmp_path: Path) 
     feeder = read_glm(write(tmp_path, "module generators;\n" + HEAD + LOAD + other + inverter), leave_out=["inv*.*"])
 
     assert [part.name for part in feeder.load_parts] == ["load.l2"]
-    assert any(note.startswith("load.l1: what it takes itself is not taken over") for note in feeder.notes)
+    assert any(note.startswith("load.l1: its own load is not taken over") for note in feeder.notes)
 
 
 def test_what_gridlabd_would_write_is_not_written(tmp_path: Path) -> None:

@@ -84,7 +84,7 @@ def test_generation_is_told_and_no_load(tmp_path: Path) -> None:
     feeder = read_opendss(write(tmp_path, LINE, STEP_DOWN, UNEVEN, GENERATION["generator"], idle))
 
     assert feeder.notes == (
-        "generator.g: delivers the 50 kW and 10 kvar of the snapshot, constant",
+        "generator.g: delivers 50 kW and 10 kvar as in the snapshot, constant",
         "generator.idle: delivers nothing; left out",
     )
     assert feeder.generation_by_bus() == {"c": pytest.approx(50e3)}

@@ -63,7 +63,7 @@ def test_a_switch_that_cuts_off_the_load_is_proposed() -> None:
 
 def test_without_a_switch_lines_to_be_one_are_named() -> None:
     """A feeder without a switch names the lines near the substation that would make one."""
-    with pytest.raises(NoSwitchError, match=r"name a line to be one, such as Line\.l") as refused:
+    with pytest.raises(NoSwitchError, match=r"make a line a switch, e\.g\. --switch Line\.l") as refused:
         propose(feeder())
 
     assert refused.value.lines[0] == "Line.l"

@@ -77,7 +77,7 @@ UNUSABLE = [
     ("link heal inv1 -", "LINKS: the shell took the arrow for a redirection; put the pattern in quotes"),
     ("feeder import nothere.dss", "there is no such file"),
     ("feeder import nothere.glm", "there is no such file"),
-    ("feeder import bad.txt", "a feeder is a .dss file (OpenDSS) or a .glm file (GridLAB-D)"),
+    ("feeder import bad.txt", "the file of a feeder ends in .dss (OpenDSS) or .glm (GridLAB-D)"),
     ("feeder import bad.dss", "3 problems"),
     ("feeder check microgrid", 'no such feeder and no such folder; did you mean "microgrid123"?'),
     ("feeder solve microgrid123 --open sw9", 'switch "sw9": no such switch'),

@@ -147,15 +147,15 @@ def test_counts_are_words_for_people(elsewhere: Path) -> None:
 
     assert "~" not in closed
     assert ", 100 kW of load, 1 switch, 0 inverters, 60 Hz" in checked
-    assert closed.splitlines()[0] == "15 nodes with voltage; 2 nodes beside phases A, B and C (neutrals) not counted"
-    assert opened.startswith("6 nodes with voltage, 9 without, as the substation does not reach them; 2 nodes beside")
+    assert closed.splitlines()[0] == "15 nodes with voltage; 2 further nodes (neutrals) not counted"
+    assert opened.startswith("6 nodes with voltage, 9 without, as the substation does not reach them; 2 further nodes")
 
 
 def test_a_model_for_gridlabd_goes_the_same_ways(elsewhere: Path) -> None:
     """A .glm file is checked, imported and solved, and becomes an islanding at a line near its substation."""
     Path("feeder.glm").write_text(LOADS)
     for words, text in (
-        (("check", "feeder.glm", "--switch", "head"), "switch head: closed; open, it cuts off"),
+        (("check", "feeder.glm", "--switch", "head"), "switch head: closed; opening it cuts off"),
         (("import", "feeder.glm", "--out", "mine"), "Tables: mine"),
         (("solve", "feeder.glm", "--csv", "model.csv"), "lowest"),
         (("solve", "mine", "--csv", "tables.csv"), "lowest"),
@@ -169,7 +169,7 @@ def test_a_model_for_gridlabd_goes_the_same_ways(elsewhere: Path) -> None:
     code, made = invoke("init", "mine-islanded", "--feeder", "feeder.glm")
 
     assert code == 0, made
-    assert "overhead_line.head is made one" in made
+    assert "overhead_line.head becomes a switch" in made
     assert "switch head islands" in made
 
 

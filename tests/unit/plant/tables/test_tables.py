@@ -75,10 +75,10 @@ def test_loads_are_the_published_ones_and_those_of_the_microgrids() -> None:
     assert [event2[zone] / main[zone] for zone in ("MG2", "MG3")] == pytest.approx([0.95, 0.95])
 
 
-FLOATING = 'bus "610" stands behind a delta winding without ground'
+FLOATING = 'bus "610" is behind a delta winding without ground'
 MISTAKES: list[tuple[str, int, dict[str, str], str]] = [
     ("buses.csv", 3, {"phases": "BX"}, 'phases must be letters out of A, B, C, each once (as "ABC" or "B"), got "BX"'),
-    ("buses.csv", 136, {"bus": "162"}, 'bus "162": there is one of this name already; names must differ'),
+    ("buses.csv", 136, {"bus": "162"}, 'bus "162" exists already; names must differ'),
     ("lines.csv", 5, {"to_bus": "47x"}, 'to_bus "47x": no such bus; did you mean "47"?'),
     ("lines.csv", 5, {"to_bus": ""}, "to_bus is empty; give a name"),
     ("lines.csv", 5, {"to_bus": "3"}, 'both ends are bus "3"; a branch needs two buses'),
@@ -91,7 +91,7 @@ MISTAKES: list[tuple[str, int, dict[str, str], str]] = [
     ("line_configs.csv", 3, {"phase_2": "D"}, 'phase_2 "D": no such phase; choose one of A, B, C'),
     ("line_configs.csv", 53, {}, 'config "12" element C-C: given already; give each element once'),
     ("switches.csv", 2, {"state": "shut"}, 'state "shut": no such state of a switch; choose one of closed, open'),
-    ("switches.csv", 5, {"alias": "sw1_2"}, 'switch "sw1_2": there is one of this name already; names must differ'),
+    ("switches.csv", 5, {"alias": "sw1_2"}, 'switch "sw1_2" exists already; names must differ'),
     ("switches.csv", 11, {"phases": "AB"}, 'bus "94" has no phase B; it has A'),
     ("regulators.csv", 3, {"tap": "-161"}, "tap, tap_step_pu: -0.00625 is not plausible for "),
     ("transformers.csv", 2, {"connection": "D-Yg"}, 'connection "D-Yg": no such connection of a transformer; '),
@@ -130,7 +130,7 @@ MISTAKES: list[tuple[str, int, dict[str, str], str]] = [
     ),
     ("regulators.csv", 3, {"tap": "100"}, "tap, tap_step_pu: 1.625 is not plausible for the ratio of a regulator"),
     ("inverters.csv", 3, {"microgrid": "MG\x1b[31m1"}, "microgrid 'MG\\x1b[31m1': has characters"),
-    ("source.csv", 3, {}, "a second source; a feeder has one at most"),
+    ("source.csv", 3, {}, "a second source; a feeder has at most one"),
 ]
 
 
@@ -173,7 +173,7 @@ CHANGED: list[tuple[str, Callable[[str], str | bytes], str]] = [
     (
         "lines.csv",
         lambda text: text.replace("origin,note", "length_m,note"),
-        'lines.csv: column "length_m" stands there ',
+        'lines.csv: column "length_m" appears twice',
     ),
     ("lines.csv", without("L67_72,"), "buses.csv: 23 buses not connected with the substation at bus 150"),
     (
@@ -184,7 +184,7 @@ CHANGED: list[tuple[str, Callable[[str], str | bytes], str]] = [
     (
         "transformers.csv",
         lambda text: f"{text}T,61,610,D-D,150,1.27,2.72,no, or little\n",
-        "transformers.csv row 3: 1 cells",
+        "transformers.csv row 3: 1 more cells",
     ),
     ("loads_main.csv", lambda text: b"\xff\xfebus", "loads_main.csv: is damaged"),
     ("buses.csv", lambda text: (text + "süd\n").encode("cp1252"), NOT_UTF8),
@@ -291,7 +291,7 @@ def test_ground_is_missing_wherever_a_delta_winding_leads(folder: Path, file: st
 
     (problem,) = problems(folder)
 
-    assert f'bus "611" stands behind a delta winding without ground, and {what} needs ground' in problem
+    assert f'bus "611" is behind a delta winding without ground, and {what} needs ground' in problem
 
 
 @pytest.mark.parametrize("name", ["PV 2", "pv/2", "a*", "é", "x" * 65, "plant", "grid", "off"])

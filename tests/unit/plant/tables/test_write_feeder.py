@@ -82,7 +82,7 @@ def test_an_inverter_added_to_a_feeder_of_ours_is_saved(tmp_path: Path) -> None:
         ({"name": None, "microgrid": None}, "name is empty; .*microgrid is empty; give a name"),
         ({"name": 1, "kind": 2}, 'inverter "1": kind "2": no such kind'),
         ({"params": "slow"}, 'parameters "slow": no such set'),
-        ({"bus": "610", "phases": "A"}, 'bus "610" stands behind a delta winding without ground'),
+        ({"bus": "610", "phases": "A"}, 'bus "610" is behind a delta winding without ground'),
         ({"name": "inv1", "bus": "160", "phases": "B"}, 'must differ; .*has inverter "inv1" on phase B already'),
     ],
 )

@@ -68,7 +68,7 @@ def test_a_full_disk_ends_a_sweep_that_can_go_on(sweep_file: Write, tmp_path: Pa
     folder = tmp_path / "runs" / "sweeps" / "mine"
     assert code == 3
     assert "gridpeers: runs/sweeps/mine: cannot be written: No space left on device\n" in text
-    assert "of 2 runs are kept in runs/sweeps/mine/; go on with: gridpeers sweep mine.toml\n" in text
+    assert "of 2 runs are kept in runs/sweeps/mine/; continue with: gridpeers sweep mine.toml\n" in text
     assert (folder / "status.txt").read_text().startswith("broken: runs/sweeps/mine: cannot be written: No space left")
     first, again = invoke("mine.toml", "--jobs", "1"), invoke("mine.toml", "--jobs", "1")
     assert first[0] == again[0] == 0

@@ -219,7 +219,7 @@ def test_a_folder_of_another_sweep_is_refused_by_name(sweep_file: Write, tmp_pat
         SweepFolder(folder, plan)
     before = {file.name: file.read_bytes() for file in folder.iterdir()}
 
-    with pytest.raises(FolderError, match="name mine, here is gains; runs 1, here is 49; fingerprint"):
+    with pytest.raises(FolderError, match="name is mine, not gains; runs is 1, not 49; fingerprint"):
         SweepFolder(folder, read_sweep("gains"))
     with pytest.raises(FolderError, match=r"would not compare: fingerprint .*, here is"):
         SweepFolder(folder, read_sweep(sweep_file('[grid]\n"gains.k_p" = [0.0006]\n')))
