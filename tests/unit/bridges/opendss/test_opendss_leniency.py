@@ -39,7 +39,9 @@ def unlike(path: Path) -> float:
         pytest.param(
             (FLOATING,), "buses e, d (first e.1, e.2, e.3): no path to the source; left out, with 10 kW", id="section"
         ),
-        pytest.param((SPUR, "New Load.m bus1=f.2 phases=1 kv=0.277 kw=9"), "load.m: nothing else is connected", id="phase"),
+        pytest.param(
+            (SPUR, "New Load.m bus1=f.2 phases=1 kv=0.277 kw=9"), "load.m: nothing else is connected", id="phase"
+        ),
         pytest.param(
             (SPUR, "New Load.m bus1=f.1.2 phases=1 conn=delta kv=0.48 kw=9"),
             "load.m: nothing else is connected",

@@ -135,7 +135,7 @@ def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(many: Path, tmp_path: P
     kept = (tmp_path / "here" / "runs.jsonl").read_text().count("\n")
 
     again = "gridpeers sweep mine.toml --out here"
-    assert err == f"gridpeers: interrupted; {kept} of 10 runs are kept in here/; go on with: {again}\n"
+    assert err == f"gridpeers: interrupted; {kept} of 10 runs are kept in here/; continue with: {again}\n"
     assert (tmp_path / "here" / "status.txt").read_text().startswith("broken: interrupted after")
 
 
@@ -229,7 +229,7 @@ def test_a_folder_of_another_sweep_is_refused_by_name(sweep_file: Write, tmp_pat
         SweepFolder(folder, plan)
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "thesis.tex").write_text("")
-    with pytest.raises(FolderError, match=r"there are other things in it \(thesis.tex\)"):
+    with pytest.raises(FolderError, match=r"it holds other files \(thesis.tex\)"):
         SweepFolder(tmp_path / "other", plan)
 
 
