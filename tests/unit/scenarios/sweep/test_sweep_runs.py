@@ -221,11 +221,11 @@ def test_a_folder_of_another_sweep_is_refused_by_name(sweep_file: Write, tmp_pat
 
     with pytest.raises(FolderError, match="name is mine, not gains; runs is 1, not 49; fingerprint"):
         SweepFolder(folder, read_sweep("gains"))
-    with pytest.raises(FolderError, match=r"would not compare: fingerprint .*, here is"):
+    with pytest.raises(FolderError, match=r"or version: fingerprint is .*, not "):
         SweepFolder(folder, read_sweep(sweep_file('[grid]\n"gains.k_p" = [0.0006]\n')))
     assert {file.name: file.read_bytes() for file in folder.iterdir()} == before
     (folder / "sweep.json").write_text(before["sweep.json"].decode().replace('"numpy": "', '"numpy": "0.'))
-    with pytest.raises(FolderError, match=r"would not compare: numpy 0\..*, here is"):
+    with pytest.raises(FolderError, match=r"or version: numpy is 0\..*, not "):
         SweepFolder(folder, plan)
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "thesis.tex").write_text("")
