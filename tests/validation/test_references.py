@@ -25,8 +25,8 @@ def assert_limits_kept(part: ValidationPart, case: str) -> CaseResult:
 
 # (a) the power flow beside both OpenDSS engines
 @pytest.mark.parametrize("case", POWER_FLOW.cases)
-def test_the_power_flow_is_that_of_both_opendss_engines(case: str) -> None:
-    """Every node's phasor of the IEEE 13, 34 and 123-node feeders and of ours is both engines' within 1e-6 pu."""
+def test_the_power_flow_equals_both_opendss_engines(case: str) -> None:
+    """On the IEEE 13, 34 and 123-node feeders and on ours every phasor equals both engines' within 1e-6 pu."""
     result = assert_limits_kept(POWER_FLOW, case)
 
     if case == SWITCH_STATES:
@@ -35,8 +35,8 @@ def test_the_power_flow_is_that_of_both_opendss_engines(case: str) -> None:
 
 # (b) the plant beside GridLAB-D, in a fifth of the time
 @pytest.mark.parametrize("case", [name for name, run in RUNS.items() if run.in_tests])
-def test_the_plant_goes_through_a_run_as_gridlabd_does(case: str) -> None:
-    """With set-points from a list and from agents, f, P, Q and V of all inverters are GridLAB-D's at each step."""
+def test_the_plant_equals_gridlabd_through_a_run(case: str) -> None:
+    """f, P, Q and V of all inverters equal GridLAB-D's at each step, with set-points from a list or from agents."""
     assert_limits_kept(GRIDLABD, case)
 
 
@@ -45,7 +45,7 @@ STEPS = {"gfm-gfl": "2000", "secondary-start": "610"}
 
 
 @pytest.mark.parametrize("case", STEPS)
-def test_the_plant_runs_gridlabds_autotests_as_gridlabd_does(case: str) -> None:
+def test_the_plant_equals_gridlabd_in_its_autotests(case: str) -> None:
     """Power of every source within 0.01 VA and frequency within 1e-8 Hz, after every step; control acts three times."""
     result = assert_limits_kept(AUTOTESTS, case)
 
@@ -66,8 +66,8 @@ def test_the_impedances_of_the_autotest_are_the_published_ones() -> None:
 
 # (d) a grid-forming source beside OpenDSS's
 @pytest.mark.parametrize("case", GRID_FORMING.cases)
-def test_an_island_behind_a_grid_forming_source_is_opendss_s(case: str) -> None:
-    """All phasors and the source's power are both engines' within 1e-6 pu, as far as OpenDSS's model goes."""
+def test_an_island_behind_a_grid_forming_source_equals_opendss(case: str) -> None:
+    """All phasors and the source's power equal both engines' within 1e-6 pu."""
     result = assert_limits_kept(GRID_FORMING, case)
 
     assert result.facts["nodes with voltage"] == ("166 of 216" if case in ("shed", "regulated") else "216 of 216")
@@ -76,7 +76,7 @@ def test_an_island_behind_a_grid_forming_source_is_opendss_s(case: str) -> None:
 # (f) random feeders beside both OpenDSS engines
 @pytest.mark.parametrize("case", RANDOM_FEEDERS.cases)
 def test_random_feeders_have_the_phasors_of_both_opendss_engines(case: str) -> None:
-    """At the start, after a load step and a switching, and no current is left at any node of the inner loop."""
+    """At the start, after a load step and after a switching; the currents at every node sum to zero."""
     result = assert_limits_kept(RANDOM_FEEDERS, case)
 
     assert int(result.facts["asymmetric"]) > 2

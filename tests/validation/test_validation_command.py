@@ -15,8 +15,8 @@ def part(value: float, needs: tuple[str, ...] = ("numpy",)) -> ValidationPart:
 
 
 @pytest.mark.parametrize("value", [1.5, float("nan")])
-def test_a_broken_limit_ends_the_command_with_1_and_is_told(value: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A value beyond its limit, or none at all, is a line on stderr, and stands in the table."""
+def test_a_broken_limit_is_printed_and_ends_the_command_with_1(value: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A value beyond its limit, or a missing one, is a line on stderr and a cell of the table."""
     monkeypatch.setattr(command, "PARTS", {"made-up": part(value)})
 
     done = CliRunner().invoke(command.app, ["made-up"])
@@ -27,7 +27,7 @@ def test_a_broken_limit_ends_the_command_with_1_and_is_told(value: float, monkey
 
 
 def test_a_missing_reference_is_one_line_that_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without the wheel the command ends with 2, names it, and runs nothing."""
+    """Without the package the command names it, runs nothing and ends with 2."""
     monkeypatch.setattr(command, "PARTS", {"made-up": part(0.0, ("no-such-reference",))})
 
     done = CliRunner().invoke(command.app, [])
@@ -41,5 +41,5 @@ def test_a_missing_reference_is_one_line_that_says_what_to_install(monkeypatch: 
     ("value", "text"), [(3.6e-11, "5e-11"), (1e-6, "1e-06"), (1.1e-6, "2e-06"), (6.0, "10"), (0.0, "0")]
 )
 def test_a_difference_is_rounded_up(value: float, text: str) -> None:
-    """The table never tells a smaller difference than there is."""
+    """The table never shows a smaller difference than the real one."""
     assert rounded_up(value) == text

@@ -24,13 +24,13 @@ def test_without_a_name_all_experiments_are_listed() -> None:
     assert [line.split()[0] for line in text.splitlines()] == list(EXPERIMENTS)
 
 
-def test_an_unknown_name_is_told_with_a_suggestion() -> None:
-    """Exit code 2, and what was probably meant."""
+def test_an_unknown_name_gets_a_suggestion() -> None:
+    """Exit code 2, and the nearest name."""
     assert invoke("dealy")[0] == 2
     assert 'no experiment "dealy"; did you mean "delay"?' in invoke("dealy")[1]
 
 
-def test_a_folder_with_other_things_is_left_alone(tmp_path: Path) -> None:
+def test_a_folder_with_other_files_is_refused(tmp_path: Path) -> None:
     """Exit code 2, and nothing is written."""
     (tmp_path / "thesis.tex").write_text("mine")
 
@@ -42,7 +42,7 @@ def test_a_folder_with_other_things_is_left_alone(tmp_path: Path) -> None:
 
 
 def test_a_result_is_a_figure_and_the_same_table_twice(tmp_path: Path) -> None:
-    """A value that was never reached is written as never, and drawn at the edge."""
+    """A time that is never reached is written as never and drawn at the edge."""
     x = np.array([0.0, 0.1, 1.0])
     curves = [Curve(x=x, y=np.array([1.0, 2.0, np.inf]), style=0), Curve(x=x, y=x + 1.0, style=1, look="predicted")]
     panel = PlotPanel(

@@ -27,7 +27,7 @@ def test_over_late_links_the_graph_with_most_links_restores_f_last_as_predicted(
 
 
 def test_a_loss_is_a_delay_of_the_same_mean_age() -> None:
-    """Three of four messages lost are as 4 T_c of delay: f is back to within 15 % of the same time."""
+    """With three of four messages lost, f returns in the time of a delay of 4 T_c, within 15 %."""
     lost = measured("graphs", "full", 4.0, Fault(on=ALL, loss=0.75))["t_f_s"]
     late = measured("graphs", "full", 4.0, Fault(on=ALL, delay=0.08))["t_f_s"]
     sound = measured("graphs", "full", 4.0)["t_f_s"]
@@ -46,7 +46,7 @@ def test_late_set_points_let_vars_swing_long_before_the_frequency() -> None:
     assert (wild["V_swing_pu"] or 0.0) > 0.01
 
 
-def test_late_links_alone_let_vars_swing_where_their_lags_say_so() -> None:
+def test_late_links_alone_let_vars_swing_where_theory_predicts_it() -> None:
     """With the re-tuned gains of reduced communication the var law grows at 0.3 s and not at 0.5 s."""
     reduced = theory("reduced-communication")
     growth = [var_growth(reduced.inverters["reduced"], reduced.response, link_delay_s=d) for d in (0.3, 0.5)]
@@ -56,7 +56,7 @@ def test_late_links_alone_let_vars_swing_where_their_lags_say_so() -> None:
     assert swing > 0.003
 
 
-def test_what_is_held_through_a_partition_keeps_f_off_as_predicted_and_what_expires_does_not() -> None:
+def test_held_states_keep_f_off_in_a_partition_and_expired_ones_do_not() -> None:
     """By microgrid f stays 0.15 Hz off, 10 % less than predicted, and within 1 mHz if states expire."""
     cases = told("partition", 6.0, "microgrids", "microgrids-expire")
     _, (f, _) = predicted(cases, "microgrids", 3.0)
@@ -68,7 +68,7 @@ def test_what_is_held_through_a_partition_keeps_f_off_as_predicted_and_what_expi
 
 
 def test_a_link_that_flaps_fast_is_as_good_as_one_that_is_up() -> None:
-    """A bridge that is down every other 0.1 s costs a path no time to share; one that is down for good costs all."""
+    """A bridge that is down every other 0.1 s does not delay sharing on a path; without it power is never shared."""
     found = {case: told("flapping", 6.0, case).settling(case, 1.0, 6.0) for case in ("steady", "fast", "down")}
 
     assert found["fast"].t_share_s == pytest.approx(found["steady"].t_share_s, abs=0.05)
@@ -76,8 +76,8 @@ def test_a_link_that_flaps_fast_is_as_good_as_one_that_is_up() -> None:
     assert found["down"].t_f_s is not None
 
 
-def test_normalising_by_degree_takes_most_of_what_delay_costs_a_dense_graph() -> None:
-    """At 0.1 s of delay on full f is back a third sooner."""
+def test_normalising_by_degree_removes_most_of_the_cost_of_delay_on_a_dense_graph() -> None:
+    """At 0.1 s of delay on the full graph f returns a third sooner."""
     link = Fault(on=ALL, delay=0.1)
     paper = measured("graphs", "full", 4.0, link)["t_f_s"]
     normalised = measured("graphs", "full", 4.0, link, degraded_communication={"weights": "degree-normalised"})["t_f_s"]
@@ -99,8 +99,8 @@ def steady(T_c: float, end_s: float) -> tuple[float, float]:
     return MQSI, V_error
 
 
-def test_vars_are_as_equal_and_voltage_as_near_at_any_control_period() -> None:
-    """MQSI and V_error at T_c 20 and 100 ms are those at 2 ms, where the law is nearly the paper's, to 2 %."""
+def test_settled_vars_and_voltage_do_not_depend_on_the_control_period() -> None:
+    """MQSI and V_error at T_c 20 and 100 ms equal those at 2 ms to 2 %."""
     shortest = steady(0.002, 11.0)
 
     assert shortest == pytest.approx((0.0058, 0.00175), rel=0.01)

@@ -31,13 +31,13 @@ def graph(case: str) -> np.ndarray:
     return (theory("graphs").inverters[case].A > 0.0).astype(float)
 
 
-def test_the_graphs_bear_two_liars_one_and_none() -> None:
+def test_the_graphs_resist_two_liars_one_and_none() -> None:
     """R is 5, 3 and 1."""
     assert [robustness(graph(case)).least for case in GRAPHS] == [5, 3, 1]
 
 
 def test_below_3_robust_one_constant_liar_keeps_the_honest_apart() -> None:
-    """On the reduced graph, r 1, the range of the honest does not close with F = 1, and not even without a liar."""
+    """On the reduced graph (r 1) the range of the honest agents does not close with F = 1, even without a liar."""
     start = np.array([0.2, 0.2, 0.2, 0.5, 0.5, 0.5, 0.8, 0.8, 0.8])
     lies = np.full((400, 9, 9), 0.2)
 
@@ -46,8 +46,8 @@ def test_below_3_robust_one_constant_liar_keeps_the_honest_apart() -> None:
     assert np.ptp(spread_after(graph("robust"), start, {1}, 1, lies)[-1]) < 1e-3
 
 
-def test_every_run_is_in_the_table_and_has_words_of_its_own() -> None:
-    """No two attacks or defences have one name, so that none hides another; each graph has all of them."""
+def test_every_run_is_in_the_table_under_its_own_name() -> None:
+    """Every attack and every defence has its own name, on every graph."""
     plan = sweep()
     attacks = {attack_words(*written(run, "node", "link")) for run in plan.runs}
     defences = {defence_words(*written(run, "law")) for run in plan.runs}

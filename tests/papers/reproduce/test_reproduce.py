@@ -49,7 +49,7 @@ def whole(*results: PartResult) -> Reproduction:
 
 
 def test_the_page_needs_nothing_but_itself(tmp_path: Path) -> None:
-    """Every image is inside, nothing is fetched: no script, no link to a style, no address."""
+    """It contains every image and fetches nothing: no script, no style sheet, no address."""
     page = render("report.html.jinja", whole(result(tmp_path)), settings({"islanding": load_scenario("islanding")[0]}))
 
     assert page.count("data:image/png;base64,") == len(ISLANDING.picture)
@@ -57,7 +57,7 @@ def test_the_page_needs_nothing_but_itself(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("template", ["report.html.jinja", "report.md.jinja"])
-def test_every_number_verdict_and_reason_is_told(tmp_path: Path, template: str) -> None:
+def test_the_report_has_every_number_verdict_and_reason(tmp_path: Path, template: str) -> None:
     """The paper's number, ours with a digit more, the difference, each claim with its status and each known miss."""
     one = result(tmp_path)
     text = render(template, whole(one), [("k_p", "0.0007 s", "speed")])
@@ -72,7 +72,7 @@ def test_every_number_verdict_and_reason_is_told(tmp_path: Path, template: str) 
     assert "V_error in proportion: 8 of 8" in text
 
 
-def test_a_number_that_is_off_fails_the_whole(tmp_path: Path) -> None:
+def test_a_number_beyond_its_tolerance_fails_the_report(tmp_path: Path) -> None:
     """It is marked in its cell, fails the claim on its column, and the command ends with 1."""
     off = whole(result(tmp_path, f_error=0.2))
     entry = next(iter(lines(TABLES[0], off.results[0]).values()))[0]
@@ -83,8 +83,8 @@ def test_a_number_that_is_off_fails_the_whole(tmp_path: Path) -> None:
     assert not whole(result(tmp_path)).failed
 
 
-def test_what_is_no_number_is_null(tmp_path: Path) -> None:
-    """metrics.json is JSON for every reader, also where an index has no value."""
+def test_a_missing_number_is_null(tmp_path: Path) -> None:
+    """metrics.json is valid JSON also if an index has no value."""
     one = result(tmp_path)
     IV = {**one.found.results["IV"]}
     IV["event1"] = replace(IV["event1"], MQSI=float("nan"))
@@ -97,7 +97,7 @@ def test_what_is_no_number_is_null(tmp_path: Path) -> None:
 
 
 def test_every_claim_is_shown_and_every_figure_exists() -> None:
-    """A claim that names a figure names one of its own part's; every experiment with claims is a part."""
+    """The figure of a claim is in the claim's own part; every experiment with claims has a part."""
     for part in PARTS:
         keys = {picture.key for picture in part.picture}
         assert {claim.figure for claim in CLAIMS.get(part.experiment, ())} <= keys | {""}

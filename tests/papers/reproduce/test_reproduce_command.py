@@ -9,7 +9,7 @@ from tests.command_line import invoke
 
 
 def test_one_part_from_end_to_end(tmp_path: Path) -> None:
-    """A report with its figures, every number of Table V within tolerance, exit code 0, and progress on the way."""
+    """A report with its figures, every number of Table V within tolerance, exit code 0, and lines of progress."""
     out = tmp_path / "report"
     code, text = invoke("reproduce", "--driver", "inprocess", "--only", "microgrid-switching", "--out", str(out))
 
@@ -42,8 +42,8 @@ def test_one_part_from_end_to_end(tmp_path: Path) -> None:
         (["--out", __file__], "this is a file; give a new or an empty folder"),
     ],
 )
-def test_a_slip_is_told_before_anything_runs(words: list[str], told: str) -> None:
-    """Exit code 2, and a sentence with what would be right."""
+def test_a_wrong_option_is_refused_before_any_run(words: list[str], told: str) -> None:
+    """Exit code 2, and a sentence with the right choice."""
     code, text = invoke("reproduce", *words)
 
     assert code == 2

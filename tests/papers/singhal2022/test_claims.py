@@ -46,7 +46,7 @@ def verdict(name: str, results: Table) -> Verdict:
 
 
 def test_the_papers_own_numbers_pass_every_claim() -> None:
-    """Tables I and II of the paper bear out what its text says."""
+    """Tables I and II of the paper agree with its text."""
     assert {verdict.claim.name: verdict.status for verdict in judged(paper())} == {
         claim.name: "PASS" for claim in ISLANDING
     }
@@ -80,7 +80,7 @@ def test_a_number_that_is_off_fails_the_claim(name: str, results: Table) -> None
 
 
 @pytest.mark.parametrize("V_error", [0.0, 0.00126])
-def test_a_V_error_is_judged_beside_its_own_size(V_error: float) -> None:
+def test_a_V_error_is_judged_in_proportion_to_its_size(V_error: float) -> None:
     """A zero for 0.001 pu, or a quarter more at 0.002, is a miss, though a tolerance of 0.003 pu would pass it."""
     results = changed("III", "event2", V_error=V_error)
 
@@ -89,8 +89,8 @@ def test_a_V_error_is_judged_beside_its_own_size(V_error: float) -> None:
     assert "7 of 8, largest difference" in verdict("table_II_V_error_relative", results).found
 
 
-def test_a_claim_about_a_case_or_an_event_that_is_not_there_is_not_judged() -> None:
-    """With case IV alone, what compares cases is not run, and what is about IV is judged."""
+def test_a_claim_about_a_missing_case_or_event_is_not_judged() -> None:
+    """With case IV alone, claims that compare cases are not judged, and claims on IV are."""
     storm = {case: {"event1": events["event1"], "storm": events["event2"]} for case, events in paper().items()}
     verdicts = {verdict.claim.name: verdict for verdict in judged({"IV": paper()["IV"]})}
 
@@ -100,8 +100,8 @@ def test_a_claim_about_a_case_or_an_event_that_is_not_there_is_not_judged() -> N
     assert {(one.status, one.found) for one in judged(storm)} == {("NOT RUN", "needs event2")}
 
 
-def test_nothing_left_to_better_is_better_by_any_factor() -> None:
-    """An MQSI of exactly 0 in case IV passes what asks for a factor."""
+def test_a_zero_is_smaller_by_any_factor() -> None:
+    """An MQSI of exactly 0 in case IV passes the claims that need a factor."""
     results = changed("IV", "event1", MQSI=0.0)
 
     assert verdict("IV_5_times_below_II_and_III", results).status == "PASS"
@@ -109,7 +109,7 @@ def test_nothing_left_to_better_is_better_by_any_factor() -> None:
 
 
 def test_every_tolerance_has_its_reason() -> None:
-    """No number is compared, or left uncompared, without a word on why; every claim has a name and a place."""
+    """Every column has a reason for its tolerance, or for having none; every claim has a name and a source."""
     assert all(tolerance.reason for tolerance in TABLE.values())
     for claims in CLAIMS.values():
         assert len({claim.name for claim in claims}) == len(claims)
@@ -144,12 +144,12 @@ def over_graphs(times: dict[int, float | None]) -> Findings:
     ],
 )
 def test_claims_of_topologies_hold_and_fail(name: str, times: dict[int, float | None], status: str) -> None:
-    """A time that never came counts as later than all others; where nothing was run below 8, nothing is claimed."""
+    """A missing time counts as later than all others; without runs below 8 links that claim fails."""
     assert {v.claim.name: v.status for v in judge(over_graphs(times), CLAIMS["topology"])}[name] == status
 
 
 def test_an_experiment_without_the_papers_islands_fails_its_table() -> None:
-    """A scenario of the user's own that says it is the paper's, and has no islands, is judged without a traceback."""
+    """A user's scenario with the key `paper` and without islands is judged without a traceback."""
     steady = Steady(f_error_Hz=0.0, MPSI=0.0, V_error=0.0, MQSI=0.0, t_restore_s=None, p={"inv1": 0.5})
     found = Findings(results={"IV": {"event1": steady, "event2": steady}}, islands={"IV": {}})
 

@@ -30,8 +30,8 @@ INV1, INV2 = 0, 1
         ("microgrid-switching", "switching"),
     ],
 )
-def test_every_claim_holds_but_for_the_misses_that_are_explained(scenario: str, benchmark: str) -> None:
-    """`gridpeers run` reports what the documentation says of each claim."""
+def test_every_claim_holds_but_for_the_known_deviations(scenario: str, benchmark: str) -> None:
+    """`gridpeers run` reports the same claims as docs/understand/evidence.md."""
     assert experiment(scenario).statuses(benchmark) == expected(benchmark)
 
 
@@ -40,7 +40,7 @@ def test_every_claim_holds_but_for_the_misses_that_are_explained(scenario: str, 
 
 @pytest.mark.parametrize("case", ["II", "III"])
 def test_without_the_followers_the_leaders_run_into_their_limit(case: str) -> None:
-    """After event 1 every GFM has P_max = 1 pu, which is what holds 60 Hz back. Section 4, Table I."""
+    """After event 1 every GFM is at P_max = 1 pu, which prevents 60 Hz. Section 4, Table I."""
     p = experiment("islanding").steady[case]["event1"].p
 
     assert [p[name] for name in ("inv1", "inv4", "inv7")] == pytest.approx([1.0] * 3, abs=0.005)
@@ -66,7 +66,7 @@ def test_the_mean_voltage_returns_to_nominal_with_secondary_control() -> None:
     assert [mean[case] for case in ("II", "III", "IV")] == pytest.approx([1.0] * 3, abs=0.002)
 
 
-def test_below_200_kW_the_frequency_falls_on_and_on() -> None:
+def test_below_200_kW_the_frequency_keeps_falling() -> None:
     """At 175 kW all others are at their rating. Section 4."""
     intermittency = experiment("intermittency")
     history = intermittency.histories["175kW"]
@@ -80,8 +80,8 @@ def test_below_200_kW_the_frequency_falls_on_and_on() -> None:
 # ---------------------------------------------------------------- intermittency, wind-up
 
 
-def test_the_set_point_of_a_saturated_inverter_goes_on_with_the_others() -> None:
-    """P_set of GFL 2 follows the consensus while its power stays at the limit: wind-up, which is accepted. Remark 2."""
+def test_the_set_point_of_a_saturated_inverter_follows_the_others() -> None:
+    """P_set of GFL 2 follows the consensus while its power stays at the limit: accepted wind-up. Remark 2."""
     intermittency = experiment("intermittency")
     history, nameplates = intermittency.histories["200kW"], intermittency.nameplates
     P_set, P = history.P_set[-1] / nameplates.s, history.P[-1] / nameplates.s
@@ -96,7 +96,7 @@ def overshoot(history: History, wind_up: Experiment) -> float:
 
 
 def test_without_limits_set_points_grow_as_long_as_power_is_short() -> None:
-    """P_set of GFM 1 grows beyond twice its rating, while it gives half of that; GFL 2 clips its own. Remark 2."""
+    """P_set of GFM 1 grows beyond twice its rating, and its power is half of that; GFL 2 clips P_set. Remark 2."""
     wind_up = experiment("wind-up")
     history, s = wind_up.histories["none"], wind_up.nameplates.s
     short = (history.t > 3.0) & (history.t < 5.0)
@@ -108,8 +108,8 @@ def test_without_limits_set_points_grow_as_long_as_power_is_short() -> None:
     assert history.P[short, INV2][-1] < 0.51 * s[INV2]
 
 
-def test_wound_up_set_points_overshoot_when_power_is_back() -> None:
-    """The frequency goes above nominal by a third more without limits than with them. Remark 2."""
+def test_wound_up_set_points_overshoot_when_power_returns() -> None:
+    """Without limits the frequency overshoots nominal by a third more than with them. Remark 2."""
     wind_up = experiment("wind-up")
     over = {case: overshoot(history, wind_up) for case, history in wind_up.histories.items()}
 
@@ -117,7 +117,7 @@ def test_wound_up_set_points_overshoot_when_power_is_back() -> None:
 
 
 def test_a_reference_that_is_not_clipped_overshoots_three_times_as_far() -> None:
-    """The clipping decides: with a bound of 3 pu for GFL too, the frequency goes to 60.38 Hz instead of 60.12 Hz."""
+    """With a bound of 3 pu for GFL too, the frequency reaches 60.38 Hz in place of 60.12 Hz."""
     wind_up = experiment("wind-up")
     scenario, feeder = load_scenario("wind-up")
     plant = replace(scenario.plant, gfl=replace(scenario.plant.gfl, P_set_lim=3.0))
@@ -158,7 +158,7 @@ def test_an_adaptive_alpha_is_better_in_both_at_once() -> None:
     assert at["adaptive"][1] < at["reduced"][1]
 
 
-def test_the_others_take_the_load_of_the_one_that_left_at_once() -> None:
+def test_the_others_take_the_load_at_once_when_an_inverter_leaves() -> None:
     """In the first row after inverter 2 left, the total power is within 2 % of that before. Section 4, figure of P."""
     history = experiment("plug-n-play").histories["IV"]
     before, after = (int(np.searchsorted(history.t, t - 1e-9)) for t in (2.0, 2.01))
@@ -171,8 +171,8 @@ def test_the_others_take_the_load_of_the_one_that_left_at_once() -> None:
 # ---------------------------------------------------------------- plug-n-play, switching
 
 
-def test_it_comes_back_at_no_load_and_without_a_step() -> None:
-    """Inverter 2 gives next to nothing at first; the others go to the new level only, and once they hear of it."""
+def test_an_inverter_returns_at_no_load_and_without_a_step() -> None:
+    """Inverter 2 delivers almost nothing at first; the others change only when they hear it."""
     plug_n_play = experiment("plug-n-play")
     history, s = plug_n_play.histories["IV"], plug_n_play.nameplates.s
     k = int(np.searchsorted(history.t, 3.0 - 1e-9))
@@ -186,7 +186,7 @@ def test_it_comes_back_at_no_load_and_without_a_step() -> None:
 
 
 def test_without_secondary_control_the_returned_inverter_stays_at_no_load() -> None:
-    """Case I: nobody tells inverter 2 to take its part again; it is the consensus that does. (7), (12)."""
+    """In case I nothing changes the set-point of inverter 2; the consensus would. (7), (12)."""
     steady = experiment("plug-n-play").steady["I"]["return"]
 
     assert abs(steady.p["inv2"]) < 0.01

@@ -5,8 +5,8 @@ from gridpeers.papers.singhal2022.figures import topologies
 from .test_claims import graph_run
 
 
-def test_graphs_in_parts_are_not_drawn_as_connected_ones() -> None:
-    """Also with links enough for a tree: they have a mark of their own, are named, and are not in the median."""
+def test_unconnected_graphs_have_their_own_mark() -> None:
+    """Also those with enough links for a tree: they are in the legend, and not in the median."""
     runs = [graph_run(8, 1.0, connected=True), graph_run(9, 0.8, connected=True), graph_run(9, None, connected=False)]
     page = topologies(runs)
     left, right = page.axes

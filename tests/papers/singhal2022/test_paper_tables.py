@@ -17,8 +17,8 @@ def ours(cell: Cell) -> float:
     return experiment(SCENARIOS[cell.table]).found.value(cell)
 
 
-def test_the_numbers_that_no_tolerance_judges_are_as_near_as_the_documentation_says() -> None:
-    """11 of the 16 MQSI are within a factor of 2 of the paper's. The other five are smaller than its. (17)."""
+def test_MQSI_is_as_near_as_the_documentation_says() -> None:
+    """11 of the 16 MQSI are within a factor of 2 of the paper's. The other five are smaller. (17)."""
     cells = [cell for table in TABLES for cell in table.cells if cell.tolerance.value is None]
     far = {cell: ours(cell) for cell in cells if not cell.within_factor(ours(cell))}
 
@@ -33,7 +33,7 @@ def test_the_numbers_that_no_tolerance_judges_are_as_near_as_the_documentation_s
     assert all(value < cell.paper for cell, value in far.items())
 
 
-def test_V_error_is_as_near_beside_its_own_size_as_the_documentation_says() -> None:
+def test_V_error_is_as_near_as_the_documentation_says() -> None:
     """13 of the 19 V_error are within a quarter of the paper's, or half of its last digit."""
     cells = [cell for table in TABLES for cell in table.cells if cell.relative is not None]
     far = {(c.table, c.case, c.event, c.island) for c in cells if not c.within_relative(ours(c))}
@@ -47,6 +47,6 @@ def test_V_error_is_as_near_beside_its_own_size_as_the_documentation_says() -> N
     }
 
 
-def test_every_table_is_whole() -> None:
+def test_every_table_is_complete() -> None:
     """16 numbers each in Tables I and II, 20 in III, 12 each in IV and V."""
     assert [len(table.cells) for table in TABLES] == [16, 16, 20, 12, 12]

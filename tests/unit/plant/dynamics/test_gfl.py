@@ -59,7 +59,7 @@ def frequency_step(plant: Dynamics, df: float, seconds: float) -> NDArray[np.flo
 
 @pytest.mark.parametrize(("h", "expected"), [(0.002, 61.4315), (0.0002, 61.387)])
 def test_the_plls_first_answer_to_a_phase_jump(h: float, expected: float) -> None:
-    """Row 14: a jump of 10 degrees shows at once through both gains, before the corrector."""
+    """A jump of 10 degrees shows at once through both gains, before the corrector."""
     units = on_stiff_bus(GFL_D, h=h).inverters
     g, x0 = by_name(units.constants(0)), by_name(units.state_of(0))
     x, t = copy(x0), at_terminal(V_B * BALANCED * np.exp(1j * np.deg2rad(10.0)), units.J[0], g.y_f, 0.0, 1.0, 0.0)
@@ -70,7 +70,7 @@ def test_the_plls_first_answer_to_a_phase_jump(h: float, expected: float) -> Non
 
 
 def test_the_pll_after_a_phase_jump() -> None:
-    """Row 14: it undershoots to 59.940 Hz a tenth of a second after the jump."""
+    """It undershoots to 59.940 Hz a tenth of a second after the jump."""
     plant = on_stiff_bus(GFL_D)
     move_source(plant, V_B * BALANCED * np.exp(1j * np.deg2rad(10.0)))
 
@@ -93,7 +93,7 @@ def test_the_pll_after_a_frequency_step() -> None:
 
 
 def test_frequency_watt() -> None:
-    """Row 16: 1 % droop gives 0.5 pu for -0.3 Hz, through the lags of 0.05 and 0.5 s."""
+    """1 % droop gives 0.5 pu for -0.3 Hz, through the lags of 0.05 and 0.5 s."""
     plant = on_stiff_bus(WATT)
     plant.inverters.set_points[0, 0] = 0.3
     plant.run(3000)
@@ -106,7 +106,7 @@ def test_frequency_watt() -> None:
 
 
 def test_frequency_watt_with_the_default_droop() -> None:
-    """Row 17: 5 % droop gives 0.1 pu for -0.3 Hz."""
+    """5 % droop gives 0.1 pu for -0.3 Hz."""
     plant = on_stiff_bus(WATT, m_p=0.05)
 
     p = frequency_step(plant, -0.3, 6.0)[:, 1]
@@ -115,7 +115,7 @@ def test_frequency_watt_with_the_default_droop() -> None:
 
 
 def test_the_dead_band_jumps() -> None:
-    """Row 18: past the edge of the dead band the full deviation acts."""
+    """Past the edge of the dead band the full deviation acts."""
     record = by_name(on_stiff_bus(replace(WATT, db_UF=0.036, db_OF=0.036)).inverters.constants(0))
 
     assert gfl.power_reference(record, 0.3, 59.965) == pytest.approx(0.3, abs=1e-12)
@@ -123,7 +123,7 @@ def test_the_dead_band_jumps() -> None:
 
 
 def test_volt_var() -> None:
-    """Row 19: 5 % droop gives 0.4 pu of var for -2 %, through the lags of 0.05 and 0.2 s."""
+    """5 % droop gives 0.4 pu of var for -2 %, through the lags of 0.05 and 0.2 s."""
     plant = on_stiff_bus(replace(GFL_D, volt_var=True))
     move_source(plant, 0.98 * V_B * BALANCED)
 
@@ -134,14 +134,14 @@ def test_volt_var() -> None:
 
 
 def test_var_takes_what_power_leaves() -> None:
-    """Row 20: at P_d = 0.8 the var reference is clipped at 0.6."""
+    """At P_d = 0.8 the var reference is clipped at 0.6."""
     record = by_name(on_stiff_bus(replace(GFL_D, volt_var=True)).inverters.constants(0))
 
     assert gfl.var_reference(record, 1.0, 0.0, 0.9, 0.8) == pytest.approx(0.6, abs=1e-6)
 
 
 def test_the_current_loop() -> None:
-    """Row 21: a step of P* of 0.3 rings at 4.57 Hz, with the overshoot and decay of the pole -11.49 +- j28.74 1/s."""
+    """A step of P* of 0.3 rings at 4.57 Hz, with the overshoot and decay of the pole -11.49 +- j28.74 1/s."""
     plant = on_stiff_bus(GFL_D)
     plant.inverters.set_points[0, 0] = 0.3
     plant.run(3000)
@@ -162,7 +162,7 @@ def test_the_current_loop() -> None:
 
 
 def test_the_current_reference_is_clipped() -> None:
-    """Row 22: at half voltage 0.8 pu of power would need 1.6 pu of current; 1.0 is given, and 0.5 pu of power."""
+    """At half voltage 0.8 pu of power would need 1.6 pu of current; 1.0 is given, and 0.5 pu of power."""
     plant = on_stiff_bus(GFL_D)
     plant.inverters.set_points[0, 0] = 0.8
     plant.run(2000)
@@ -178,13 +178,13 @@ def test_the_current_reference_is_clipped() -> None:
 
 @pytest.mark.parametrize("wrong", [replace(GFL_D, F_current=1.0), replace(GFL_D, k_pc=0.2)])
 def test_a_diverging_current_controller_is_refused(wrong: Gfl) -> None:
-    """Row 23: gains whose one-pass feedback grows on a stiff bus are refused with the ratio and the remedy."""
+    """Gains whose one-pass feedback grows on a stiff bus are refused with the ratio and the remedy."""
     with pytest.raises(ValueError, match=r"must be below 1, got 1\.\d\d"):
         on_stiff_bus(wrong)
 
 
 def test_the_refused_gains_do_diverge() -> None:
-    """Row 23: the refusal is not overcautious: let through, the gains blow up."""
+    """The refusal is not overcautious: let through, the gains blow up."""
     plant = on_stiff_bus(GFL_D)
     plant.inverters.constants(0)["F_current"] = 1.0
     plant.inverters.set_points[0, 0] = 0.3

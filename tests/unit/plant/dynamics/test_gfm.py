@@ -46,7 +46,7 @@ def settled(y: Series, end: float, within: float, h: float) -> float:
 
 
 def test_bases() -> None:
-    """Row 1: 200 kVA at 277.1363 V has 1.15207 ohm, and the autotest's filter 0.4507 - j5.2672 S."""
+    """200 kVA at 277.1363 V has 1.15207 ohm, and the autotest's filter 0.4507 - j5.2672 S."""
     record = on_stiff_bus(GFM_A).inverters.constants(0)
 
     assert pytest.approx(240.56, rel=1e-4) == S_B / (3.0 * V_B)
@@ -55,7 +55,7 @@ def test_bases() -> None:
 
 
 def test_a_lone_gfm_droops() -> None:
-    """Rows 3 and 4: a step of 0.5 pu ends 0.3 Hz lower, on the way a first-order lag of 10 ms."""
+    """A step of 0.5 pu ends 0.3 Hz lower, on the way a first-order lag of 10 ms."""
     plant = lone(GFM_D, 0.3)
     plant.inverters.set_points[0, 0] = 0.3
     plant.connect(loaded(0.3))
@@ -70,7 +70,7 @@ def test_a_lone_gfm_droops() -> None:
 
 
 def test_the_voltage_controller_alone() -> None:
-    """Row 5: without load the measured voltage follows V_set with poles -6.25 and -93.7 1/s."""
+    """Without load the measured voltage follows V_set with poles -6.25 and -93.7 1/s."""
     plant = lone(GFM_D, 0.0)
     plant.inverters.set_points[0, 1] += 0.01
 
@@ -83,7 +83,7 @@ def test_the_voltage_controller_alone() -> None:
 
 
 def test_voltage_droop_on_a_stiff_bus() -> None:
-    """Row 6: 1 % of V_set is 0.2 pu of var, 63 % of it after 0.548 s."""
+    """1 % of V_set is 0.2 pu of var, 63 % of it after 0.548 s."""
     plant = on_stiff_bus(GFM_A)
     plant.inverters.set_points[0, 1] += 0.01
 
@@ -94,7 +94,7 @@ def test_voltage_droop_on_a_stiff_bus() -> None:
 
 
 def test_power_step_on_a_stiff_bus() -> None:
-    """Row 7: P_set acts at once on the speed; power follows in 25 ms to a half and 75 ms to 90 %, without overshoot."""
+    """P_set acts at once on the speed; power follows in 25 ms to a half and 75 ms to 90 %, without overshoot."""
     plant = on_stiff_bus(GFM_A)
     plant.inverters.set_points[0, 0] = 0.3
 
@@ -109,7 +109,7 @@ def test_power_step_on_a_stiff_bus() -> None:
 
 
 def test_the_default_filter_is_critically_damped() -> None:
-    """Row 8: with the default filter the P-f loop has the poles -50 +- j1.5 1/s."""
+    """With the default filter the P-f loop has the poles -50 +- j1.5 1/s."""
     plant = on_stiff_bus(GFM_D, h=0.0002)
     plant.inverters.set_points[0, 0] = 0.001
 
@@ -160,7 +160,7 @@ def test_two_gfm_share_a_load(
 def test_the_limiter_on_a_stiff_bus(
     k_pp: float, k_ip: float, peak: tuple[float, float], at: float, quiet: float
 ) -> None:
-    """Rows 11 and 12: P_set 0.8 over Pmax 0.5 overshoots as computed and ends at 0.5 with x+ = -1.131 rad/s."""
+    """P_set 0.8 over Pmax 0.5 overshoots as computed and ends at 0.5 with x+ = -1.131 rad/s."""
     plant = on_stiff_bus(replace(GFM_A, P_max=0.5, k_pp=k_pp, k_ip=k_ip))
     plant.inverters.set_points[0, 0] = 0.8
 
@@ -174,7 +174,7 @@ def test_the_limiter_on_a_stiff_bus(
 
 
 def test_a_gfm_does_not_absorb() -> None:
-    """Row 13: pushed below Pmin = 0 a GFM speeds up until it delivers nothing, above its droop frequency."""
+    """Pushed below Pmin = 0 a GFM speeds up until it delivers nothing, above its droop frequency."""
     plant = pair(GFM_A, GFM_A, 0.2)
     plant.inverters.set_points[:, 0] = 0.1, 0.9
 

@@ -126,7 +126,7 @@ def test_legs_that_a_load_couples_start_as_one_island() -> None:
     np.testing.assert_allclose(out[:, :4], before, rtol=1e-9, atol=1e-6)
 
 
-def test_it_starts_its_dead_lateral_at_its_own_phase() -> None:
+def test_it_starts_its_de_energised_lateral_at_its_own_phase() -> None:
     """A black start on phase C begins at +120 degrees, so that the lateral meets the rest in step."""
     network = circuit(np.array([[0.5 / Z_B]], complex), [[0, 0, 0]])
     dynamics = Dynamics(network, (single(GFM_D, "C"),), 0.002, connected=[False])

@@ -61,7 +61,7 @@ def test_going_on_with_the_same_network_changes_nothing() -> None:
     np.testing.assert_allclose(np.abs(plant.inverters.V), np.abs(before), rtol=1e-9)
 
 
-def test_a_gfm_alone_starts_a_dead_island_at_its_set_point() -> None:
+def test_a_gfm_alone_starts_a_de_energised_island_at_its_set_point() -> None:
     """Taken off, it leaves 0 V behind; put back where there is no voltage, it holds nominal voltage at angle 0."""
     plant = lone(GFM_D, 0.3)
     plant.run(100)
@@ -148,7 +148,7 @@ def test_switching_what_is_so_already_changes_nothing() -> None:
 
 
 def test_an_island_without_solution_is_de_energised_until_it_can_be_fed() -> None:
-    """A load of twenty times the rating trips the inverter; with 0.4 and 0.05 pu it starts the dead island again."""
+    """A load of twenty times the rating trips the inverter; with 0.4 and 0.05 pu it starts the island again."""
     plant: Dynamics = lone(GFM_D, 0.3)
     dead_weight = constant_power(20.0)
     plant.network.V_branch = dead_weight.V_branch.copy()

@@ -1,4 +1,4 @@
-"""The whole plant: rest, islanding, load loss, three islands, dead islands, re-closing."""
+"""The whole plant: rest, islanding, load loss, three islands, de-energised islands, re-closing."""
 
 from __future__ import annotations
 
@@ -218,7 +218,7 @@ def test_a_spare_is_off_until_it_is_connected() -> None:
     assert spared.measure()["inv1"].f > off["inv1"].f + 0.01
 
 
-def test_what_is_dead_from_the_start_is_said() -> None:
+def test_parts_that_are_de_energised_from_the_start_are_reported() -> None:
     """An inverter cut off before the run begins is an event at t = 0, with its load, not a silent zero."""
     feeder = read_feeder("microgrid123", "main")
     cut = replace(feeder, lines=tuple(line for line in feeder.lines if "162" not in (line.from_bus, line.to_bus)))

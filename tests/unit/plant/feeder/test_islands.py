@@ -56,7 +56,7 @@ def test_an_island_that_stays_as_it_is_is_told_once(network: Network) -> None:
     assert [event.subject for event in then] == ["inv1", "inv4"]
 
 
-def test_an_island_without_gfm_is_dead_and_told_once(network: Network) -> None:
+def test_an_island_without_gfm_is_de_energised_and_reported_once(network: Network) -> None:
     """Buses that lose their last GFM are told with load and idle inverters, once until they have been fed again."""
     closed = opened(network, *PAPER_ISLANDS)
     dead, alive = reduced(network, closed, off=("inv4",)), reduced(network, closed)

@@ -107,7 +107,7 @@ def test_many_steps_at_once_are_the_same_as_one_by_one() -> None:
 
 
 def test_an_inverter_that_is_off_does_not_trip() -> None:
-    """An inverter that delivers nothing, or stands in a dead island, is not tripped."""
+    """An inverter that delivers nothing, or stands in a de-energised island, is not tripped."""
     relays = Relays(Protection(), 1, H, 60.0)
 
     assert not any(relays.watch(row(60.0), row(0.0), row(0.0), np.array([False])) for _ in range(2000))
@@ -236,7 +236,7 @@ def test_underfrequency_trips_at_the_very_step_and_without_protection_never() ->
     assert np.all(P[k + 1] == 0.0)
 
 
-def test_a_dead_island_has_no_frequency_and_its_inverters_no_island() -> None:
+def test_a_de_energised_island_has_no_frequency_and_its_inverters_no_island() -> None:
     """After a blackout every inverter reads 0 V, 0 W, 0 Hz, and is told that it is out of service; the run goes on."""
     p = blackout(Protection())
     run(p, 4.0)
@@ -274,7 +274,7 @@ def test_an_inverter_that_tripped_alone_comes_back_at_no_load_after_the_delay() 
     assert np.abs(f[start:, 0] - 60.0).max() < 0.5
 
 
-def test_leaders_that_return_start_a_dead_island_with_all_that_tripped_there() -> None:
+def test_leaders_that_return_start_a_de_energised_island_with_all_that_tripped_there() -> None:
     """After load is switched off, inv1 and inv4 come back, and the island is started when all have waited 1 s."""
     p = blackout(Protection(enter_service=1.0), *opened(2.2, "60-160"))
     run(p, 2.5)
