@@ -26,11 +26,18 @@ ONE_RUN = (
 """Tests that look at the same runs of the catalogue: one worker has them all, and runs each case once."""
 
 
+EACH = ("tests/pages", "tests/validation")
+"""Tests that take seconds and share nothing: any worker has any of them."""
+
 SLOW = {
     "tests/processes": "processes and real time",
     "tests/validation": "other simulators",
     "tests/conformance/test_gridlabd_plant.py": "GridLAB-D as the plant",
-    "tests/conformance/laws/test_carriers.py": "FMUs",
+    "tests/conformance/laws": "carriers of laws",
+    "tests/conformance/test_record.py": "records",
+    "tests/conformance/test_replay.py": "replays",
+    "tests/papers/experiments": "experiments on links",
+    "tests/fuzz": "made-up messages",
     "tests/unit/lab/chaos/test_campaign.py": "campaigns of chaos",
     "tests/pages": "the pages",
     "tests/examples": "the examples",
@@ -61,6 +68,8 @@ class RealTimeApart(LoadFileScheduling):
         if _within(nodeid, PAGES):
             return nodeid  # each page is a test of its own, of some seconds
         file = super()._split_scope(nodeid)
+        if _within(file, EACH):
+            return nodeid
         return ONE_RUN[0] if _within(file, ONE_RUN) else str(file)
 
     def _assign_work_unit(self, node: WorkerController) -> None:
