@@ -112,7 +112,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
         from gridpeers.scenarios.results.plots.drawing import drawing_of
         from gridpeers.scenarios.results.plots.run_figures import draw_all
 
-        draw_all(drawing_of(scenario, cases), folder / "plots")
+        draw_all(drawing_of(scenario, cases), folder / "plots", request.figures)
     set_complete(folder)
     return report
 

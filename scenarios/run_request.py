@@ -72,5 +72,6 @@ class Request:
     """Number of processes that agents share; 0 gives each agent its own. It decides no number."""
     strict: bool = False
     """Real time: the run breaks when the plant cannot keep pace."""
+    figures: Literal["png", "pdf", "svg"] = "png"
     lasting: bool = True
     """The folder stays; one that goes with the results of a notebook has no figures, and is not named."""

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from importlib import util
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
 
 import typer
 from typer import BadParameter
@@ -42,6 +42,7 @@ def argument(metavar: str, help: str) -> Any:
 
 
 ScenarioName = Annotated[str, argument("SCENARIO", "A name that `gridpeers list` shows, or the path of a file.")]
+FigureFormat = Annotated[Literal["png", "pdf", "svg"], typer.Option("--format", help="Format of the figures.")]
 Switches = Annotated[
     list[str] | None, option("LINE", "A line of a .dss or .glm file to make a switch; repeat it.", "--switch")
 ]

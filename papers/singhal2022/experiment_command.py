@@ -14,6 +14,7 @@ from gridpeers.cli.progress import progress
 from gridpeers.cli.usage import (
     BROKEN,
     CLAIM_FAILED,
+    FigureFormat,
     argument,
     check_choice,
     ended_by_signals,
@@ -33,6 +34,7 @@ def experiment(
     out: Annotated[
         Path | None, option("DIR", "Folder, new or this experiment's; runs/experiments/NAME when left out.")
     ] = None,
+    figures: FigureFormat = "png",
     jobs: Annotated[int | None, option("N", "Processes of a sweep; one per core when left out.", min=1)] = None,
 ) -> None:
     """Run an experiment on late, lossy or broken links.
@@ -54,7 +56,7 @@ def experiment(
     again = ["experiment", name, *(["--out", str(out)] if out else [])]
     result = _from_sweep(source, folder, jobs, again) if source.sweep else _from_scenario(source, folder)
     try:
-        files = result.write(folder)
+        files = result.write(folder, figures)
     except OSError as error:
         fail(refusal(folder, error), code=BROKEN)
     for path in files:

@@ -333,8 +333,8 @@ def conclude(outcome: ProcessOutcome, metrics: Request) -> ProcessOutcome:
         from gridpeers.scenarios.results.report import show_summary
 
         report, cases = write_measures(metrics, {case: recorded}, pacing, (), place=f"{shown(folder)}/")
-        draw_all(drawing_of(metrics.scenario, cases), folder / "plots")
-        show_summary(report, terminal(), command_line("export", shown(folder)))
+        draw_all(drawing_of(metrics.scenario, cases), folder / "plots", metrics.figures)
+        show_summary(report, terminal(), command_line("export", shown(folder)), metrics.figures)
         set_complete(folder)
     except (StoppedError, KeyboardInterrupt) as stop:
         set_broken(folder, "interrupted while it was measured")

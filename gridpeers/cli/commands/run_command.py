@@ -14,6 +14,7 @@ from gridpeers.cli.usage import (
     BROKEN,
     CLAIM_FAILED,
     PASSED,
+    FigureFormat,
     ScenarioName,
     chosen,
     ended_by_signals,
@@ -61,6 +62,7 @@ def run(
     details: Annotated[
         bool, flag("Print the whole report, as report.txt has it: tables, claims, checks, notes.", "--details")
     ] = False,
+    figures: FigureFormat = "png",
     out: Annotated[
         Path | None, option("DIR", "Folder for the results, new or empty; runs/SCENARIO/TIME when left out.")
     ] = None,
@@ -89,7 +91,7 @@ def run(
     if driver == "processes":
         free_endpoint(local_endpoint(spec.processes.port), option="processes.port")
     folder = new_folder(out, spec.name, datetime.now().astimezone())  # noqa: TID251  # folders are named by the day
-    request = Request(scenario=spec, feeder=feeder, driver=driver, folder=folder, **pace)
+    request = Request(scenario=spec, feeder=feeder, driver=driver, folder=folder, figures=figures, **pace)
     console, left = terminal(), f"what came until then is in {shown(folder)}/"
     try:
         said = simulator.starting(spec.plant.simulators.get(spec.plant.simulator)) or COMPILING
@@ -106,7 +108,8 @@ def run(
         show(report, console)
     else:
         ours = spec.plant.simulator == "gridpeers"
-        show_summary(report, console, command_line("up", scenario) if ours else command_line("export", shown(folder)))
+        after = command_line("up", scenario) if ours else command_line("export", shown(folder))
+        show_summary(report, console, after, figures)
     failed = any(verdict.status == "FAIL" for verdict in report.verdicts) or report.fails(LAW_FAILED)
     failed |= require_checks and report.fails()
     raise typer.Exit(CLAIM_FAILED if failed else PASSED)

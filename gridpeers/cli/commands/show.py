@@ -7,7 +7,7 @@ from typing import Annotated, Literal, get_args
 
 import typer
 
-from gridpeers.cli.usage import argument, fail, option, require
+from gridpeers.cli.usage import FigureFormat, argument, fail, option, require
 from gridpeers.wire.wording import printable
 
 Topic = Literal[
@@ -70,15 +70,16 @@ _Run = Annotated[Path, argument("RUN", "Folder of a run, e.g. runs/islanding/lat
 def compare(
     first: _Run,
     second: _Run,
-    out: Annotated[Path, option("FILE", "Figure, as .png, .pdf or .svg; runs/comparison.png when left out.")] = Path(
-        "runs/comparison.png"
-    ),
+    out: Annotated[
+        Path | None, option("FILE", "Figure, as .png, .pdf or .svg; runs/comparison.png when left out.")
+    ] = None,
+    figures: FigureFormat = "png",
 ) -> None:
     """Compare two runs: scenarios, metrics, and one figure of both.
 
     Example:  gridpeers compare runs/islanding/latest runs/mine/latest
     """
-    kinds = (".png", ".pdf", ".svg")
+    kinds, out = (".png", ".pdf", ".svg"), out or Path(f"runs/comparison.{figures}")
     if out.suffix not in kinds:
         fail(f"--out {out}: must end in {', '.join(kinds)}")
 

@@ -21,7 +21,7 @@ from gridpeers.cli.commands.options import (
     of_live_run,
     opened,
 )
-from gridpeers.cli.usage import ScenarioName, chosen, flag, load, option, require_posix
+from gridpeers.cli.usage import FigureFormat, ScenarioName, chosen, flag, load, option, require_posix
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
 from gridpeers.scenarios.live.run_address import (
     ENDPOINT,
@@ -54,6 +54,7 @@ class Start:
     duration: Annotated[float | None, option("SECONDS", "Run time of the end; no end if left out.", "--for")] = None
     strict: Annotated[bool, flag("End with exit code 3 if the plant cannot keep pace.", "--strict")] = False
     out: Annotated[Path | None, option("DIR", "Record the run in this new folder, and measure it at its end.")] = None
+    figures: FigureFormat = "png"
     keys: Keys = None
     insecure: Insecure = False
 
@@ -115,7 +116,13 @@ def _start(start: Start, *, agents: bool) -> None:
             outcome = plant_here(config, kept.record, info)
         if kept.whole is not None:
             metrics = Request(
-                scenario=spec, feeder=feeder, driver=LIVE, folder=kept.whole, clock="realtime", speed=start.speed
+                scenario=spec,
+                feeder=feeder,
+                driver=LIVE,
+                folder=kept.whole,
+                clock="realtime",
+                speed=start.speed,
+                figures=start.figures,
             )
             outcome = conclude(outcome, metrics)
         elif outcome.failed_laws:

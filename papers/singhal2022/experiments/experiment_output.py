@@ -106,12 +106,12 @@ class ExperimentResult:
     apart: int = 0
     """Number of leading columns that split the table in Markdown: one table for each combination of their values."""
 
-    def write(self, folder: Path) -> tuple[Path, ...]:
-        """Write figure.png, table.csv and table.md into a folder; return the files."""
+    def write(self, folder: Path, kind: gp.figures.Format = "png") -> tuple[Path, ...]:
+        """Write the figure, table.csv and table.md into a folder; return the files."""
         files = folder / "table.csv", folder / "table.md"
         write_whole(files[0], self.as_csv())
         write_whole(files[1], self.markdown())
-        return *gp.figures.save(draw(self.page), folder, "figure", dpi=DPI), *files
+        return *gp.figures.save(draw(self.page), folder, "figure", (kind,), dpi=DPI), *files
 
     def as_csv(self) -> str:
         text = io.StringIO()

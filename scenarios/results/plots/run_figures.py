@@ -26,6 +26,7 @@ from gridpeers.scenarios.results.plots.style import (
     PAGE,
     STYLES,
     Bounds,
+    Format,
     Style,
     from_zero,
     legend_below,
@@ -39,6 +40,7 @@ from gridpeers.wire.wording import suggestion
 WIDTH = 7.4  # Width of a page (inches)
 TITLE_LENGTH = 48  # Characters of a panel's title that fit above half a page
 LOST = 0.3  # Distance from nominal (Hz) at which a frequency that does not come back leaves the frame
+MARKERS, MARKED = "osD^vP", 5  # Of inverters in turn, and how many each has
 ROUNDS = ("-", "--", ":", "-.")  # Lines of the first inverters, of those that have their colours again, and so on
 
 MOVER: Style = ("#d55e00", "-", 2.2)
@@ -57,6 +59,8 @@ class PanelCurve(NamedTuple):
     style: Style
     label: str = ""
     """Its words in the legend; "" for a curve that has none."""
+    marks: tuple[str, int, int] | None = None
+    """Marker, row of the first one, and rows from one to the next; None: no markers."""
 
 
 class Panel(NamedTuple):
@@ -86,8 +90,12 @@ class Page(NamedTuple):
 
 
 def _fill(axes: Axes, panel: Panel) -> None:
-    for t, y, (colour, dashes, width), label in panel.curves:
-        axes.plot(t, y, color=colour, linestyle=dashes, linewidth=width, label=label)
+    for t, y, (colour, dashes, width), label, marks in panel.curves:
+        (line,) = axes.plot(t, y, color=colour, linestyle=dashes, linewidth=width, label=label)
+        if marks:
+            sign: Any = {"marker": marks[0], "markevery": marks[1:], "ms": 5.0, "mec": "white", "mew": 0.5}
+            line.set(**sign)
+            axes.plot(t, y, color=colour, linestyle="none", zorder=3, **sign)  # above all lines
     axes.set_title(panel.title, loc="left")
     axes.set_ylabel(panel.label)
     axes.set_xlabel("time (s)")
@@ -254,7 +262,9 @@ def _by_inverter(
         curves = []
         for number, (name, (t, y)) in enumerate(of_case.items()):
             again, of = divmod(number, len(STYLES))  # more inverters than colours: those of a later round dashed
-            curves.append(PanelCurve(t, y, (STYLES[of][0], ROUNDS[again % len(ROUNDS)], widths[number]), name))
+            step = max(len(t) // MARKED, 1)  # markers in turn: they tell curves apart that lie on one another
+            marks = MARKERS[number % len(MARKERS)], number * step // len(of_case), step
+            curves.append(PanelCurve(t, y, (STYLES[of][0], ROUNDS[again % len(ROUNDS)], widths[number]), name, marks))
         panels.append(Panel(_case_title(drawing, case), "" if place % columns else label, curves))
     rows = [panels[i : i + columns] for i in range(0, len(panels), columns)]
     size = (3.7 * columns + (2.0 if len(panels) == 1 else 0.0), 2.0 * len(rows) + 0.6)
@@ -348,7 +358,7 @@ def draw(drawing: Drawing, name: str) -> Figure:
         return drawn(figures[name](), drawing)
 
 
-def draw_all(drawing: Drawing, folder: Path) -> tuple[Path, ...]:
+def draw_all(drawing: Drawing, folder: Path, kind: Format = "png") -> tuple[Path, ...]:
     """Draw the figures of a run into a folder, but those of a single measure: the overview has them, or `draw` does."""
     names = (name for name in figures_of(drawing) if name not in MEASURES)
-    return tuple(file for name in names for file in save(draw(drawing, name), folder, name))
+    return tuple(file for name in names for file in save(draw(drawing, name), folder, name, (kind,)))

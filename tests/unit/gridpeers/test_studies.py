@@ -105,12 +105,12 @@ def test_the_command_compare_prints_the_table_and_draws_both(
     shutil.copytree(scenario.run("I").folder, "one")
     shutil.copytree(scenario.run("IV").folder, "two")
 
-    code, text = invoke("compare", "one", "two")
+    code, text = invoke("compare", "one", "two", "--format", "pdf")
 
     assert code == 0
     assert "f_error_Hz" in text
     assert "case.secondary" in text
-    assert (tmp_path / "runs" / "comparison.png").is_file()
+    assert (tmp_path / "runs" / "comparison.pdf").is_file()
     Path("two").rename("latest")
     code, text = invoke("compare", "one", ".")
     assert code == 2

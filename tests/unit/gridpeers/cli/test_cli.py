@@ -90,11 +90,11 @@ def test_a_run_fills_its_folder_from_which_it_can_be_repeated(elsewhere: Path) -
     """
     (elsewhere / "short.toml").write_text(SHORT)
 
-    command = ("run", "short.toml", "--driver", "inprocess", "--seed", "7", "--out", "here")
+    command = ("run", "short.toml", "--driver", "inprocess", "--seed", "7", "--format", "svg", "--out", "here")
     code, text = invoke(*command, figures=True)
 
     assert code == 0, text
-    assert "report  here/report.txt\n" in text
+    assert "figure  here/plots/overview.svg\nreport  here/report.txt\n" in text
     here = elsewhere / "here"
     assert {path.name for path in here.iterdir()} == {
         *("I", "log", "plots", "metrics.json", "checks.json", "report.txt", "scenario.toml", "status.txt"),

@@ -63,6 +63,10 @@ def test_no_curve_hides_another_that_it_lies_upon() -> None:
         for below, above in pairwise(drawn):
             assert above.get_linewidth() <= below.get_linewidth() - 0.2
             assert above.get_color() != below.get_color()
+    signs = [
+        line.get_markevery() for line in draw(drawing("a"), "power_GFL").axes[0].get_lines() if line.get_markevery()
+    ]
+    assert len({start for start, _ in signs}) > 1, "inverters that coincide have their markers at different times"
 
 
 def test_a_case_has_one_colour_everywhere_and_no_two_share_it() -> None:
