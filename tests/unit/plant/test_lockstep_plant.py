@@ -241,7 +241,7 @@ def test_a_nameplate_is_asked_for_again_until_it_comes() -> None:
     assert lab.node.stepper.outcome.startswith("plant: no nameplate from inv4 within 10 s")
 
 
-def test_the_deadline_names_who_is_missing_but_a_plant_that_stood_still_blames_nobody() -> None:
+def test_the_deadline_names_who_is_missing_but_a_plant_that_stood_still_reports_no_agent_as_silent() -> None:
     """Its clock ran on while messages waited: it waits anew, then names agent, message, time and last sign of life."""
     lab = ticking(deadline=10.0)
     lab.states(0, "inv1", "inv3", "inv4")

@@ -83,7 +83,7 @@ def test_another_process_loads_the_step_and_compiles_nothing() -> None:
 
 
 def test_code_for_other_types_is_not_taken(folder: Path) -> None:
-    """Two processes that compile a function for two types at a time may give both the same file."""
+    """Two processes may write code of two types into one file."""
     filled()
     (of_floats,) = folder.glob("*.1.nbc")
     filled(int)

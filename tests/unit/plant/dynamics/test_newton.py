@@ -46,7 +46,7 @@ def test_a_load_behind_a_reactance_has_the_textbook_voltage(part: float, guess: 
 
 @pytest.mark.parametrize("part", [1.001, 2.0, 100.0])
 def test_more_than_the_largest_load_has_no_solution(part: float) -> None:
-    """Beyond E^2 / 2X nothing is found, rather than something that does not solve."""
+    """Beyond E^2 / 2X the solver reports no solution."""
     assert voltage_of(part * E**2 / (2.0 * X), E, E) is None
 
 
@@ -65,8 +65,8 @@ def test_a_load_behind_next_to_no_impedance_has_the_textbook_voltage(B: float) -
     assert abs(V[1]) ** 2 == pytest.approx(E**2 / 2.0 + np.sqrt(E**4 / 4.0 - (X_all * P) ** 2), rel=1e-7)
 
 
-def test_what_is_not_finite_has_no_solution() -> None:
-    """Injections that are not numbers give no voltages."""
+def test_injections_that_are_not_finite_have_no_solution() -> None:
+    """They give no voltages."""
     assert voltage_of(1e3, complex("nan"), E) is None
 
 
@@ -106,7 +106,7 @@ def test_the_island_with_more_load_than_it_can_carry_is_found(island: int, load:
 I_B = S_B / (3.0 * V_B)
 
 
-def test_an_overloaded_phase_carries_no_more_than_its_limit_and_the_others_what_they_need() -> None:
+def test_an_overloaded_phase_carries_its_limit_and_the_others_their_load() -> None:
     """With a load of 3 pu on phase A, |I_A| stays below I_max and V_A is what that gives; B and C stay as they are."""
     dynamics = lone(replace(GFM_D, I_max=1.2), 0.5)
     dynamics.connect(circuit(np.diag([3.0, 0.5, 0.5]).astype(complex) / Z_B, [[0, 1, 2]]))
@@ -144,7 +144,7 @@ def unequal(*P: float) -> Circuit:
 
 
 def test_an_island_whose_limited_currents_settle_is_not_de_energised() -> None:
-    """Two phases that fall to where loads give way hold their limit there, however far the tangent is from it."""
+    """Two phases fall to voltages at which loads draw less, and stay at their limit, far from the tangent."""
     dynamics = Dynamics(unequal(0.3, 0.8, 0.9), (inverter(replace(GFM_D, I_max=1.5)),), 0.002)
     dynamics.start(np.array([0.6]), np.zeros(1))
     dynamics.connect(unequal(0.3, 1.2, 1.6))

@@ -186,7 +186,7 @@ def test_an_inverters_own_keys_come_before_its_set_and_its_set_before_its_kind(t
         ),
     ],
 )
-def test_parameters_that_an_inverter_cannot_have_are_told(tmp_path: Path, tables: str, said: str) -> None:
+def test_parameters_that_an_inverter_cannot_have_are_problems(tmp_path: Path, tables: str, said: str) -> None:
     """Each problem names its key and inverter, before anything starts."""
     path = scenario_of(tmp_path, f"\n{tables}\n")
 

@@ -47,7 +47,7 @@ def totals(p: Plant) -> tuple[float, float]:
 
 @pytest.mark.parametrize("model", ["voltage_source", "current_source"])
 def test_the_feeder_rests(model: str) -> None:
-    """Row 2 on the real feeder: without an event nothing moves for 10 s, and every V_set is exactly what was asked."""
+    """On the real feeder nothing moves for 10 s without an event, and every V_set is exactly the scenario's."""
     p = plant(gfl=Gfl(model=model))
     first = p.measure()
 
@@ -183,7 +183,7 @@ def test_an_inverter_leaves_and_comes_back_without_a_bump(name: str) -> None:
 
 
 def test_a_switch_can_be_operated_by_hand() -> None:
-    """Without any schedule a switch opens when told to, by its alias as well, and it is told if it was open already."""
+    """Without a schedule a switch opens by a command, also by its alias; the answer says if it was already open."""
     p = plant(*opened(0.1, "13-152"))
     run(p, 1.0)
 
@@ -243,7 +243,7 @@ def test_the_grid_takes_back_an_island_out_of_phase() -> None:
 
 
 def test_an_overloaded_island_trips_and_the_rest_goes_on() -> None:
-    """Islanded with more load than its ratings, the feeder goes dark and says why; the run reaches its end."""
+    """With more load than its ratings, the island is de-energised with a reason; the run reaches its end."""
     feeder = read_feeder("microgrid123")
     loads = tuple(replace(load, S=tuple(2.0 * S for S in load.S)) for load in feeder.loads)
     settings = PlantSettings(events=opened(0.1, "13-152"))

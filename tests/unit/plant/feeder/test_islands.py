@@ -44,8 +44,8 @@ def test_islands_are_named_by_their_first_inverter(network: Network) -> None:
     assert not any(alone)
 
 
-def test_an_island_that_stays_as_it_is_is_told_once(network: Network) -> None:
-    """A switch that only drops load changes no island; one that parts another leaves the third untold."""
+def test_an_unchanged_island_is_reported_once(network: Network) -> None:
+    """A switch that only drops load changes no island; the split of one island does not report another."""
     whole, parts = opened(network, "13-152"), opened(network, "13-152", "sw1_2")
     islands = Islands(network)
 
@@ -57,7 +57,7 @@ def test_an_island_that_stays_as_it_is_is_told_once(network: Network) -> None:
 
 
 def test_an_island_without_gfm_is_de_energised_and_reported_once(network: Network) -> None:
-    """Buses that lose their last GFM are told with load and idle inverters, once until they have been fed again."""
+    """Buses without GFM are reported with load and idle inverters, once until they are energised again."""
     closed = opened(network, *PAPER_ISLANDS)
     dead, alive = reduced(network, closed, off=("inv4",)), reduced(network, closed)
     islands = Islands(network)
@@ -104,8 +104,8 @@ def schedule(draw: random.Random) -> tuple[SwitchEvent, ...]:
         ("III", 1, "second-order"),
     ],
 )
-def test_no_schedule_of_switchings_ends_the_plant(category: Literal["off", "III"], seed: int, method: Method) -> None:
-    """Every row is finite; who delivers has a frequency within bounds, who does not has no power; trips are told."""
+def test_no_schedule_of_switching_ends_the_plant(category: Literal["off", "III"], seed: int, method: Method) -> None:
+    """Every row is finite; a connected inverter has a bounded frequency, another has no power; trips are events."""
     draw = random.Random(f"switchings {seed}")
     factor = draw.uniform(0.8, 2.0)
     feeder = read_feeder("microgrid123")

@@ -20,8 +20,8 @@ from tests.unit.plant.feeder.test_feeder import T_C, plant, run
 ISLANDED = SwitchEvent(t=0.02, switch="13-152", action="open")
 
 
-def test_a_load_that_was_set_is_the_load_of_another_table() -> None:
-    """In an island the inverters come to the powers of a plant whose table has the load so from the beginning."""
+def test_a_set_load_acts_as_a_load_of_the_table() -> None:
+    """In an island the powers settle at those of a plant whose table has the load from the start."""
     p = plant(ISLANDED)
     run(p, 0.1)
     words = p.set_load("48", LoadSetting(factor=1.5))
@@ -48,7 +48,7 @@ def test_a_load_that_was_set_is_the_load_of_another_table() -> None:
 
 
 def test_a_load_is_changed_once_and_restored_to_the_byte() -> None:
-    """Nothing of a setting stays once the load has its table's power again: the network is the first one."""
+    """With the table's power the load, and so the network, is the first one again."""
     first = Network(read_feeder("microgrid123"))
     board = LoadBoard(first)
     board.put("48", LoadSetting(P=0.0, Q=0.0))
@@ -78,7 +78,7 @@ def test_a_load_is_changed_once_and_restored_to_the_byte() -> None:
         ("48", LoadSetting(Q=-90e6), "-90000 kvar is not plausible for the reactive power of a load"),
     ],
 )
-def test_what_makes_no_sense_is_refused_and_changes_nothing(name: str, setting: LoadSetting, said: str) -> None:
+def test_an_invalid_setting_is_refused_and_changes_nothing(name: str, setting: LoadSetting, said: str) -> None:
     """The message says what would be right."""
     board = LoadBoard(Network(read_feeder("microgrid123")))
 
@@ -98,7 +98,7 @@ def kinds(p: Plant) -> set[str]:
     return {event.kind for event in p.take_events()}
 
 
-def test_a_scheduled_change_is_the_one_that_a_person_makes() -> None:
+def test_a_scheduled_change_equals_a_live_one() -> None:
     """The same rows to the last bit, and the same event."""
     changes = {"48": LoadSetting(factor=1.5), "65": LoadSetting(P=0.0, Q=0.0)}
     scheduled = plant(
@@ -120,7 +120,7 @@ def test_a_scheduled_change_is_the_one_that_a_person_makes() -> None:
 
 
 def test_switches_and_loads_of_one_step_change_at_once() -> None:
-    """The island takes the loads that it has then, and never those of before, which it could not feed."""
+    """The island starts with its new loads, never with the former ones, which it could not feed."""
     heavy, light = every_load(0.04, 2.5), every_load(0.1, 1.0)
     opening = SwitchEvent(t=0.1, switch="13-152", action="open")
     together = plant(opening, loads=(*heavy, *light))
@@ -150,8 +150,8 @@ def test_networks_of_scheduled_loads_are_factored_before_the_run(monkeypatch: py
     assert factored == [5]
 
 
-def test_a_schedule_that_makes_no_sense_is_refused_at_the_start() -> None:
-    """Whoever writes settings in Python hears of it before the run, and not when the event comes."""
+def test_an_invalid_schedule_is_refused_at_the_start() -> None:
+    """A wrong setting from Python is an error before the run, not at its event."""
     with pytest.raises(ValueError, match='load "4800": no such load'):
         plant(loads=(LoadEvent(t=0.02, load="4800", setting=LoadSetting(factor=0.5)),))
     with pytest.raises(ValueError, match="load 48: the real power of a load must not be negative"):

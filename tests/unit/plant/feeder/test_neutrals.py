@@ -296,7 +296,7 @@ THREE_POLES = (
 """A street behind a switch of three poles, past which its neutral goes on to the transformer."""
 
 
-def test_a_switch_that_leaves_the_neutral_closed_is_told(tmp_path: Path) -> None:
+def test_a_switch_that_leaves_the_neutral_closed_gives_a_warning(tmp_path: Path) -> None:
     """An island that its neutral still ties to the grid counts as fed by the grid, and a warning says so, once."""
     feeder, _ = imported(tmp_path, THREE_POLES)
     feeder = feeder.add_inverter("bat", "b1", "GFM", 6e4).add_inverter("roof", "b3", "GFL", 5e3, phases="A")

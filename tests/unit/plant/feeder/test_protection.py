@@ -58,8 +58,8 @@ def test_each_function_trips_beyond_its_threshold_after_its_clearing_time(
     assert steps_until_trip(alone, **{quantity: threshold}, most=round(time / 0.1) + 2) == 0
 
 
-def test_settings_of_a_scenario_go_before_the_defaults_which_follow_the_nominal_frequency() -> None:
-    """At 50 Hz UF2 is at 47.08 Hz, as 56.5 Hz is at 60 Hz; what somebody writes is meant in Hz; "off" is off."""
+def test_settings_of_a_scenario_replace_defaults_that_follow_the_nominal_frequency() -> None:
+    """At 50 Hz the default of UF2 is 47.08 Hz; a setting of the scenario is in Hz; "off" disables all."""
     own = Relays(Protection(trips={"UV2": (0.8, 0.1), "OF2": (51.5, 0.1)}), 1, H, 50.0)
     off = Relays(Protection(category="off", trips={"UV2": (0.8, 0.1)}), 1, H, 60.0)
     at = dict(zip(own.names, own.thresholds.tolist(), strict=True))
@@ -107,7 +107,7 @@ def test_many_steps_at_once_are_the_same_as_one_by_one() -> None:
 
 
 def test_an_inverter_that_is_off_does_not_trip() -> None:
-    """An inverter that delivers nothing, or stands in a de-energised island, is not tripped."""
+    """An inverter without power, or in a de-energised island, is not tripped."""
     relays = Relays(Protection(), 1, H, 60.0)
 
     assert not any(relays.watch(row(60.0), row(0.0), row(0.0), np.array([False])) for _ in range(2000))
@@ -147,7 +147,7 @@ def test_an_inverter_enters_service_after_the_delay_with_normal_voltage_and_freq
     assert recovery.passed(0) == enters
 
 
-def test_a_disturbance_and_a_change_between_dead_and_live_start_the_delay_anew() -> None:
+def test_a_disturbance_and_a_change_of_the_island_start_the_delay_anew() -> None:
     """In a de-energised island, where there is nothing to measure, it counts from the trip."""
     recovery = Recovery(2.0, 1, H, 60.0)
     recovery.trip(0)
@@ -165,7 +165,7 @@ def test_a_disturbance_and_a_change_between_dead_and_live_start_the_delay_anew()
 
 
 @pytest.mark.parametrize(("served", "locks"), [(2.0, True), (60.0, False)])
-def test_who_trips_again_and_again_stays_off(served: float, locks: bool) -> None:
+def test_an_inverter_that_trips_three_times_stays_off(served: float, locks: bool) -> None:
     """The third trip without a minute in service between locks out; an agent that joins anew unlocks."""
     recovery = Recovery(2.0, 1, 0.1, 60.0)
 
@@ -303,8 +303,8 @@ def test_an_island_that_cannot_carry_its_load_is_not_started_for_ever() -> None:
     assert {r.V for r in p.measure().values()} == {0.0}
 
 
-def test_who_left_does_not_come_back_by_itself() -> None:
-    """An inverter whose agent left after a trip waits for nobody; the others start without it."""
+def test_an_inverter_whose_agent_left_does_not_return_by_itself() -> None:
+    """After a trip its agent leaves, and the others start without it."""
     p = blackout(Protection(enter_service=1.0), *opened(2.2, "60-160"))
     run(p, 2.1)
     p.connect("inv2", False)
@@ -317,8 +317,8 @@ def test_who_left_does_not_come_back_by_itself() -> None:
     assert on == {f"inv{k}" for k in (1, 3, 4, 5, 6, 7, 8, 9)}
 
 
-def test_an_island_without_solution_takes_no_other_with_it(network: Network) -> None:
-    """Where a closing lets one of two live islands collapse, only its own inverters trip."""
+def test_an_island_without_solution_does_not_affect_the_others(network: Network) -> None:
+    """If one of two live islands collapses after a closing, only its own inverters trip."""
     actions = ((1.0, "13-152", "open"), (1.5, "60-160", "open"), (1.62, "sw1_2", "open"), (1.88, "60-160", "close"))
     events = tuple(SwitchEvent(t=t, switch=switch, action=action) for t, switch, action in actions)
     p = Plant(network, PlantSettings(events=events), T_C, T_C)
@@ -331,7 +331,7 @@ def test_an_island_without_solution_takes_no_other_with_it(network: Network) -> 
 
 
 def test_generation_beyond_the_load_is_no_collapse_under_load() -> None:
-    """Where nothing takes what is generated, the trip says so, without a voltage that no network has."""
+    """The trip names the surplus of generation, without an unreal voltage."""
     feeder = read_feeder("microgrid123")
     loads = tuple(replace(load, S=(-load.S[0], -load.S[1], -load.S[2])) for load in feeder.loads)
     network = Network(replace(feeder, loads=loads, source=None))

@@ -102,7 +102,7 @@ def test_a_lateral_is_an_island_of_its_own_grid_forming_inverter() -> None:
     assert pytest.approx(40e3, rel=0.01) == now["leg"].P + now["roof"].P
 
 
-def test_an_overloaded_lateral_trips_and_starts_again_by_itself() -> None:
+def test_an_overloaded_lateral_trips_and_restarts_by_itself() -> None:
     """Underfrequency trips both inverters of the phase; after the delay they start it together."""
     p = plant(
         small(*ON_LATERAL, lateral_load=75e3),

@@ -139,8 +139,8 @@ def frequencies(p: Plant) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
 
 
 @pytest.mark.parametrize("P_set", [1e7, -1e300])
-def test_a_gfm_told_nonsense_holds_its_bound_and_the_run_goes_on(P_set: float) -> None:
-    """10 MW ended the plant by no convergence, 1 TW gave 1 MHz: P_set is bounded at 3 pu, and so is the frequency."""
+def test_absurd_set_points_of_a_gfm_are_bounded_and_the_run_continues(P_set: float) -> None:
+    """P_set is bounded at 3 pu, and with it the frequency, whatever the set-point."""
     p = islanded()
     p.take_rows()
 
@@ -153,8 +153,8 @@ def test_a_gfm_told_nonsense_holds_its_bound_and_the_run_goes_on(P_set: float) -
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_set_points_that_are_no_numbers_are_left_out(value: float) -> None:
-    """Neither NaN nor an infinity gets in, alone or beside a good value."""
+def test_set_points_that_are_not_finite_are_ignored(value: float) -> None:
+    """NaN and infinity are ignored, alone or beside a valid value."""
     p = islanded()
     before = p.measure()["inv1"]
 
@@ -166,7 +166,7 @@ def test_set_points_that_are_no_numbers_are_left_out(value: float) -> None:
     assert [event.subject for event in p.take_events()] == ["inv1"]
 
 
-def test_a_spell_of_limited_set_points_is_told_once_with_value_and_bound() -> None:
+def test_a_spell_of_limited_set_points_is_one_event_with_value_and_bound() -> None:
     """A hundred set-points beyond the bound make one event with value and bound; a later spell makes another."""
     p = islanded()
 

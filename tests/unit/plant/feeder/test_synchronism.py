@@ -69,8 +69,8 @@ def test_the_angle_across_a_switch_grows_as_the_frequencies_differ(network: Netw
     assert off == pytest.approx(60.0 - p.measure()["inv1"].f, abs=1e-3)
 
 
-def test_closing_out_of_step_is_told_with_the_angle(network: Network) -> None:
-    """Without the check the switch closes, and a warning tells what the check would have measured."""
+def test_closing_out_of_step_gives_a_warning_with_the_angle(network: Network) -> None:
+    """Without the check the switch closes, and a warning has the differences."""
     p = plant(network, close(2.5, synchronised=False))
     run(p, 2.5)
     angle, f = apart(p)
@@ -81,7 +81,7 @@ def test_closing_out_of_step_is_told_with_the_angle(network: Network) -> None:
 
 
 def test_a_switch_waits_until_its_sides_are_in_step(network: Network) -> None:
-    """With the check it closes as soon as the island, 0.136 Hz slow, has come round; nothing is pulled or trips."""
+    """With the check it closes when the island, 0.136 Hz slow, is in phase again; nothing trips."""
     p = plant(network, close(2.5, synchronised=True), f=0.2, V=0.1)
     told = run(p, 12.0)
 
@@ -98,7 +98,7 @@ def test_a_switch_waits_until_its_sides_are_in_step(network: Network) -> None:
 
 
 def test_a_switch_that_is_never_in_step_gives_up(network: Network) -> None:
-    """Droop leaves the island 0.136 Hz slow: beyond the 0.1 Hz for 3900 kVA; after the timeout it is told."""
+    """Droop leaves the island 0.136 Hz slow: beyond the 0.1 Hz for 3900 kVA; after the timeout there is a warning."""
     p = plant(network, close(2.5, synchronised=True), timeout=2.0)
     told = run(p, 5.0)
 
@@ -116,7 +116,7 @@ def test_opening_a_switch_ends_its_wait(network: Network) -> None:
     assert len(told) == 3
 
 
-def test_one_island_or_a_dead_side_needs_no_synchronism(network: Network) -> None:
+def test_one_island_or_a_de_energised_side_needs_no_synchronism(network: Network) -> None:
     """A loop within one island, and a side without voltage, close at once and without a warning."""
     zone = (SwitchEvent(t=0.5, switch="60-160", action="open"), SwitchEvent(t=0.5, switch="61-61s", action="open"))
     p = plant(network, SwitchEvent(t=0.2, switch="18-135", action="close"), *zone)
@@ -129,8 +129,8 @@ def test_one_island_or_a_dead_side_needs_no_synchronism(network: Network) -> Non
     assert told == ["1.00 switch 60-160 closed"]
 
 
-def test_islands_that_meet_across_a_dead_zone_are_told(network: Network) -> None:
-    """Two switches closed at once around buses without voltage join what is live behind them."""
+def test_islands_that_meet_across_a_de_energised_zone_give_a_warning(network: Network) -> None:
+    """Two switches that close at once around buses without voltage join the live parts behind them."""
     p = plant(network, SwitchEvent(t=0.1, switch="60-160", action="open"))
     run(p, 2.0)
     p.switch("60-160", "close")

@@ -152,8 +152,8 @@ def test_a_model_of_a_user_gives_the_same_bytes(tmp_path: Path) -> None:
     assert received.strip() == str(spec.plant.inverter["inv4"])
 
 
-def test_what_is_wrong_with_a_model_is_said_at_its_key(tmp_path: Path) -> None:
-    """A model that is not there, one of the other kind, a parameter that it has not, a value that makes no sense."""
+def test_a_wrong_model_is_a_problem_at_its_key(tmp_path: Path) -> None:
+    """A missing model, one of the other kind, an unknown parameter, an implausible value."""
     cases = {
         "vsn": 'plant.gfm.model: there is no "vsn"; did you mean "vsm"?',
         "mine:Machine": 'plant.gfm.model: mine:Machine: there is no module "mine"',
@@ -187,7 +187,7 @@ def test_what_is_wrong_with_a_model_is_said_at_its_key(tmp_path: Path) -> None:
     ],
 )
 def test_a_pass_with_a_mistake_is_refused_with_its_line(tmp_path: Path, right: str, wrong: str, words: str) -> None:
-    """`check` takes the pass once as a function of Python, before a compiler says less about it."""
+    """`check` runs the pass once as a function of Python, whose errors say more than the compiler's."""
     path = scenario(tmp_path / "own", "machine:Machine", "machine:Machine")
     (path.parent / "machine.py").write_text(OF_A_USER.replace(right, wrong))
 
@@ -205,8 +205,8 @@ def test_a_start_with_a_mistake_names_the_inverter_and_the_line(tmp_path: Path) 
 
 
 @pytest.mark.parametrize("state", ["q", "z"])
-def test_a_model_that_gives_no_number_breaks_the_run(tmp_path: Path, state: str) -> None:
-    """Its island is not to be blamed: the run says which inverter and model failed, though no current depends on z."""
+def test_a_model_without_a_finite_result_breaks_the_run(tmp_path: Path, state: str) -> None:
+    """The run names inverter and model, not the island, though no current depends on z."""
     path = scenario(tmp_path / "own", "machine:Machine", "machine:Machine")
     wrong = f"if x.q > 0.2:\n            x.{state} = (x.q - 1e3) ** 0.5\n        x.f ="
     (path.parent / "machine.py").write_text(OF_A_USER.replace("x.f =", wrong).replace('("q",)', '("q", "z")'))
@@ -216,7 +216,7 @@ def test_a_model_that_gives_no_number_breaks_the_run(tmp_path: Path, state: str)
 
 
 def test_predict_says_that_it_cannot(tmp_path: Path) -> None:
-    """A model without a linear response is named: a prediction of others would be silently wrong."""
+    """A model without a linear response is named; a prediction with another model would be wrong."""
     with pytest.raises(gp.ScenarioError, match=r'inv\d+: the model "vsm" has no linear response'):
         predict(scenario(tmp_path / "ours", "vsm", "vsm"), "A")
 

@@ -99,7 +99,7 @@ def test_loads_of_an_imported_feeder_have_the_angles_without_load() -> None:
     np.testing.assert_allclose(loads.phi0, np.angle(loads.voltages(network.nominal)), rtol=1e-12)
 
 
-def test_dead_loads_draw_nothing() -> None:
+def test_de_energised_loads_draw_nothing() -> None:
     """Without voltage a load draws no current, instead of an infinite one."""
     loads = one_bus(load("P", "Y", S, S, S), load("I", "D", S, S, S)).loads()
 
@@ -162,15 +162,15 @@ def test_power_flow_satisfies_the_equations(network: Network) -> None:
     assert np.abs(residual).max() < 1e-4
 
 
-def test_dead_buses_have_no_voltage() -> None:
+def test_de_energised_buses_have_no_voltage() -> None:
     """Nodes that the substation does not reach have zero volts."""
     V = solve_power_flow(two_buses(100e3 + 50e3j), frozenset())
 
     np.testing.assert_allclose(np.abs(V), [2448.0] * 6 + [0.0] * 3)
 
 
-def test_unbearable_load_is_told() -> None:
-    """A load beyond what the line can carry ends in an error that names it, not in numbers."""
+def test_a_load_beyond_the_lines_limit_is_an_error() -> None:
+    """The error names the load."""
     network = two_buses(5e6 + 0j)
 
     with pytest.raises(ArithmeticError, match=r"power flow has no solution; the network cannot feed .*at bus 3"):

@@ -24,8 +24,8 @@ def test_switch_is_found_by_every_name(network: Network, text: str) -> None:
     assert network.switch_name(text) == "67s-67"
 
 
-def test_unknown_switch_is_told_with_the_nearest(network: Network) -> None:
-    """An unknown switch is told with the one that was probably meant."""
+def test_an_unknown_switch_gets_the_nearest_name(network: Network) -> None:
+    """The error suggests the nearest switch."""
     with pytest.raises(ValueError, match=r'switch "13-125": no such switch in .*; did you mean "13-152"'):
         network.switch_name("13-125")
     with pytest.raises(
@@ -199,7 +199,7 @@ def test_ideal_switches_are_the_limit_of_small_impedances(standard: Network) -> 
 
 
 def test_parallel_regulator_and_switch_are_an_error() -> None:
-    """Two ties between the same nodes at different ratios are a short circuit, which is told with both nodes."""
+    """Two ties between the same nodes at different ratios are a short circuit, and the error names both nodes."""
     with pytest.raises(ValueError, match=r"a bus and b bus are tied twice, at 1.00000 and at 1.05000"):
         merge_nodes(["a bus", "b bus"], [(0, 1, 1.0), (0, 1, 1.05)], [])
 

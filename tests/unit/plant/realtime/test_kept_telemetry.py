@@ -95,8 +95,8 @@ def test_a_recorder_that_was_cut_off_has_all_rows_and_reports_in_order_and_once(
     assert not link.stream.lost
 
 
-def test_what_the_plant_has_no_more_is_a_gap_that_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its memory is bounded: after a longer absence the recorder goes on with what there is, and knows it."""
+def test_rows_beyond_the_plants_memory_are_a_known_gap(monkeypatch: pytest.MonkeyPatch) -> None:
+    """After a longer absence the recorder continues with the kept rows, and notes the gap."""
     lab = running(end=None)
     monkeypatch.setattr(lab.node.feed, "_limit", 4_000)
     link = Link(lab)
@@ -118,7 +118,7 @@ def test_what_the_plant_has_no_more_is_a_gap_that_is_known(monkeypatch: pytest.M
 
 
 @pytest.mark.parametrize("argument", ["", "x", "-1", "1" * 30, "٣"])
-def test_a_question_that_makes_no_sense_is_answered_and_changes_nothing(argument: str) -> None:
+def test_an_invalid_question_is_answered_and_changes_nothing(argument: str) -> None:
     """Somebody else's problem is theirs."""
     lab = running(end=None)
     lab.step(50)
@@ -193,7 +193,7 @@ def test_the_end_of_a_run_does_not_wait_for_what_is_published_again(end: str) ->
     assert [message.seq for message in told[-150:]] == list(range(told[-1].seq - 149, told[-1].seq + 1))
 
 
-def test_what_comes_again_is_what_was_kept_and_that_is_bounded() -> None:
+def test_repeated_messages_are_the_kept_ones_within_a_bound() -> None:
     """Messages of any size, asked for at any time, come byte by byte and in order; those of one number together."""
     rng, sent = random.Random(1), list[tuple[int, bytes]]()
     got: list[bytes] = []

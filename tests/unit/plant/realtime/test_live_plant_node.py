@@ -15,8 +15,8 @@ from tests.unit.plant.plant_lab import KEYS
 from tests.unit.plant.realtime.realtime_lab import Lab, running
 
 
-def test_who_leaves_takes_its_inverter_off_and_who_returns_puts_it_on() -> None:
-    """The vanished token of who has left is no death; the next life counts from 0 again."""
+def test_a_leaving_agent_disconnects_its_inverter_and_a_returning_one_connects_it() -> None:
+    """The vanished token of an agent that left is no death; its successor counts from 0."""
     lab = running()
     lab.state("inv2", 40, 60e3)
     lab.leave("inv2")
@@ -35,7 +35,7 @@ def test_who_leaves_takes_its_inverter_off_and_who_returns_puts_it_on() -> None:
     assert [text.split(",")[0].split(";")[0] for text in texts[3:]] == ["inv2 left", "inv2 joined"]
 
 
-def test_who_dies_stays_on_primary_droop() -> None:
+def test_the_inverter_of_an_agent_that_died_stays_on_primary_droop() -> None:
     """Its inverter is not switched, and keeps the set-points; the run goes on."""
     lab = running()
     lab.state("inv2", 0, 60e3)
@@ -80,7 +80,7 @@ def test_a_second_agent_of_a_name_and_one_of_no_inverter_are_refused() -> None:
     assert lab.node.rejects.counts["ghost"] == 1
 
 
-def test_who_leaves_by_the_scenario_is_asked_to_and_who_joins_is_awaited() -> None:
+def test_the_scenario_asks_agents_to_leave_and_awaits_those_that_join() -> None:
     """At its tick the leaver alone is told to stop, and is off once it says so; telemetry tells once who is to come."""
     schedule = (
         ScheduledAction(t=0.1, inverter="inv2", action="leave"),
@@ -117,7 +117,7 @@ def test_a_nameplate_that_does_not_come_is_asked_for_again() -> None:
     assert [m.to for m in lab.take(Measurement)][-1] == "inv2"
 
 
-def test_an_agent_that_comes_while_the_run_ends_is_told_so() -> None:
+def test_an_agent_that_comes_while_the_run_ends_receives_the_end() -> None:
     """An agent whose session was renewed just then has not heard the end; else it would seek a plant for minutes."""
     lab = Lab()
     lab.join("inv1", "inv2", "inv3")
@@ -134,7 +134,7 @@ def test_an_agent_that_comes_while_the_run_ends_is_told_so() -> None:
     assert not stop.refused
 
 
-def test_of_thousands_that_are_refused_some_are_told() -> None:
+def test_of_thousands_of_refused_agents_some_get_an_answer() -> None:
     """Anybody may hold tokens: the first are told, then ten a second; the log has one line for each kind."""
     lab = running(3)
     lab.take(Stop)

@@ -26,8 +26,8 @@ def test_it_begins_when_all_are_there() -> None:
     assert lab.node.deadline == pytest.approx(lab.now + T_C)
 
 
-def test_it_waits_only_as_long_as_told() -> None:
-    """Then it begins without who is missing, says so, and takes them in when they come; till then it says it waits."""
+def test_it_waits_only_for_the_configured_time() -> None:
+    """Then it begins without the missing agents, reports them, and admits them later."""
     lab = Lab(wait_for_agents=4.0)
     lab.join("inv1", "inv3")
     words = []
@@ -47,7 +47,7 @@ def test_it_waits_only_as_long_as_told() -> None:
 
 
 def test_the_last_state_heard_is_held_from_the_next_step_on() -> None:
-    """Of several only the newest counts; who says nothing keeps its set-points."""
+    """Only the newest state counts; an agent without a state keeps its set-points."""
     lab = running()
     lab.step()
     lab.state("inv1", 0, 60e3)
@@ -61,8 +61,8 @@ def test_the_last_state_heard_is_held_from_the_next_step_on() -> None:
     assert lab.node.rejects.counts["stale"] == 1
 
 
-def test_the_run_lasts_end_over_speed_and_all_are_told() -> None:
-    """All rows are there; Stop goes to everybody; it is over once they have gone."""
+def test_the_run_lasts_end_over_speed_and_stops_all_agents() -> None:
+    """All rows exist; Stop goes to every agent; the run ends when they have left."""
     lab = running(speed=4.0)
     began = lab.now + LEAD
     lab.step(101)
@@ -102,7 +102,7 @@ def test_it_says_once_that_it_cannot_keep_pace() -> None:
 
 
 def test_strict_breaks_the_run_that_cannot_keep_pace() -> None:
-    """The outcome says why; agents are told."""
+    """The outcome has the reason, and the agents stop."""
     lab = running(strict=True)
     lab.step(2, delay=0.03)
 
@@ -110,8 +110,8 @@ def test_strict_breaks_the_run_that_cannot_keep_pace() -> None:
     assert len(lab.take(Stop)) == 1
 
 
-def test_far_behind_it_puts_its_schedule_off_and_says_how_much() -> None:
-    """Up to ten periods the schedule stands; a frozen plant does not rush through what it has missed."""
+def test_far_behind_it_delays_its_schedule_and_reports_the_delay() -> None:
+    """Up to ten periods the schedule stays; a frozen plant does not rush through the missed steps."""
     lab = running()
     lab.step(3)
     due = lab.node.deadline
@@ -140,7 +140,7 @@ def test_the_end_has_the_number_of_the_warnings_that_came_too_often() -> None:
 
 
 def test_a_plant_without_solution_breaks_the_run() -> None:
-    """The cause is kept for the log, the outcome says it, agents are told."""
+    """Log and outcome have the cause, and the agents stop."""
     config, _ = toy_configs(3, end=2.0, P_set0=1.5)
     lab = running(settings=config.settings)
     lab.step(6)
@@ -200,14 +200,14 @@ def test_commands_are_done_and_answered() -> None:
     ("load", "load1", "load load1: nothing to set; give a factor, or real or reactive power"),
     ("stop", "inv7", 'no agent "inv7" is running; running are: inv1, inv2, inv3'),
 ])  # fmt: skip
-def test_what_cannot_be_done_is_answered_with_what_there_is(verb: str, argument: str, text: str) -> None:
-    """The answer is not ok, and names the choices."""
+def test_an_impossible_command_is_answered_with_the_choices(verb: str, argument: str, text: str) -> None:
+    """The answer is not ok."""
     answer = running().ask(verb, argument)
 
     assert (answer.ok, answer.text) == (False, text)
 
 
-def test_who_watches_hears_of_an_event_at_once() -> None:
+def test_a_watcher_receives_an_event_at_once() -> None:
     """An event comes with the step in which it happens, not with the next telemetry; a flood of them waits for that."""
     lab = running()
     lab.step(2)
@@ -226,7 +226,7 @@ def test_who_watches_hears_of_an_event_at_once() -> None:
     assert lab.ask("status").data["switches"] == {"sw1": True}
 
 
-def test_who_asks_without_end_is_answered_a_bounded_number_of_times() -> None:
+def test_a_flood_of_questions_gets_a_bounded_number_of_answers() -> None:
     """Of ten thousand questions between two steps the first are answered, the others counted; another verb is free."""
     lab = running(3)
     question = Command(sender="visitor", epoch=0, seq=0, t=0.0, verb="status", reply_to="z1")

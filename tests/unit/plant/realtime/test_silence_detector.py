@@ -36,8 +36,8 @@ def told(lab: Lab) -> list[tuple[float, str]]:
     return [(event.t, event.text) for event in lab.events("roster") if " joined" not in event.text]
 
 
-def test_an_agent_whose_law_has_failed_is_silent_for_that_reason() -> None:
-    """It says so in its last state; nobody looks for a broken path then."""
+def test_an_agent_whose_law_failed_is_silent_with_that_reason() -> None:
+    """Its last state has the reason, so no path is suspected."""
     lab = running(end=None)
     all_tick(lab, 100)
     lab.state("inv2", lab.node.stepper.tick, 50e3, fault="law mine:Mine: step raised")
@@ -48,8 +48,8 @@ def test_an_agent_whose_law_has_failed_is_silent_for_that_reason() -> None:
     ]
 
 
-def test_an_agent_on_the_roster_that_is_not_heard_is_told_once_and_once_when_it_speaks_again() -> None:
-    """As soon as its state is older than the neighbours use, long before its token goes; not for a lost message."""
+def test_a_silent_agent_is_reported_once_and_once_when_it_is_heard_again() -> None:
+    """It is silent once neighbours reject its state as too old, long before its token vanishes."""
     lab = running(end=None)
     all_tick(lab, 100)
     all_tick(lab, 10, ("inv1", "inv3"))
@@ -67,7 +67,7 @@ def test_an_agent_on_the_roster_that_is_not_heard_is_told_once_and_once_when_it_
 
 
 @pytest.mark.parametrize("stalls", [(3.0,), (0.18, 0.18, 0.18)])
-def test_a_plant_that_stood_still_blames_nobody(stalls: tuple[float, ...]) -> None:
+def test_a_plant_that_stood_still_reports_no_agent_as_silent(stalls: tuple[float, ...]) -> None:
     """Ticks that the plant itself missed or hurried count against no agent; a death or a leave is reported once."""
     lab = running(end=None)
     all_tick(lab, 50)
@@ -82,7 +82,7 @@ def test_a_plant_that_stood_still_blames_nobody(stalls: tuple[float, ...]) -> No
     assert [text.split(",")[0].split(";")[0] for _, text in told(lab)] == ["inv2 left", "inv3 died"]
 
 
-def test_two_agents_that_cannot_hear_each_other_are_told_though_the_plant_hears_both() -> None:
+def test_two_agents_that_do_not_hear_each_other_are_reported_though_the_plant_hears_both() -> None:
     """A cut between hosts: the neighbour's ages say so. It holds on when the token of the one is gone at the other."""
     lab = running(end=None)
     all_tick(lab, 100)
@@ -102,8 +102,8 @@ def test_two_agents_that_cannot_hear_each_other_are_told_though_the_plant_hears_
     assert cut <= t1 == t2 <= cut + 0.2
 
 
-def test_neighbours_of_a_frozen_agent_are_not_told_of_too() -> None:
-    """That it is silent says all; who joined a moment ago, or has just woken, may not have heard anybody yet."""
+def test_neighbours_of_a_frozen_agent_are_not_reported() -> None:
+    """The silent agent is enough; an agent that has just joined or woken may not have heard others yet."""
     lab = running(end=None)
     lab.hear(KEYS.status("inv1"), status("inv1", {"inv2": -1.0}))
     all_tick(lab, 1)
@@ -121,7 +121,7 @@ def test_neighbours_of_a_frozen_agent_are_not_told_of_too() -> None:
 
 
 @pytest.mark.parametrize(("at", "why"), [(2, "nothing comes from it"), (90, "it says that it has no measurement")])
-def test_an_agent_that_has_no_measurement_is_told_from_one_that_is_frozen(at: int, why: str) -> None:
+def test_an_agent_without_measurement_differs_from_a_frozen_one(at: int, why: str) -> None:
     """Its status says so; but that of a start, when all wait for the first measurement, proves nothing."""
     silence = SilenceDetector(max_age=0.25, T_c=0.02, period=0.02)
     silence.joined("inv1")
@@ -139,7 +139,7 @@ def test_an_agent_that_has_no_measurement_is_told_from_one_that_is_frozen(at: in
 
 
 @pytest.mark.parametrize("period", [0.02, 0.001])
-def test_who_was_never_heard_is_told_of_once_both_had_time_to_meet(period: float) -> None:
+def test_an_agent_never_heard_is_reported_after_both_had_time_to_meet(period: float) -> None:
     """-1 means never: a second of real time after a join, at every speed, that is news."""
     silence = SilenceDetector(max_age=0.25, T_c=0.02, period=period)
     for name in NAMES:

@@ -47,7 +47,7 @@ def zone_powers(feeder: Tables) -> dict[str, complex]:
 
 
 def test_tables_are_read_again_when_a_file_has_other_bytes(folder: Path) -> None:
-    """A feeder that did not change is the one read before; an edit is seen, and its problems are told each time."""
+    """A feeder that did not change is the one read before; an edit is seen, and its problems are reported each time."""
     first = read_feeder(str(folder))
 
     assert read_feeder(str(folder)) is first
@@ -135,8 +135,8 @@ MISTAKES: list[tuple[str, int, dict[str, str], str]] = [
 
 
 @pytest.mark.parametrize(("file", "row", "cells", "told"), MISTAKES, ids=[f"{m[0]}-{m[3][:40]}" for m in MISTAKES])
-def test_problem_is_told(folder: Path, file: str, row: int, cells: dict[str, str], told: str) -> None:
-    """Every kind of problem is told once, with file, row, value and what would be right, and drags no others behind."""
+def test_each_problem_is_reported_once(folder: Path, file: str, row: int, cells: dict[str, str], told: str) -> None:
+    """It has file, row, value and the remedy, and causes no further problems."""
     edit(folder, file, row, **cells)
 
     found = problems(folder)
@@ -209,7 +209,7 @@ CHANGED: list[tuple[str, Callable[[str], str | bytes], str]] = [
 
 
 @pytest.mark.parametrize(("file", "change", "told"), CHANGED)
-def test_a_file_with_a_problem_is_told_once(
+def test_a_file_with_a_problem_is_reported_once(
     folder: Path, file: str, change: Callable[[str], str | bytes], told: str
 ) -> None:
     """Whatever refers to it makes no problems of its own."""
@@ -222,7 +222,7 @@ def test_a_file_with_a_problem_is_told_once(
     assert found.startswith(told), found
 
 
-def test_missing_files_are_told_alone(folder: Path) -> None:
+def test_a_missing_file_is_one_problem(folder: Path) -> None:
     """A missing table is one problem, not one for every reference into it; some a feeder need not have."""
     for name in ("source.csv", "capacitors.csv"):
         (folder / name).unlink()
@@ -265,7 +265,7 @@ def test_tables_as_a_spreadsheet_saves_them_are_the_same_feeder(
     assert (after.inverters, after.transformers) == (before.inverters, before.transformers)
 
 
-def test_unknown_names_are_told_with_the_choice(folder: Path) -> None:
+def test_unknown_names_get_the_choices(folder: Path) -> None:
     """A feeder, a set of loads, and the file that a feeder without any set needs."""
     with pytest.raises(FeederError, match='no such feeder and no such folder; did you mean "microgrid123"'):
         read_feeder("microgrid321")

@@ -87,15 +87,15 @@ def test_an_inverter_added_to_a_feeder_of_ours_is_saved(tmp_path: Path) -> None:
     ],
 )
 def test_an_inverter_that_the_tables_would_refuse_is_not_added(wrong: dict[str, Any], said: str) -> None:
-    """The mistake is told where it is made, not by a row of a file that is written later."""
+    """The error comes at the call, not from a row of a file that is written later."""
     with pytest.raises(ValueError, match=said):
         Feeder.read("microgrid123").add_inverter(
             **{"name": "inv11", "bus": "87", "kind": "GFL", "P_rated": 2e5} | wrong
         )
 
 
-def test_a_saved_feeder_keeps_no_table_of_the_one_before(tmp_path: Path) -> None:
-    """Capacitors of what a folder had are not those of the feeder that is saved into it."""
+def test_saving_a_feeder_removes_former_tables_of_its_folder(tmp_path: Path) -> None:
+    """Capacitors of the former feeder in the folder are gone."""
     feeder = Feeder.read("microgrid123")
     folder = feeder.save(tmp_path / "mine")
     (folder / "README.md").write_text("mine")
@@ -138,7 +138,9 @@ NODE = 'nodes: "{}" is no node; write a bus and one of its phases, as "650.A"'
     ("load_parts_main.csv", {"Q_kvar": "-1e9"}, "Q_kvar: -1e+09 kvar is not plausible for a load on a phase "),
     ("inverters.csv", {"P_rated_kW": "200000"}, "P_rated_kW: 200000 kW is not plausible for an inverter"),
 ])  # fmt: skip
-def test_a_wrong_cell_of_an_imported_feeder_is_told(folder: Path, file: str, cells: dict[str, str], told: str) -> None:
+def test_a_wrong_cell_of_an_imported_feeder_is_a_problem(
+    folder: Path, file: str, cells: dict[str, str], told: str
+) -> None:
     """No element is left out; a part of a load is between two nodes or one and ground, within limits."""
     (problem,) = problems(folder, file, **cells)
 
