@@ -129,17 +129,17 @@ class FollowerLag(NamedTuple):
 
 
 class InverterModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A model of an inverter; an object has the parameters of a unit, per unit of its own rating.
+    """Base of all inverter models; an object has the parameters of a unit, per unit of its own rating.
 
-    A model derives from this class, says its `kind` and its `STATES`, and has two static methods, `advance` and `rest`.
-    Its parameters are fields with unit, range, sentence and default, as below; they are keys of `[plant.gfm]` or
-    `[plant.gfl]`. Everything else here has a default that serves a voltage behind a filter.
+    A model sets `kind` and `STATES`, and defines the static methods `advance` and `rest`. Its parameters are fields
+    with unit, range, sentence and default; they are keys of `[plant.gfm]` or `[plant.gfl]`. All other members have
+    defaults for a voltage behind a filter.
     """
 
     model: str = ""
-    """Which model: a name, or `module:Class` of your own."""
+    """Name of the model, or `module:Class` of your own."""
     folder: Annotated[str | None, Example('"models"')] = None
-    """Where the module of a model of your own is looked for; without it beside the scenario."""
+    """Folder of the module of your own model; by default that of the scenario."""
     R_f: Annotated[Resistance, "Filter resistance (pu)."] = 0.015
     X_f: Annotated[Reactance, "Filter reactance (pu)."] = 0.15
     P_set_lim: BoundOfPset = 3.0
@@ -166,13 +166,13 @@ class InverterModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     LIMITS_OF_P: ClassVar[tuple[str, ...]] = ("P_set_lim",)
     """Parameters between which the first P_set must be; a name that ends in "_min" is the lower bound."""
     BOUNDS_AT_REST: ClassVar[tuple[tuple[str, str, str, str], ...]] = ()
-    """What is checked at the start: "P", "Q" or "E" (pu), its unit, and the parameters of its lowest and highest."""
+    """Checks at the start: "P", "Q" or "E" (pu), its unit, and the parameters of its lowest and highest."""
 
     measures_positive_sequence: ClassVar[bool] = False
 
     @staticmethod
     def advance(g: Any, t: Any, x0: Any, x: Any, d: Any, h: float, second: bool) -> None:
-        """Take one pass; compiled.
+        """Make one pass; compiled.
 
         `g`: parameters, `UnitRating.constants`, y_f (S, filter in the network), and what `constants` adds; `t`: in:
         P_set, V_set, Q_set (pu), P, Q, V (pu: power, and mean voltage of the phases), V_A, V_B, V_C (V), I_A, I_B, I_C
@@ -184,7 +184,7 @@ class InverterModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
 
     @staticmethod
     def rest(g: Any, x: Any, V: Any, I: Any, J: Any, S: complex, v: float) -> None:  # noqa: E741
-        """Set the states to rest, `x["q"] = S.imag`: not compiled; w is 0 and f nominal already.
+        """Set the states at rest, as `x["q"] = S.imag`; not compiled. w is already 0, and f nominal.
 
         V (V), I, J (A): of three phases; S, v: power and voltage that it measures (pu).
         """
@@ -192,14 +192,14 @@ class InverterModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
 
     @staticmethod
     def locked(x: Any, w: float, f: float) -> None:
-        """Set the states of a unit at rest that enters an island of another speed: w (rad/s), f (Hz)."""
+        """Set the states of a unit at rest that enters an island with another speed w (rad/s) and frequency f (Hz)."""
 
     def constants(self, rating: UnitRating) -> dict[str, float | complex | bool]:
         """Return further values for `g`; the types are the same for every unit."""
         return {}
 
     def values(self, rating: UnitRating, y_f: complex) -> dict[str, Any]:
-        """Return all of `g`; `y_f`: admittance of the filter in the network (S)."""
+        """Return all values of `g`; `y_f` is the admittance of the filter in the network (S)."""
         fields = {name: getattr(self, name) for name in self.__struct_fields__}
         given = {name: value for name, value in fields.items() if not isinstance(value, str | None)}
         numbers = {name: value if isinstance(value, bool) else float(value) for name, value in given.items()}
@@ -236,7 +236,7 @@ class InverterModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
         return False
 
     def objection(self, method: Method) -> str:
-        """Return why these parameters cannot be stepped by a method, "" if they can."""
+        """Return why a method of time stepping cannot step these parameters; empty if it can."""
         return ""
 
     def time_constants(self) -> dict[str, float]:
@@ -244,9 +244,9 @@ class InverterModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
         return {name: getattr(self, name) for name in self.__struct_fields__ if name.startswith("T_")}
 
     def beyond_gridlabd(self) -> dict[str, str]:
-        """Return, by their keys in a file, the values that GridLAB-D has not."""
+        """Return the values that GridLAB-D does not have, by their keys in a file; by default the whole model."""
         return {"model": f'"{self.model}"'}
 
     def response(self) -> DroopLag | FollowerLag | None:
-        """Return the linear response by which `predict` knows the model; None: it says that it cannot predict."""
+        """Return the linear response for `predict`, or None if the model has none."""
         return None

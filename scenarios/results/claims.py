@@ -132,6 +132,8 @@ class Claim:
 
 @dataclass(frozen=True, kw_only=True)
 class Verdict:
+    """The verdict on one claim."""
+
     claim: Claim
     status: Status
     found: str
