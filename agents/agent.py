@@ -88,7 +88,7 @@ def own_of(config: AgentConfig, m: Measurement, P_set: float, V_set: float, satu
 
 
 SIGN_OF_LIFE = 0.5
-"""Longest silence of an agent whose law sends nothing, as part of the age at which neighbours drop a state."""
+"""Longest silence of an agent whose law sends nothing, as a part of the age at which neighbours drop a state."""
 
 
 class Agent:
@@ -120,7 +120,7 @@ class Agent:
         self.heard: dict[str, State] = {} if board is None else board
         self.around: Sequence[Neighbour] = ()
         self.in_service = True
-        """Whether the own inverter was on the network at the last tick; if not, there were no sums."""
+        """Whether the own inverter was on the network at the last tick; if not, the tick had no sums."""
         self.saturated = (0, 0)
         self._takes_part = config.control.acts(config.name, config.kind)
         options = config.control.degraded_communication
@@ -131,7 +131,7 @@ class Agent:
             options.max_age or (config.max_age if config.clock == "realtime" else inf)
         )
         self.watches_saturation = options.anti_windup == "conditional"
-        """True if the law is told at which limits the own inverter is saturated."""
+        """True if the law receives the limits at which the own inverter is saturated."""
         self._islands_from_switches = options.islands == "switches"
         self._detector = IslandDetector(config.f_nom, options.slip_max) if options.islands == "frequency" else None
         self._saturation_P, self._saturation_V = SaturationDetector(options.T_sat), SaturationDetector(options.T_sat)

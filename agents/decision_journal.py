@@ -22,7 +22,8 @@ class DecisionJournal:
         self._states: list[int | None] = []
         self._others: tuple[object, ...] = ()
         self._plain: Sequence[str] | None = None
-        """Its in-neighbours if it says nothing but that: all of the tick before, none weighed; else None."""
+        """In-neighbours of the last noted decision, if it used the states of the tick before, all with weight 1; else
+        None."""
         self._weighs = not agent.weighs_alike
 
     def tick(self, tick: int, measurement: int, neighbours: Sequence[str]) -> bool:

@@ -28,13 +28,14 @@ from gridpeers.agents.laws.consensus import Consensus
 from gridpeers.wire.messages import Angle
 
 REMEMBERED = 51
-"""Number of arrivals in the median of a link's ages: a second at 20 ms."""
+"""Number of arrivals over which the usual age on a link is a median: one second at 20 ms."""
 
 OFF = 0.05
-"""Distance (pu of own rating) beyond which an inverter is off its droop characteristic; so much may still wind up."""
+"""Distance (pu of own rating) beyond which an inverter is off its droop characteristic, and up to which it may wind up.
+"""
 
 P_BOUND, V_BOUND = 100.0, 10.0
-"""Limits (pu) of P_set, either way, and of V_set, from 0, that exclude only implausible values."""
+"""Limits (pu) of P_set, in both directions, and of V_set, from 0, that exclude only implausible values."""
 
 
 class StalenessWeights:
@@ -133,10 +134,10 @@ T_LEAK = 10.0
 step."""
 
 T_GAP = 0.2
-"""Longest time (s) between two own measurements over which the frequency counts as known."""
+"""Longest time (s) between two own measurements over which the frequency is integrated."""
 
 RETRY, LONGEST_RETRY = 10.0, 600.0
-"""Time (s) until the first retry of a neighbour out of step, and the longest; it doubles each time."""
+"""First and longest time (s) until a retry of a neighbour out of step; it doubles each time."""
 
 TRUSTED = 10.0
 """Time (s) in step after a retry, after which the next loss of step counts as the first."""
@@ -213,7 +214,7 @@ class IslandDetector:
             pair.compare((self._since, angle.since), t, own + e * (t - at) - angle.cycles)
 
     def apart(self, name: str, t: float) -> bool:
-        """Return whether the agent takes a neighbour to be in another island at t (s of run time)."""
+        """Return whether the agent considers a neighbour to be in another island at t (s of run time)."""
         pair = self._pairs.get(name)
         if pair is None:
             return False

@@ -47,7 +47,7 @@ Graph = Callable[[Members], Mapping[str, Iterable[str]]]
 
 
 class GraphError(ValueError):
-    """A rule that failed, or returned no graph."""
+    """A rule raised an error, or returned no graph."""
 
 
 @lru_cache(maxsize=8192)
@@ -187,7 +187,7 @@ def rule_of(control: Control) -> Graph:
 
 
 def is_pairwise(control: Control) -> bool:
-    """Return whether two agents can tell if they are linked before they know the others."""
+    """Return whether two agents know that they are linked before they know the others."""
     return control.own_graph is None and control.graph != "ring"
 
 
@@ -204,6 +204,6 @@ def in_neighbours(
 
 
 def without_missing(control: Control, name: str, heard: tuple[str, ...]) -> tuple[str, ...]:
-    """Return an agent's in-neighbours by the rule without those whose links to it the case takes out."""
+    """Return the in-neighbours of an agent by the rule, without the links that the case removes."""
     missing = {pair[0] if pair[1] == name else pair[1] for pair in control.without if name in pair}
     return tuple(other for other in heard if other not in missing) if missing else heard

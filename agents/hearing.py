@@ -20,10 +20,10 @@ class Hearing:
     def __init__(self, agent: Agent, links: Links | None) -> None:
         self.agent, self.links = agent, links
         self.states: dict[str, tuple[State, float]] = {}
-        """Last state of each neighbour, and when it came."""
+        """Last state of each neighbour, and the time of its arrival."""
         self.measurement: Measurement | None = None
         self.measured_at = 0.0
-        """When the measurement came."""
+        """Time at which the measurement arrived."""
 
     def keep(self, message: AnyMessage, at: float) -> None:
         """Use a message that came at this time."""

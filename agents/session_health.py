@@ -19,7 +19,7 @@ from gridpeers.wire.messages import PLANT
 from gridpeers.wire.timing import SessionDeadline
 
 SILENT = 1.0
-"""Time (s) without a message after which the plant, or a neighbour that it hears, is silent."""
+"""Time (s) without a message after which the plant, or a neighbour that the plant hears, counts as silent."""
 
 STAGGER = 0.5
 """Time (s) between the agents that may open the new session, so that the first spares the others: one is heard after
@@ -27,14 +27,14 @@ STAGGER = 0.5
 
 
 class SessionHealth:
-    """Judge whether the agent's session brings the messages that it should, one session after the other."""
+    """Judge whether the session brings the messages that it should; it outlives sessions."""
 
     def __init__(self, name: str) -> None:
         self._name = name
         self._ran = False
         """Whether the agent has ever been in touch with a plant; before that, silence proves nothing."""
         self._plant_seen = -inf
-        """Time (s) at which the plant was last known to be there, though it measures nothing yet."""
+        """Time (s) of the last sign of a plant that does not measure yet."""
         self._patience = SessionDeadline()
         self._came: dict[str, float] = {}
 
@@ -79,7 +79,7 @@ class SessionHealth:
         return f"the plant hears {lost}, but nothing comes from it here"
 
     def _silent(self, roster: Sequence[str] | None, others: Sequence[str], now: float) -> tuple[str, ...]:
-        """Return the silent names: the plant, agents that it hears, or the agent itself, if it is unheard there."""
+        """Return the silent names: the plant, agents that it hears, or this agent if it is not heard there."""
         if self._ran and now - max(self._came.get(PLANT, -inf), self._plant_seen) > SILENT:
             return (PLANT,)
         if roster is None:

@@ -29,7 +29,7 @@ from gridpeers.wire.tick_policy import WAIT, TickVerdict
 from gridpeers.wire.timing import Awaited, TickBarrier, time_of
 
 CLOSING = 2.0
-"""Longest wait (s) for the neighbours' last states, and for the acknowledgement of the report on emulated links."""
+"""Longest wait (s) for the last states of neighbours, and for the acknowledgement of the report on links."""
 
 DEADLINES = 2.0
 """An agent waits this many deadlines, so that the plant reports the error first."""
@@ -104,13 +104,13 @@ class AgentBarrier:
         self._waits.renew(now)
 
     def new_plant(self) -> None:
-        """Do nothing: a run ends with its plant."""
+        """Do nothing: in simulated time a run ends with its plant."""
 
     def new_session(self) -> None:
-        """Do nothing: a run ends with a session."""
+        """Do nothing: in simulated time a run ends with a session."""
 
     def gone(self, name: str) -> TickVerdict:
-        """Note that a process is gone: nothing of it is waited for."""
+        """Note that a process is gone; the agent no longer waits for it."""
         if name == PLANT:
             tick = "" if self._tick is None else f" at tick {self._tick}"
             return TickVerdict("break", f"{self._post.name}: the plant is gone{tick}; the run has ended")
@@ -125,7 +125,7 @@ class AgentBarrier:
         """Do nothing: the plant says who is on the roster."""
 
     def leave(self, now: float) -> bool:
-        """Return whether there is something to wait for: an account of links needs the neighbours' last states."""
+        """Return whether the agent must wait: an account of links needs the last states of the neighbours."""
         if self._heard.links is None:
             return False
         self._leaving = self.awaits_states = True
@@ -195,7 +195,7 @@ class AgentBarrier:
     def decide(
         self, agent: Agent, measurement: Measurement | None, decisions: DecisionJournal | None, now: float
     ) -> State:
-        """Compute the tick that is due with the last measurement, without one idly; wait for the next tick."""
+        """Compute the due tick with the last measurement, or idly without one; then wait for the next."""
         grant, links = self._grant, self._heard.links
         assert grant is not None
         if measurement is None or (links is not None and grant.t in links.pauses):
@@ -228,7 +228,7 @@ class AgentBarrier:
         return state
 
     def ticked(self, now: float) -> bool:
-        """Report on links when that is due, and take the states of this tick that came before it was done."""
+        """Report on links if that is due, and take the early states of this tick."""
         heard, links = self._heard, self._heard.links
         if self._accounts_due:
             self._reports.links()

@@ -41,11 +41,11 @@ from gridpeers.wire.timing import Awaited, Timer
 EARLIEST, LATEST = 0.25, 0.75
 
 CONVINCED = 5
-"""Measurements in a row that come at a bad time before the ticks are moved: one may just have been late."""
+"""Number of badly timed measurements in a row before the ticks are moved: a single one may be late."""
 
 
 class TickTimer(Timer):
-    """Due times of an agent's ticks; unless it `keeps_clear` of the measurements, they drift as the own clock does."""
+    """Due times of an agent's ticks. With `keeps_clear` they avoid the measurements; else they drift with the clock."""
 
     def __init__(self, period: float, *, keeps_clear: bool = True) -> None:
         self._keeps_clear = keeps_clear
@@ -75,11 +75,11 @@ class TickTimer(Timer):
 
 
 LINKS_PERIOD = 0.5
-"""Time (s, real time) between two reports on links beside a journal: a killed process costs a record no more."""
+"""Time (s, real time) between two reports on links beside a journal, so that a killed process loses little."""
 
 LEAVING = 1.0
-"""Longest wait (s, real time) for the plant's word that the inverter is off: a session that closes at once can lose
-the last messages."""
+"""Longest wait (s, real time) for the plant's confirmation that the inverter is off: a session that closes at once can
+lose its last messages."""
 
 
 class AgentTimer:
@@ -149,7 +149,7 @@ class AgentTimer:
         self.upkeep.new_plant()
 
     def new_session(self) -> None:
-        """Forget all that came by the old session."""
+        """Forget all messages of the old session."""
         self.meeting.clear()
         self._heard.clear()
         self.upkeep.new_session()
@@ -163,7 +163,7 @@ class AgentTimer:
         return WAIT
 
     def hold(self, why: str) -> None:
-        """Drop what was heard; the next measurement shows the set-points to start from."""
+        """Forget all states; the next measurement has the set-points to start from."""
         if self._phases.now == "running":
             self._phases.on("held")
             self._post.say(why)
@@ -177,7 +177,7 @@ class AgentTimer:
         self._ran = True
 
     def leave(self, now: float) -> bool:
-        """Say so; return whether there is a plant, which takes the inverter off the network."""
+        """Send a Leave; return whether there is a plant, which takes the inverter off the network."""
         post, self._leaving = self._post, True
         self._reports.last(self.t)
         post.send(post.keys.leave(post.name), Leave(sender=post.name, epoch=post.epoch, seq=self.upkeep.sent, t=self.t))
@@ -208,7 +208,7 @@ class AgentTimer:
         return self._heard.links is None or health.has_come(PLANT)
 
     def missing(self) -> tuple[Awaited, ...]:
-        """Nothing: a tick does without what has not come."""
+        """Return nothing: a tick does not wait for messages."""
         return ()
 
     def passed(self, now: float, unmet: tuple[Awaited, ...] = ()) -> TickVerdict:

@@ -33,7 +33,7 @@ class LinkCommandReceiver:
             self._links.restart()
 
     def take(self, request: LinkRequest, t: float) -> LinkAcknowledgement | None:
-        """Carry a command out, or tell the links' status at t (s of run time); None if an earlier one is missing."""
+        """Carry a command out, or return the links' status at t (s of run time); None if an earlier one is missing."""
         if self._links is None:
             return self._answer(request, ok=False, text="there are no emulated links to this agent")
         if request.seq == 0:
@@ -75,7 +75,7 @@ class Upkeep:
         self.ticks = self.missed = self.sent = 0
         """Ticks done and left out; states sent, which is the number of the next."""
         self.lost = 0
-        """Messages that did not come off the wire, as the numbers of those that did show."""
+        """Lost messages, by the gaps in the numbers of those that arrived."""
         self.lateness = 0.0
         """Longest delay of a tick behind its time since the last status (s of real time)."""
         self.start(0.0)
@@ -131,7 +131,7 @@ class Upkeep:
         return bool(problem)
 
     def _session_problem(self, now: float) -> str:
-        """Return why a new session is needed, "" if it is not: this one did not bring, or take, what it should."""
+        """Return why a new session is needed, or "": this session did not deliver its messages."""
         measured = self._heard.measurement if self._phases.now == "running" else None
         roster = None if measured is None else measured.roster
         if roster is not None and self._heard.agent.fault:

@@ -108,7 +108,7 @@ class Admission:
 
 
 MOST_PROCESSES = 8
-"""Processes that may claim one name: two, while one replaces another, and some that are mistaken."""
+"""Most processes that may claim one name: two while one replaces the other, and some by mistake."""
 
 ASKED_AT_ONCE = 20
 """Most processes that are asked for their nameplates again in one go: a question costs as much as ten messages."""
@@ -156,7 +156,7 @@ class Membership:
         return counted
 
     def dismiss(self, name: str) -> None:
-        """Let the process of a name count no more; its epoch stays valid until its token is gone or replaced."""
+        """Stop counting the process of a name; its epoch stays valid until its token is gone or replaced."""
         self._dismissed[name] = self._instances[name].pop(0)
         self.nameplates.pop(name, None)
         self.changes += 1

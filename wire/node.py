@@ -83,7 +83,7 @@ class Core(Protocol):
     def lost(self, loss: Loss, now: float) -> None: ...
 
     def work(self, now: float) -> bool:
-        """Do at most one piece of work, if one is ready; return whether it did."""
+        """Do at most one piece of work that is ready; return whether there was one."""
 
     def expire(self, now: float) -> None:
         """Act, as the deadline has passed."""

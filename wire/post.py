@@ -52,7 +52,7 @@ class Post:
         self.plant: FollowedPlant | None = None
         """The plant that the node follows; None for the plant's own node."""
         self.on_nameplate: Callable[[str, Nameplate, bool, float], None] = _ignore
-        """Takes an instance, its answer, whether that is the first of a process that counts, and the time."""
+        """Called with an instance, its answer, whether that is the first of a counting process, and the time."""
         self.vouches: Callable[[str], bool] | None = None
         """Says whether a link of this process has the certificate of a sender; None if links have no certificates."""
         self.journal: JournalBuffer | None = None
@@ -160,7 +160,7 @@ class Post:
             self.publish(key, encode(message))
 
     def say(self, text: str) -> None:
-        """Have a line logged."""
+        """Log a line."""
         if self.traffic is not None:
             self.traffic.process("line", text)
         self.actions.append(Log(f"{self.name}: {text}"))

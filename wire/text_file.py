@@ -17,14 +17,14 @@ _MARKS = (
 """Marks with which a text begins, and their encodings."""
 
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
-"""Separators of cells, and their names."""
+"""Separators of cells, with their names."""
 
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
 
 
 class TextFileError(ValueError):
-    """The file cannot be read as text or as a table; its message goes behind the file's name."""
+    """The file cannot be read as text or as a table; the message follows the name of the file."""
 
 
 def text_of(data: bytes) -> str:

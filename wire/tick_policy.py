@@ -9,10 +9,10 @@ from gridpeers.wire.timing import Awaited
 
 
 class TickVerdict(NamedTuple):
-    """What follows from a deadline that has passed."""
+    """Consequence of a passed deadline."""
 
     kind: Literal["wait", "over", "tick", "break"]
-    """Wait on; end the wait; do the tick that is due; or break the run, or leave it."""
+    """Continue to wait; end the wait; do the due tick; or break the run, or leave it."""
     reason: str = ""
     """Why the run breaks, with the messages that are missing."""
     warnings: tuple[str, ...] = ()
@@ -22,7 +22,7 @@ WAIT = TickVerdict("wait")
 
 
 class TickPolicy(Protocol):
-    """Decides when a node ticks and with what; the node decides everything else. Times are s on the driver's clock."""
+    """Decide when a node ticks, from which messages; the node decides all else. Times are s on the driver's clock."""
 
     @property
     def grants(self) -> bool:
@@ -34,18 +34,18 @@ class TickPolicy(Protocol):
 
     @property
     def deadline(self) -> float | None:
-        """When to ask `passed` next."""
+        """Time of the next call of `passed`."""
 
     def start(self, now: float) -> None: ...
 
     def run_time(self, t: float, now: float) -> float:
-        """Return the run time (s) at which what belongs to t comes: t itself, or now by the own clock."""
+        """Return the run time (s) of an action that belongs to t: t itself, or the present time of the own clock."""
 
     def due(self, now: float) -> int | None:
         """Return the tick to do now, None if there is none."""
 
     def counts(self, state: State, now: float) -> bool:
-        """Take a state off the wire; return whether it enters the present tick. RejectedError if a later one came."""
+        """Take a received state; return whether it enters the present tick. RejectedError if a later one came."""
 
     def missing(self) -> tuple[Awaited, ...]:
         """Return the messages without which the tick is not due, and their senders."""

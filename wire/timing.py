@@ -46,7 +46,7 @@ class Timer:
 
 
 STOOD_STILL = 1.0
-"""Time (s) after a deadline. A process that is woken later was stopped itself, while its clock went on."""
+"""Time (s) after a deadline. A process that wakes later was stopped itself, while its clock continued."""
 
 
 class Awaited(NamedTuple):
@@ -106,8 +106,8 @@ class TickBarrier:
 
 
 PATIENCE = 3.5
-"""Silence (s) after which a new session opens. It is longer than Zenoh's lease, after which the others have
-forgotten the old session. It doubles, up to `LONGEST`, after a session that never worked."""
+"""Silence (s) after which a new session opens. It exceeds Zenoh's lease, so the others have forgotten the old session.
+It doubles, up to `LONGEST`, after a session that never worked."""
 
 LONGEST = 60.0
 """Longest patience (s): a path that stays cut must not keep a process busy with sessions."""

@@ -14,7 +14,7 @@ _UNPRINTABLE = re.compile(f"[{UNPRINTABLE}\ud800-\udfff]")
 
 
 class InputError(ValueError):
-    """Something that a person gave cannot be used; the message says why. It ends a command with exit code 2."""
+    """An input cannot be used; the message says why. It ends a command with exit code 2."""
 
 
 def printable(text: str, limit: int = 4000) -> str:

@@ -45,10 +45,10 @@ from gridpeers.wire.driver.command_line import command_line
 from gridpeers.wire.wording import counted
 
 REPEATED = 20
-"""Each run whose number is a multiple of this one is done twice, by any worker that is free."""
+"""Interval of runs that are repeated, by any free worker."""
 
 SEEDS = 1_000_000
-"""Seeds of the messages' fates for each seed of a campaign: run n has one of its own."""
+"""Number of seeds for the fates of messages per seed of a campaign: each run has its own."""
 
 COLUMNS = (
     *("run", "seed", "status", "violated", "why", "disturbances", "schedule"),
@@ -63,7 +63,7 @@ class Failure(NamedTuple):
     row: ChaosRow
     """The run in which it was found, among those with the fewest disturbances."""
     simplest: ChaosRow
-    """The run of the simplest schedule found for it."""
+    """The run of the simplest failing schedule."""
     file: Path
 
 
@@ -81,7 +81,7 @@ class Campaign:
     """By the check that is violated."""
 
     def run(self, stage: Stage) -> None:
-        """Do the runs, shrink what fails, and write all of it, also after an interruption."""
+        """Do the runs, shrink the failures, and write all results, also after an interruption."""
         try:
             with TemporaryDirectory(prefix="gridpeers-chaos-", ignore_cleanup_errors=True) as temporary:
                 self._do_runs(stage, Path(temporary))
@@ -244,7 +244,7 @@ def run_number(
 def shrink_number(
     text: str, seed: int, number: int, violated: str, driver: Driver, within: Path | None = None
 ) -> tuple[str, ChaosRow]:
-    """Return the check that a run violates, and the run of the simplest schedule found that violates it, too."""
+    """Return the check that a run violates, and the run of the simplest schedule that also violates it."""
     base = base_of(text)
     rows: dict[bytes, ChaosRow] = {}
 

@@ -30,12 +30,12 @@ from gridpeers.wire.messages import PlantEvent
 from gridpeers.wire.wording import utf8
 
 ASKED = ENDS, ERROR, LINKS, REPEATS, SAME_IN_PROCESSES = "ends", "no_error", "links", "repeats", "same_in_processes"
-"""Questions about every run beside the checks: it reaches its end; no error of the program; accounts of links balance;
-it repeats to the byte; processes give the bytes of one process."""
+"""Questions about every run beside the checks: it reaches its end; no error of the program; the accounts of links
+balance; a second run gives the same bytes; processes give the bytes of one process."""
 
 LONGER_RUNS = 6
-"""Most times that a run with trips is done, each longer than the one before: inverters stay off after three trips
-without a minute in service between."""
+"""Most repetitions of a run with trips, each longer than the one before: inverters stay off after three trips without a
+minute in service between them."""
 
 
 PERIODS = 2
@@ -51,12 +51,12 @@ class ChaosRow(JournalRow, frozen=True, kw_only=True):
     collapse: str = ""
     """Why violations of some inverters do not count: a change made them trip before any control could prevent it."""
     unsettled: str = ""
-    """Why it may be judged too early: inverters tripped and returned in each of its ever longer runs."""
+    """Why it may be judged too early: inverters tripped and returned in each longer run."""
     history_sha256: str = ""
     links_sha256: str = ""
     trips: int = 0
     since_s: float = 0.0
-    """Run time (s) from which on it was to be restored: that of the last change, or later, as inverters tripped."""
+    """Run time (s) from which it must be restored: that of the last change, or later if inverters tripped."""
     took_s: float = 0.0
 
     @property
@@ -148,7 +148,7 @@ def _excused(
 def _settled(
     base: ChaosBase, schedule: Schedule, seed: int, number: int, driver: Driver, within: Path | None
 ) -> JudgedRun:
-    """Run a scenario with a schedule; if inverters trip, again and so long that they are judged after their return."""
+    """Run a scenario with a schedule. If inverters trip, run it again, until they are judged after their return."""
     since_s = base.changed_s(schedule)
     for _ in range(LONGER_RUNS):
         row = ChaosRow(number=number, schedule=schedule, since_s=since_s)
@@ -213,7 +213,7 @@ class Collapse(NamedTuple):
     label: str
     text: str
     inverters: frozenset[str]
-    """Inverters of the islands in which inverters tripped, as the switches were then."""
+    """Inverters of the islands with trips, by the switch positions of that time."""
 
 
 def collapses_at_changes(scenario: ScenarioModel, feeder: Tables, events: Iterable[PlantEvent]) -> tuple[Collapse, ...]:

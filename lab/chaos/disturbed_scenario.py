@@ -37,17 +37,17 @@ from gridpeers.wire.plugins.plugin import table_of
 from gridpeers.wire.timing import rounded_up
 
 WITHIN_S = 4.0
-"""Time (s) after the last change within which a run is to be restored. Set-points come back from their bounds at the
-rate of the law, and vars, the slowest, settle within 3 s after a large step."""
+"""Time (s) after the last change within which a run must be restored. Set-points return from their limits at the rate
+of the law. Vars are the slowest: they settle within 3 s after a large step."""
 
 JUDGED_S = 0.8
 
 REJOINED_S = 1.0
-"""Longest time (s) after a cut until a value from over there is used: in simulated time nothing has to connect again,
-and no delay is longer."""
+"""Longest time (s) after a cut until a value from the other side is used: simulated time needs no new connection, and
+no delay is longer."""
 
 LATEST_S = 0.5
-"""Time (s) after the last change from which on no decision uses a stale value: as long as the longest delay."""
+"""Time (s) after the last change from which no decision may use a stale value: the longest delay."""
 
 _AFTER: Mapping[str, Mapping[str, Any]] = {
     "frequency": {"within_s": WITHIN_S},
@@ -59,7 +59,7 @@ _AFTER: Mapping[str, Mapping[str, Any]] = {
 }
 
 RESTORED = frozenset({*_AFTER, "oscillation", RETURNS})
-"""Checks of what control restores; the others hold whatever is done to a run."""
+"""Checks of quantities that control restores; the other checks hold during disturbances too."""
 
 _ALWAYS: Mapping[str, Mapping[str, Any]] = {"heal": {"within_s": REJOINED_S}, "oscillation": {"tail_s": 2.0}}
 
@@ -181,7 +181,7 @@ class ChaosBase:
         return not problems.any and not self.supply.objection(scenario, self.case)
 
     def kept(self, drawn: Iterable[Disturbance]) -> Schedule:
-        """Return those of some disturbances that are possible together: of two that are not, the first."""
+        """Return the disturbances that are possible together: of two that conflict, the first."""
         kept: Schedule = ()
         if self.is_possible(tuple(drawn)):
             return tuple(drawn)
@@ -278,11 +278,11 @@ def chaos_checks(
 
 
 MOST_LOAD, LEAST_LOAD = 0.97, 0.05
-"""Load of an island, as parts of the ratings of its inverters that control: above, losses and vars take what is left,
-below, its inverters are at their lower limit, which is outside of the control law."""
+"""Bounds of the load of an island, as parts of the ratings of its controlled inverters. Above, losses and vars take the
+rest. Below, inverters are at their lower limit, which the law does not move."""
 
 KILLED = 0.5
-"""Part of its rating that an inverter is counted with whose agent has been killed: it stays at its last set-points."""
+"""Part of its rating that counts for an inverter with a killed agent, which keeps its last set-points."""
 
 
 class _Part(NamedTuple):
@@ -302,7 +302,7 @@ class _State(NamedTuple):
 
 
 class FeasibleSupply:
-    """Finds islands that their inverters cannot feed: no control can change that, so it is not drawn."""
+    """Find islands that their inverters cannot feed. No control can change that, so chaos draws none."""
 
     def __init__(self, feeder: Tables) -> None:
         self._feeder, self._graph = feeder, Connectivity(feeder)

@@ -22,11 +22,11 @@ from gridpeers.plant.equipment.named_loads import named_loads
 from gridpeers.scenarios.schema.participants import with_agent
 
 BATCH = 25
-"""Schedules that are drawn together, from a seed of their own: so that the first runs of a seed are the same however
-many follow, and few are drawn again to shrink one."""
+"""Schedules that are drawn together, from one seed. So the first runs of a seed do not depend on the number of runs,
+and shrinking one draws few of them again."""
 
 TRIES = 150
-"""Most runs to shrink a schedule; a fifth is kept for leaving out disturbances one by one, once hypothesis is done."""
+"""Most runs to shrink a schedule. A fifth is reserved for leaving out single disturbances after hypothesis."""
 
 MOST_DISTURBANCES = 10
 
@@ -37,8 +37,8 @@ MOST_LOADS = 20
 """Most loads that a step changes: a quarter of those of the standard feeder."""
 
 _FAR = 7_203_117_000_000_061
-"""A number that no program is likely to contain. hypothesis prefers integers that it finds in the source code of
-loaded modules, so a seed would draw other schedules after any change of any of them; near this one it finds none."""
+"""A number that no program is likely to contain. hypothesis prefers integers from the source code of loaded modules, so
+any change of a module would change the schedules. It finds none near this number."""
 
 
 class _FailsError(Exception):
@@ -100,7 +100,7 @@ def _without_idle_ones(base: ChaosBase, schedule: Schedule, fails: Callable[[Sch
 def _search(
     base: ChaosBase, seed: int, batch: int, attempt: Callable[[Schedule], None], phases: tuple[Phase, ...]
 ) -> None:
-    """Have hypothesis draw the schedules of a batch; a seed of a batch is no other batch's."""
+    """Let hypothesis draw the schedules of a batch, from a seed of its own."""
     given = hypothesis.given(schedules(base))(lambda schedule: attempt(schedule))
     settings = hypothesis.settings(
         max_examples=BATCH,
@@ -140,7 +140,7 @@ class _Draw:
         self._loads = list(named_loads(feeder))
         time = scenario.time
         self._step = time.T_c_s * ceil(1.5 * time.record_s / time.T_c_s - 1e-9)
-        """Distance (s) of the times that are drawn: events apart by it have a recorded row between them."""
+        """Distance (s) between possible times of events, so that a row is recorded between two of them."""
 
     def disturbance(self) -> Disturbance:
         kinds = [self._cut, self._partition, self._delay, self._loss, self._noise, self._pause]

@@ -24,10 +24,10 @@ from gridpeers.wire.messages import PLANT
 LAST_LINES = 12
 
 GRACE = 2.0
-"""Time (s) that processes have to leave after SIGTERM, the plant first."""
+"""Time (s) for processes to leave after SIGTERM, the plant first."""
 
 _FAULTS = {-signal.SIGSEGV, -signal.SIGBUS, -signal.SIGABRT, -signal.SIGFPE, -signal.SIGILL}
-"""Exit statuses of faults in a process's own code; other signals come from outside."""
+"""Exit statuses of faults in the code of the process itself; other signals come from outside."""
 
 _IN_ORDER = {IN_ORDER + status: status for status in (OK, BAD_CONFIG, BROKE)}
 
@@ -89,7 +89,7 @@ class Child:
 
     @property
     def crashed(self) -> bool:
-        """True if its own code ended it, as a law whose C code has a segmentation fault, or calls exit()."""
+        """True if its own code ended it, for instance by a segmentation fault in a law, or by exit()."""
         status = self._process.poll()
         return status is not None and status not in _IN_ORDER and (status >= 0 or status in _FAULTS)
 
@@ -102,7 +102,7 @@ class Child:
         return not self._watcher.is_alive()
 
     def release(self) -> None:
-        """Close the pipes; a child that still ran would leave."""
+        """Close the pipes; a child that still runs then leaves."""
         for pipe in (self._process.stdin, self._process.stdout):
             if pipe is not None:
                 with contextlib.suppress(BrokenPipeError):

@@ -23,12 +23,12 @@ AVAILABLE = sys.platform == "linux"
 """True where forking works; elsewhere every process is started anew."""
 
 PATIENCE = 15.0
-"""Longest wait (s) for a new process: the plant's server imports for 1 s, but where its step is cached for another
-processor it would compile for a minute, without a word and deaf to Ctrl-C."""
+"""Longest wait (s) for a new process. The plant's server imports for 1 s; if its step is cached for another processor,
+it compiles for a minute without an answer."""
 
 
 class ForkServerError(RuntimeError):
-    """A fork server that cannot fork; start the process anew."""
+    """The fork server cannot fork; start the process anew."""
 
 
 class ForkServer:
@@ -139,13 +139,13 @@ _OF_PLANTS = (
 """Agents have another server, because they do not load numpy."""
 
 _SET_BY_US = {"ZENOH_RUNTIME"}
-"""Variables that loading Zenoh sets here as it does there."""
+"""Variables that loading Zenoh sets in this process and in the server."""
 
 _kept: dict[tuple[str, ...], ForkServer] = {}
 """Servers by the modules that they have imported."""
 
 _inherited: tuple[int, str, dict[str, str]] | None = None
-"""Owner, folder and variables that these servers have inherited; once they differ, others are needed."""
+"""Owner, folder and variables that these servers inherited; if they change, new servers start."""
 
 _lock = threading.RLock()
 
@@ -159,14 +159,14 @@ def plant_server() -> ForkServer | None:
 
 
 def prepare() -> None:
-    """Start the servers of a run with processes, so that they have imported once it begins."""
+    """Start the servers of a run with processes early, so that their imports are done when it begins."""
     plant_server()
     agent_server()
 
 
 @atexit.register
 def release() -> None:
-    """End the servers of this process: it goes on for long and starts few others from now on, or it ends."""
+    """End the servers of this process, before it ends, or runs for long and starts few others."""
     with _lock:
         if _inherited is not None and _inherited[0] == os.getpid():  # else they are of the process that forked this one
             for server in _kept.values():

@@ -25,19 +25,19 @@ from gridpeers.scenarios.run_request import Other, Outcome
 from gridpeers.wire.messages import PLANT, PlantEvent, Telemetry
 
 BUILD_DEADLINE = 600.0
-"""Longest time (s) until the plant is ready; compiling the step at the very first start takes up to a minute."""
+"""Longest time (s) until the plant is ready; the very first start may compile for a minute."""
 
 LEAVING = 10.0
-"""Time (s) that processes have to close at the end by themselves; most take 0.1 s, on a busy machine some take 3 s."""
+"""Time (s) for processes to close at the end by themselves; most take 0.1 s, on a busy machine up to 3 s."""
 
 AFTERMATH = 0.3
-"""The same when the run broke: processes that die of it do so in this time, the others are ended."""
+"""The same after the run broke: processes that fail with it end in this time, the others are then ended."""
 
 LAST_TELEMETRY = 2.0
-"""Longest time (s) for which the last telemetry of a plant may come after its process has ended in order."""
+"""Longest wait (s) for the last telemetry of a plant after its process ended in order."""
 
 STOOD_STILL = 1.0
-"""Time (s) by which a wait may be longer than asked for before this process counts as having stood still itself."""
+"""Excess (s) of a wait over its limit, after which this process counts as stopped itself."""
 
 
 def run_processes(

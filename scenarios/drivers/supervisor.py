@@ -25,7 +25,7 @@ class FaultInjector:
 
     def __init__(self, plant: PlantConfig) -> None:
         self._due: list[tuple[float, str, signal.Signals]] = []
-        """Run time (s), agent and signal of the faults that are left, in the order of time; others are emulated."""
+        """Run time (s), agent and signal of the remaining faults, in the order of time; others are emulated."""
         if plant.links and plant.clock == "realtime":
             setup = EmulationConfig.of_tree(plant.links)
             for node in setup.netem.nodes if setup.real_nodes else ():
@@ -158,7 +158,7 @@ class Supervisor:
         self.faults.inject(self.children)
 
     def failed(self, child: Child) -> bool:
-        """True if neither the scenario nor a request explains that a process has ended, or still runs."""
+        """True if a process ended, or still runs, without a reason in the scenario or a request."""
         return (child.status != 0 or child.crashed) and child.name not in self.faults.killed
 
 

@@ -19,14 +19,14 @@ RECORDER = "history"
 """Name of a driver's recorder in its run."""
 
 RECORDER_WAIT = 1.0
-"""Least wait (s) of the plant of a live run that is recorded: without its recorder the first row would be missing."""
+"""Least wait (s) of the plant of a recorded live run; without its recorder the first row would be lost."""
 
 LOOK = 0.5
 """Longest wait (s) between two checks for missing messages."""
 
 
 def with_recorder(config: PlantConfig, *, waits: bool = False) -> PlantConfig:
-    """Return a plant with the recorder of its driver; with `waits` it waits for that even if it waits for no agent."""
+    """Return a plant with the recorder of its driver; with `waits` it waits for that recorder even without agents."""
     wait = max(RECORDER_WAIT, config.wait_for_agents) if waits else config.wait_for_agents
     return replace(config, recorders=(RECORDER,), wait_for_agents=wait)
 
@@ -106,13 +106,13 @@ class TelemetryClient:
         return words
 
     def note_crash(self, agent: str, end: str) -> None:
-        """Pass on that the process of an agent crashed, as an event of its law, with how it ended in words."""
+        """Report the crash of an agent's process as an event of its law; `end` describes the crash."""
         if self.latest is not None and not self.ended:
             event = PlantEvent(t=self.t, kind="law", subject=agent, text=f"{agent}: its process {end}")
             self._on_message(replace(self.latest, rows=(), events=(event,), awaited=(), quiet=(), others=0))
 
     def close(self) -> None:
-        """Close the session, and with it the token: the plant knows then that the last telemetry is here."""
+        """Close the session and its token; the plant then knows that the last telemetry arrived."""
         self._closed = True
         self._session.close()
 

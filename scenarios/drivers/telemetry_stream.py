@@ -13,15 +13,15 @@ from gridpeers.wire.messages import PLANT, Answer, Command, Journal, LinkReport,
 from gridpeers.wire.post import FollowedPlant, Post, Route
 
 QUIET = 1.5
-"""Time (s) without a message of a running plant after which it is asked; it reports five times a second."""
+"""Time (s) without a message from a running plant, after which the recorder asks; it sends five per second."""
 
 AGAIN = 1.0
 
 ASTRAY = 3.0
-"""Time (s) without any answer after which a new session is opened; twice as long after each that brought none."""
+"""Time (s) without an answer, after which a new session opens; it doubles after each session without one."""
 
 ASTRAY_SIMULATED = 10.0
-"""The same in simulated time, where a plant answers between two steps, or once a full link of its is closed."""
+"""The same in simulated time, where a plant answers between two steps, or after it closed a full link."""
 
 LONGEST = 60.0
 
@@ -39,7 +39,7 @@ class TelemetryStream:
         self.lost = False
         self._next = 0
         self._held: list[Recordable] = []
-        """Other messages that came since the one before: with the next they are known to be in order."""
+        """Other messages since the last Telemetry; the next one proves their order."""
         self._gap_since: float | None = None
         """Time (s) since which messages are dropped, until the plant answers with the first number that comes again."""
         self._heard_at: float | None = None
@@ -92,7 +92,7 @@ class TelemetryStream:
         return str(self._next)
 
     def is_astray(self, now: float) -> bool:
-        """Return True if a new session is to be opened now, as questions have had no answer for long."""
+        """Return True if a new session is due, because questions have had no answer for long."""
         since = self._heard_at if self.acknowledges else self._gap_since
         if since is None or now - max(since, self._opened_at) < self._patience:
             return False

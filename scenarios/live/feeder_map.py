@@ -50,7 +50,7 @@ class FeederMap(msgspec.Struct, frozen=True):
     to_scale: bool = True
     """True if both axes have the same unit; False if the places are those of a tree."""
     scenario: str = ""
-    """Name of the scenario that runs; empty of a diagram of a feeder alone."""
+    """Name of the running scenario; empty for the diagram of a feeder alone."""
     case: str = ""
 
 
@@ -77,7 +77,7 @@ def feeder_map(feeder: Tables) -> FeederMap:
 
 
 def read_feeder_map(payload: bytes) -> FeederMap | None:
-    """Return the map in a plant's answer; None if the bytes are something else, or name a bus that is not there."""
+    """Return the map in an answer of the plant; None for other bytes, or if it names an unknown bus."""
     try:
         found = decode_foreign(msgspec.json.Decoder(FeederMap).decode, payload)
     except msgspec.DecodeError:

@@ -44,7 +44,7 @@ LOOKING = 1.5
 def check_alone(
     run: str, beyond: tuple[str, ...], credentials: Credentials | None = None, access: Access | None = None
 ) -> None:
-    """Raise UsageError if a plant of this run is at an endpoint `beyond` the own, to which the plant will connect."""
+    """Raise UsageError if the endpoints `beyond`, to which the plant will connect, already have a plant of this run."""
     if not beyond:
         return
     there = RunAddress(run=run, connect=beyond, credentials=credentials, access=access or Access())
@@ -57,7 +57,7 @@ def check_alone(
 
 
 def chosen_case(scenario: ScenarioModel, case: str) -> str:
-    """Return the case asked for, or the last, in the paper full coordination; UsageError if there is no such case."""
+    """Return the given case, or the last one; UsageError if there is no such case."""
     if case and case not in scenario.cases:
         raise UsageError(f'--case: no case "{case}"; {suggestion(case, scenario.cases, "cases")}')
     return case or list(scenario.cases)[-1]
@@ -125,7 +125,7 @@ def configure(
 
 class Folders(NamedTuple):
     logs: Path
-    """Without `--out` a temporary folder, which the caller removes unless it has named a log there."""
+    """A temporary folder without `--out`; the caller removes it unless it has named a log there."""
     record: Path | None = None
     """For the files of the record, a folder in the run folder; None if nothing is recorded."""
     whole: Path | None = None

@@ -51,7 +51,7 @@ CHECK = 0.25
 UNHEARD = "the plant has ended, and this command never had a link to it"
 
 LEAVING = 5.0
-"""Time (s) that processes have to close by themselves once the plant has."""
+"""Time (s) for processes to close by themselves after the plant."""
 
 GOES_ON = "; the run continues without it"
 
@@ -117,7 +117,7 @@ class LiveRecorder:
             recorder.close()
 
     def note_crash(self, agent: str, end: str) -> None:
-        """Note that the process of an agent crashed, with how it ended in words; from any thread."""
+        """Note that the process of an agent crashed; `end` describes the crash. Any thread may call it."""
         self.client.say(f"{agent} {end}")
 
     def _tried(self, what: str, act: Callable[[], None], consequence: str = "") -> bool:
@@ -131,7 +131,7 @@ class LiveRecorder:
         return True
 
     def _finish(self, recorder: Recorder) -> None:
-        """Write the tables; of a record that is not whole there are none."""
+        """Write the tables; an incomplete record has none."""
         if recorder.count < 2:
             say("nothing was recorded, so nothing is measured")
         elif not self.client.ended:
@@ -177,7 +177,7 @@ class LiveRecorder:
 
 
 def meaning(word: str, config: PlantConfig) -> str:
-    """Return a sentence for a line that the plant prints at a step of its start, or for a refused link; or ""."""
+    """Return a sentence for a line of the plant's start or of a refused link, or an empty string."""
     if word == COMPILING:
         return "the plant is being built; the first time, its inner loop is compiled, which takes some seconds"
     if word == READY:
@@ -211,7 +211,7 @@ def all_here(
     folder: Path | None,
     record: RecordInfo,
 ) -> ProcessOutcome:
-    """Run the plant and its agents, but for spare ones, as processes of their own, until the run ends."""
+    """Run the plant and its agents, without spare ones, each in a process, until the run ends."""
     stop_at_signals(StoppedError)
     config = with_recorder(config, waits=folder is not None)
     endpoint, listen = loopback_of(config.listen[0]), return_path(config.listen)

@@ -35,11 +35,11 @@ class Access:
     name: str = ""
     """Name of the member; the first that fits if empty."""
     insecure: bool = False
-    """An endpoint that others reach may be open to everybody."""
+    """True if an endpoint that others reach may be open to everybody."""
 
     @property
     def words(self) -> list[str]:
-        """The options as they are typed, without the command's own name."""
+        """The options as typed, without the name of the command."""
         keys = [] if self.keys is None else ["--keys", str(self.keys)]
         return [*keys, *(["--insecure"] if self.insecure else [])]
 
@@ -91,7 +91,7 @@ def objection(option: str, endpoint: str, *, keys: bool, insecure: bool) -> str:
 
 
 def with_protocol(endpoint: str, *, keys: bool, default: str) -> str:
-    """Return the default endpoint as it is with certificates; any other endpoint as it was typed."""
+    """Return the default endpoint with the protocol for certificates; any other endpoint as typed."""
     return endpoint.replace("tcp/", "tls/", 1) if keys and endpoint == default else endpoint
 
 
@@ -150,7 +150,7 @@ def far_hosts(connect: tuple[str, ...]) -> list[str]:
 
 
 def return_path(connect: tuple[str, ...]) -> tuple[str, ...]:
-    """Return where a process must listen so that others of the run can connect to it."""
+    """Return the endpoint where a process must listen, so that others of the run can connect to it."""
     protocol = "tls" if all(text.startswith("tls/") for text in connect) else "tcp"
     far = far_hosts(connect)
     host = "127.0.0.1" if not far else "[::]" if far[0].startswith("[") else "0.0.0.0"

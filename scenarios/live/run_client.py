@@ -17,7 +17,7 @@ from gridpeers.wire.trust.key_folder import tls_refusal
 from gridpeers.wire.wording import InputError
 
 REMINDER = 1.0
-"""Time (s) after which a wait is reported again, then after twice as long, and so on."""
+"""Time (s) after which a wait is reported; it doubles with each report."""
 
 PROBE = 1.0
 """Longest wait (s) for each step of a TLS handshake."""
@@ -26,7 +26,7 @@ FIRST_LOOK, RENEWAL = 1.0, 2.0  # Time (s) until the session is checked first, a
 
 
 class NobodyError(InputError):
-    """A run, plant or inverter is not there; the message says where the search was, how long, and what to do."""
+    """A run, plant or inverter was not found; the message says where, after how long, and the next step."""
 
 
 class RunClient:
@@ -54,7 +54,7 @@ class RunClient:
         self._session.watch(ANY_ALIVE_PLANT)
 
     def renew(self) -> None:
-        """Open a new session, as the old one does not bring the messages that it should."""
+        """Open a new session, because the old one does not bring its messages."""
         self.close()
         self._open()
 
@@ -163,14 +163,14 @@ class RunClient:
         return f" (runs there: {', '.join(others)})" if others else ""
 
     def _refused(self) -> str:
-        """Return why no link will come, if every endpoint refuses one; else the empty string."""
+        """Return why no link is possible, if every endpoint refuses one; else an empty string."""
         if self._session.peers():
             return ""
         refusals = [_refusal(text, self.where) for text in self.where.connect]
         return "\n".join(refusals) if all(refusals) else ""
 
     def _link_faults(self) -> str:
-        """Return why links without access bring nothing; empty if they have it, or there are no certificates."""
+        """Return why links without access bring no messages; empty if they have access, or without certificates."""
         if (credentials := self.where.credentials) is None:
             return ""
         own, vouched = credentials.own, self._session.vouches(PLANT)  # it looks at new links, and notes their lines

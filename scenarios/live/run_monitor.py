@@ -74,7 +74,7 @@ class PlantStatus(msgspec.Struct, frozen=True, kw_only=True):
     agents: tuple[str, ...] = ()
     absent: tuple[str, ...] = ()
     events: tuple[PlantEvent, ...] = ()
-    """The latest, oldest first."""
+    """The latest events, oldest first."""
     impaired: tuple[str, ...] = ()
     """Agents whose link to or from the plant has an emulated fault."""
     switches: dict[str, bool] = {}
@@ -88,10 +88,10 @@ class PlantStatus(msgspec.Struct, frozen=True, kw_only=True):
 
 
 OLD = 0.2
-"""An age (s) from which on it is shown in colour: ten control periods of 20 ms, half of what is still used."""
+"""Age (s) from which it is coloured: ten control periods of 20 ms, half of the oldest used age."""
 
 V_LOW, V_HIGH = 0.95, 1.05
-"""Terminal voltages (pu) beyond which one is shown as off: range A of ANSI C84.1."""
+"""Range of normal terminal voltages (pu): range A of ANSI C84.1."""
 
 SILENT = 1.5
 """An agent whose status is older than this (s of real time) is silent: it sends three in this time."""
@@ -124,7 +124,7 @@ class InverterStatus:
     received: int | None = None
     sent: int | None = None
     lost: int | None = None
-    """Messages that were sent to it and never came."""
+    """Messages that were sent to it and never arrived."""
     impaired: tuple[str, ...] = ()
     """Senders whose links to it have an emulated fault."""
     note: str = ""

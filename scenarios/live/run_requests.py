@@ -120,7 +120,7 @@ def plant_status(client: RunClient, wait: float = ANSWER) -> PlantStatus:
 
 
 def data_of(client: RunClient, answer: Answer, kind: type[T]) -> T:
-    """Return the data of an answer; NobodyError if they are something else, as of a plant of another version."""
+    """Return the data of an answer; NobodyError if it has another form, as of a plant of another version."""
     try:
         return msgspec.convert(answer.data, kind)
     except msgspec.ValidationError as error:
@@ -210,7 +210,7 @@ def own_code(config: AgentConfig) -> Iterator[str]:
 
 
 POWER = Range(-1e8, 1e8)
-"""Powers (kW or kvar) that are sent; the plant knows the plausible ones."""
+"""Powers (kW or kvar) that are sent; the plant refuses implausible ones."""
 
 
 def load_setting(factor: float | None, P_kW: float | None, Q_kvar: float | None) -> LoadSetting:
@@ -241,16 +241,16 @@ class _LinkReply(msgspec.Struct, frozen=True):
 
 class LinkCommandResult(NamedTuple):
     text: str
-    """Its effect in words, and from when on."""
+    """The effect in words, and its start."""
     acknowledged: list[str]
     absent: list[str]
-    """Receivers without an agent: the plant tells the agent when it comes."""
+    """Receivers without an agent; the plant tells the agent when it joins."""
     failures: list[str]
-    """Sentences on receivers that refused, or that take part and have not answered in time."""
+    """Sentences on receivers that refused, or that take part but have not answered in time."""
 
 
 def links_of_run(client: RunClient) -> EmulationConfig:
-    """Return the emulated links of a run; NobodyError if none can be changed."""
+    """Return the emulated links of a run; NobodyError if it has none."""
     for config in configurations(client).values():
         if config.links:
             return EmulationConfig.of_tree(config.links)
@@ -258,7 +258,7 @@ def links_of_run(client: RunClient) -> EmulationConfig:
 
 
 def check_link_command(command: LinkCommand, setup: EmulationConfig | None) -> None:
-    """Raise UsageError with all that is wrong with a command; without a setup, with its values alone."""
+    """Raise UsageError with all problems of a command; without a setup, check only its values."""
     problems: Iterable[Problem] = command.wrong_values() if setup is None else command.problems(setup.microgrids)
     options = [(path.partition(".")[0], text) for path, text in problems]
     wrong = [f"{'LINKS' if option == 'on' else f'--{option}'}: {text}" if option else text for option, text in options]

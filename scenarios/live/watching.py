@@ -23,7 +23,7 @@ from gridpeers.wire.timing import SessionDeadline
 EVENTS = 6
 
 LOOK = 1.2
-"""Longest wait (s) for one snapshot: two periods of an agent's status, and a bit."""
+"""Longest wait (s) for one snapshot: just over two periods of an agent's status."""
 
 SILENT = 1.0
 """Time (s) without a message after which a sender counts as silent: two periods of an agent's status."""
@@ -111,7 +111,7 @@ def table(snapshot: Snapshot, before_unit: str = "\n") -> Group:
 
 
 class TakesMessages(Protocol):
-    """The part of a `RunMonitor` that takes messages; the page's view has it too."""
+    """The part of a `RunMonitor` that takes messages; the page's view also has it."""
 
     @property
     def inverters(self) -> tuple[str, ...]: ...

@@ -50,7 +50,7 @@ def stop_handler(error: Callable[[str], BaseException]) -> Callable[[int, FrameT
 
 
 def stop_at_signals(error: Callable[[str], BaseException]) -> None:
-    """Have SIGINT and SIGTERM raise in the main thread; a SIGINT that a shell ignores in the background stays so."""
+    """Let SIGINT and SIGTERM raise in the main thread; a SIGINT that a background shell ignores stays ignored."""
     stop = stop_handler(error)
     signal.signal(signal.SIGTERM, stop)
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:

@@ -41,7 +41,7 @@ BYTES = 64_000_000
 """Bytes of long messages that may wait."""
 
 LOSSLESS = 8
-"""Factor on all these in simulated time: more than honest senders send before they have an answer."""
+"""Factor on these limits in simulated time: honest senders send less before they have an answer."""
 
 
 class Inbox:

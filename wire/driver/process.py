@@ -33,7 +33,7 @@ IN_ORDER = 96
 """Added to the exit status of a process on a leash that ends in order."""
 
 _GRACE = 5.0
-"""Time (s) for a proper end once the parent is gone."""
+"""Time (s) to end in order after the parent is gone."""
 
 LEASH = "--leash"
 """Option: the configuration is one line, and the process ends when standard input does, as its parent is gone. A name
@@ -57,7 +57,7 @@ class ConfigurationError(InputError):
 
 
 MakeLinks = Callable[[str, Mapping[str, Any]], Links | None]
-"""Makes the emulated links to a node, from its name and the tree `links` of its configuration."""
+"""Function that makes the emulated links to a node, from its name and the tree `links` of its configuration."""
 
 
 def no_links(name: str, tree: Mapping[str, Any]) -> None:

@@ -37,7 +37,7 @@ FIRST_LINK = 0.5
 """Longest wait (s) for the first link, to find out whether a router or a peer answers; on one host it takes 20 ms."""
 
 _REFUSED_LINKS = "zenoh_link_tls::unicast=warn"
-"""Part of Zenoh's log: each TLS handshake that has failed, with its reason; ten a second at the most."""
+"""Part of Zenoh's log: failed TLS handshakes with their reasons, at most ten a second."""
 
 _QUERY_TIMEOUT = 600.0
 """Time (s) after which Zenoh forgets a query; the asking node keeps its own deadline."""
@@ -185,7 +185,7 @@ class Session:
 
     @property
     def misplaced(self) -> bool:
-        """Whether a router has answered too late for this session to be its client: open another one."""
+        """Whether a router answered too late for this session to be its client; then a new session is needed."""
         return self._changeable and bool(self._session.info.routers_zid())
 
     def take(self, needed: int, timeout: float | None) -> list[Stamped]:

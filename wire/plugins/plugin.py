@@ -36,9 +36,9 @@ class Plugin(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     use: str
     """Registered name, or `module:Name`."""
     folder: str = ""
-    """Where the module is looked for."""
+    """Folder in which the module is searched."""
     parameters: tuple[tuple[str, float | int | bool | str], ...] = ()
-    """Name and value of those that do not keep their default, in the order of the names."""
+    """Names and values of the parameters that differ from their defaults, in the order of the names."""
 
 
 def table_of(key: str | Mapping[str, Any]) -> dict[str, Any]:

@@ -31,10 +31,10 @@ LONGEST_COMMON_NAME = 64
 
 class SiteMember(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     name: str
-    """An agent has that of its inverter."""
+    """Name of the member; an agent has the name of its inverter."""
     role: Role
     generation: int = 1
-    """Number of the certificate: how many of this name have been revoked before, and one."""
+    """Number of the certificate: one more than the revoked certificates of this name."""
     revoked: bool = False
     expires: str = ""
     """When the certificate ends, to the minute, e.g. "2027-11-23 12:00 UTC"; empty if none was issued."""
@@ -69,7 +69,7 @@ _WATCH = ("declare_liveliness_subscriber", "liveliness_query")
 
 
 class Rule(NamedTuple):
-    """Allowed messages on one link."""
+    """Messages that are allowed on one link."""
 
     flow: Flow
     messages: tuple[str, ...]
@@ -160,7 +160,7 @@ class Credentials(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         )
 
     def stranger(self, common_name: str) -> str:
-        """Return why messages from the other end of a link are not believed, "" if it is a member."""
+        """Return why messages of the other end of a link are not believed, or "" for a member."""
         if any(common_name in member.accepted for member in self.members):
             return ""
         shown = printable(common_name, 64) or "nobody"

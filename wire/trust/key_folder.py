@@ -41,7 +41,7 @@ SOON = timedelta(days=30)
 
 
 class KeysError(InputError):
-    """Certificates or keys cannot be used; the message says which, why, and what to do."""
+    """Certificates or keys cannot be used; the message says which and why, and the next step."""
 
 
 class MemberList(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -36,10 +36,10 @@ LIFE_DAYS = 365
 """Life (days) of a member's certificate."""
 
 SKEW = timedelta(minutes=5)
-"""A certificate is valid from so long before its issue: clocks of hosts differ."""
+"""Time by which a certificate is valid before its issue, because clocks of hosts differ."""
 
 RESERVED = {text for file in (CA, CA_KEY, LIST) for text in (file, Path(file).stem)}
-"""Names that no member may have: the site's own files are called so."""
+"""Names that no member may have, because files of the site have them."""
 
 FIRST: tuple[tuple[str, Role], ...] = (("plant", "plant"), ("operator", "operator"), ("viewer", "viewer"))
 """Members of every new site."""
