@@ -209,5 +209,4 @@ def _ending(name: str | Path) -> str:
 
 
 def _listed(names: Names) -> Names:
-    """Return several names, also where one is given as it is: its letters are never meant."""
     return [names] if isinstance(names, str) else names

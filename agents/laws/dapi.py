@@ -63,5 +63,4 @@ def _terms(neighbours: Sequence[Neighbour], of_P: _Sums, of_V: _Sums) -> Terms:
 
 
 def _step(gain: float, weight: float) -> float:
-    """Return an Euler step for a sum over neighbours, limited to half of the way to their mean."""
-    return min(gain, 0.5 / weight) if weight > 0.0 else 0.0
+    return min(gain, 0.5 / weight) if weight > 0.0 else 0.0  # at most half of the way to their mean

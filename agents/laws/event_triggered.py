@@ -63,7 +63,6 @@ class EventTriggered(Consensus):
 
     @staticmethod
     def _terms_of(seen: SetPoints, beyond: float) -> Terms:
-        """Return the terms of the step from the last broadcasts, and what the limits took there."""
         assert seen.terms is not None
         P, V, *_ = seen.terms()
         return Terms((*P, Term("limit of the last broadcast", beyond)) if beyond else P, V)

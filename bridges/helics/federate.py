@@ -154,7 +154,6 @@ class HelicsFederate:
         return answer
 
     def _take(self, wait: float, late: str) -> dict[str, Any]:
-        """Return the next answer; raise HelicsError if it is late."""
         try:
             answer = self._process.answer(monotonic() + wait)
         except ProcessEndedError as how:

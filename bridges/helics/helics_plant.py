@@ -110,7 +110,6 @@ class HelicsPlant(RecordedPlant):
         return [topic.key for topic in topics(self._prefix, inverters, *groups)]
 
     def _hold(self, name: str, *set_points: float) -> None:
-        """Keep the published set-points as those that an inverter follows."""
         held = zip(self._keys([name], HELD), set_points, strict=True)
         self._values |= {key: value for key, value in held if key not in self._came}
 

@@ -122,7 +122,6 @@ class Comparison:
 
 
 def _table(a: Result, b: Result, names: tuple[str, str]) -> pd.DataFrame:
-    """Return the metrics of one pair of cases; a window that one of them lacks is nan there."""
     columns = [run.metrics.drop(columns="reasons").stack(future_stack=True) for run in (a, b)]
     frame = pd.concat(columns, axis=1, keys=names, sort=False).rename_axis(["window", "metric"])
     frame["difference"] = frame[names[1]] - frame[names[0]]
@@ -131,7 +130,6 @@ def _table(a: Result, b: Result, names: tuple[str, str]) -> pd.DataFrame:
 
 
 def _keys(runs: tuple[Result, ...]) -> dict[str, Any]:
-    """Return every key of a scenario with its value, of the cases that are compared; a single case has no name."""
     spec = runs[0].spec
     tables = tomllib.loads(to_toml(spec, {}))
     tables.pop("as_run", None)

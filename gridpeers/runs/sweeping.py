@@ -82,7 +82,7 @@ def sweep(
 
 
 def _with_metrics(scenario: Scenario, metrics: str | Iterable[Any] | None) -> tuple[Scenario, list[str] | None]:
-    """Return the scenario with metrics of one's own beside its own, and the names of all that were asked for."""
+    """Return the scenario with the caller's metrics beside its own, and the names of all asked metrics."""
     if metrics is None:
         return scenario, None
     given: list[Any] = [metrics] if isinstance(metrics, str | Mapping) or callable(metrics) else list(metrics)
@@ -99,7 +99,6 @@ def _with_metrics(scenario: Scenario, metrics: str | Iterable[Any] | None) -> tu
 
 
 def _plan(scenario: Scenario, grid: Any, zipped: Any, cases: Any, seeds: Any) -> Plan:
-    """Return the checked plan of runs; ScenarioError has everything that is wrong with the values."""
     problems = Problems("sweep")
     lists: dict[str, Any] = {"grid": {}, "zip": {}}
     for table, values in (("grid", grid), ("zip", zipped)):
@@ -128,7 +127,6 @@ def _jobs(plan: Plan, jobs: int | None) -> int:
 
 
 def _chosen(columns: list[str], metrics: list[str], plan: Plan) -> list[str]:
-    """Return the columns of some metrics behind those that say which run it is."""
     head = [name for name in columns if name in ("case", "seed", "status", "why", *plan.parameters)]
     head += [name for name in columns if name == "metric_warnings"]
     known = dict.fromkeys(name.partition(".")[2] or name for name in columns if name not in (*head, *FATE))
