@@ -181,7 +181,7 @@ def machine() -> str:
     with suppress(OSError, StopIteration):
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
         cpu = next(line.partition(":")[2].strip() for line in text.splitlines() if line.startswith("model name"))
-    cores = len(os.sched_getaffinity(0))
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1  # not on macOS
     return f"{cpu}, {cores} core{'s' if cores > 1 else ''}; {platform.system()} {platform.release()}"
 
 
