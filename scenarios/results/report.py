@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 
-from rich.console import Console, RenderableType
-from rich.table import Table
+from rich.console import Console
 from rich.text import Text
 
 from gridpeers.scenarios.checks.check_registry import LAW_FAILED
@@ -76,7 +75,7 @@ def show_summary(report: RunReport, console: Console, after: str, figure: str = 
     `after` is the command to type next if nothing failed and no browser shows runs; `figure` is the kind of picture.
     """
     failed = [*_failures(report)]
-    tail = [Text(line) for line in _claims_in_short(report)]
+    tail = _claims_that_hold(report)
     notes = [*_without_agent(report), *report.notes]
     if report.folder:
         more = f" ({counted(len(notes), 'note')})" if notes else ""
@@ -146,29 +145,24 @@ def _answer(report: RunReport, failed: Sequence[str]) -> Text:
     return Text(_cut(text), "bold red" if failed else "bold")
 
 
+_IN_SHORT = {"f_error_Hz": "f error", "MPSI": "uneven P", "MQSI": "uneven Q", "t_restore_s": "restored in"}
+
+
 def _cases(report: RunReport, room: int) -> list[Text]:
     """Return a row for each case with its largest values after any event, as far as there is room."""
     found, cases = report.findings, [*report.checks]
-    rows = {
-        case: [_worst(found, case, name) for name in ("f_error_Hz", "MPSI", "MQSI", "t_restore_s")] for case in cases
-    }
-    heads = ["f error", "uneven P", "uneven Q", "restored in"]
-    measured = any(found.results.values())  # without an event there is no window to measure in
-    room -= 1 + measured
-    left = cases if len(cases) <= room else cases[: max(room - 1, 1)]
-    table = [[*(heads if measured else ()), "limits"]]
-    table += [[*(rows[case] if measured else ()), _STATES[_state(report, case)][2]] for case in left]
-    widths = [max(len(row[column]) for row in table) for column in range(len(table[0]))]
-    first = [_cut(_case(report, case), max(COLUMNS - sum(widths) - GAP * len(widths), len(case))) for case in left]
-    width = max(map(len, ("case", *first)))
-    lines = []
-    for name, row in zip(("case", *first), table, strict=True):
-        cells = [f"{cell:>{size}}" for cell, size in zip(row[:-1], widths, strict=False)]
-        style = {"law failed": "red", "broken": "red", "kept": "green"}.get(row[-1], "")
-        lines.append(Text.assemble((" " * GAP).join([f"{name:{width}}", *cells, ""]), (row[-1], style)))
-    lines += [Text(f"and {len(cases) - len(left)} more cases: see the report")] * (len(left) < len(cases))
+    columns = _IN_SHORT if any(found.results.values()) else {}  # without an event there is no window to measure in
+    room -= 1 + bool(columns)
+    shown = cases if len(cases) <= room else cases[: max(room - 1, 1)]
+    rows = [["case", *columns.values(), "limits"]]
+    rows += [["", *(_worst(found, it, name) for name in columns), _STATES[_state(report, it)][2]] for it in shown]
+    rest = sum(max(len(row[at]) for row in rows) + GAP for at in range(1, len(rows[0])))
+    for row, case in zip(rows[1:], shown, strict=True):
+        row[0] = _cut(_case(report, case), max(COLUMNS - rest, len(case)))
+    lines = _aligned(rows, left=(0, len(rows[0]) - 1))
+    lines += [Text(f"and {len(cases) - len(shown)} more cases: see the report")] * (len(shown) < len(cases))
     words = "largest values after any event; uneven P, Q: MPSI, MQSI, 0 if shared equally"
-    return lines + [Text(words, "dim")] * measured
+    return lines + [Text(words, "dim")] * bool(columns)
 
 
 def _worst(found: Findings, case: str, name: str) -> str:
@@ -188,12 +182,12 @@ def _worst(found: Findings, case: str, name: str) -> str:
     return f"{max(values):.2f} s" if name == "t_restore_s" else f"{max(values):.3f}{UNITS[name]}"
 
 
-def _claims_in_short(report: RunReport) -> Iterator[str]:
+def _claims_that_hold(report: RunReport) -> list[Text]:
     of = Counter(verdict.status for verdict in report.verdicts)
-    if judged := of.total() - of["NOT RUN"]:
-        rest = f", {counted(of['MISS'], 'known deviation')}" if of["MISS"] else ""
-        rest += f", {of['NOT RUN']} need other cases" if of["NOT RUN"] else ""
-        yield f"{of['PASS']} of {judged} claims{' of the paper' * bool(report.benchmark.numbers)} hold{rest}"
+    rest = f", {counted(of['MISS'], 'known deviation')}" if of["MISS"] else ""
+    rest += f", {of['NOT RUN']} not judged without other cases" if of["NOT RUN"] else ""
+    paper = " of the paper" if report.benchmark.numbers else ""
+    return [Text(f"{of['PASS']} of {of.total() - of['NOT RUN']} claims{paper} hold{rest}")] if report.verdicts else []
 
 
 def _next(report: RunReport, after: str) -> str:
@@ -212,7 +206,7 @@ def _cut(text: str, width: int = COLUMNS) -> str:
 
 
 def _print(report: RunReport, console: Console) -> None:
-    blocks: list[list[RenderableType]] = [
+    blocks: list[list[Text]] = [
         [Text(f"FAILED  case {case}: {first_of(of)}", "bold red") for case, of in report.failures.items() if of],
         *_tables(report),
         [*_claims(report)],
@@ -225,7 +219,7 @@ def _print(report: RunReport, console: Console) -> None:
         if number:
             console.print()
         for line in block:
-            console.print(line, soft_wrap=not isinstance(line, Table))
+            console.print(line, soft_wrap=True)
 
 
 def _without_agent(report: RunReport) -> Iterator[str]:
@@ -242,12 +236,8 @@ def _claims(report: RunReport) -> Iterator[Text]:
         yield Text.assemble(status, f"  {verdict.claim.text:{width}}  ", (verdict.found, "dim"))
         if verdict.status == "MISS":
             yield Text(f"{'':7}  {verdict.claim.known_miss}", style="dim")
-    if report.verdicts:
-        of = Counter(verdict.status for verdict in report.verdicts)
-        rest = f", {of['MISS']} missed for a known reason" if of["MISS"] else ""
-        rest += f", {of['NOT RUN']} not run" if of["NOT RUN"] else ""
-        yield Text(f"{of['PASS']} of {len(report.verdicts) - of['NOT RUN']} claims hold{rest}.")
-        yield from map(Text, report.benchmark.lines(report.findings))
+    yield from _claims_that_hold(report)
+    yield from map(Text, report.benchmark.lines(report.findings) if report.verdicts else ())
 
 
 def _checks(case: str, verdicts: tuple[CheckVerdict, ...]) -> Text:
@@ -255,7 +245,7 @@ def _checks(case: str, verdicts: tuple[CheckVerdict, ...]) -> Text:
     return Text.assemble(("CHECKS", "yellow" if failed else "green"), f"  case {case}: {summary(verdicts)}")
 
 
-def _tables(report: RunReport) -> Iterator[list[RenderableType]]:
+def _tables(report: RunReport) -> Iterator[list[Text]]:
     """Yield our results as the paper's Tables I and II have them, with its numbers beside ours, and own metrics."""
     if any(report.findings.results.values()):  # without events there is no window to measure in
         yield _table_of(report, "Frequency and power sharing", ("f_error_Hz", "MPSI"))
@@ -264,19 +254,22 @@ def _tables(report: RunReport) -> Iterator[list[RenderableType]]:
             yield _own_metrics(report)
 
 
-def _rendered(
-    title: str, header: Sequence[str], rows: Sequence[Sequence[str]], legend: Sequence[str]
-) -> list[RenderableType]:
+def _titled(title: str, header: Sequence[str], rows: Sequence[Sequence[str]], legend: Sequence[str]) -> list[Text]:
     """Return a table whose first two columns name the rows; the lines below it say why a cell is no number."""
-    table = Table(box=None, padding=(0, GAP, 0, 0))
-    for number, column in enumerate(header):
-        table.add_column(Text(column), justify="left" if number < 2 else "right")
+    return [Text(title, "bold"), *_aligned((header, *rows), left=(0, 1)), *(Text(line, "dim") for line in legend)]
+
+
+def _aligned(rows: Sequence[Sequence[str]], left: Collection[int]) -> list[Text]:
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = []
     for row in rows:
-        table.add_row(*(Text(cell, style="red" if cell.endswith("!") else "") for cell in row))
-    return [Text(title, style="bold"), table, *(Text(line, style="dim") for line in legend)]
+        cells = (f"{cell:{'<' if at in left else '>'}{widths[at]}}" for at, cell in enumerate(row))
+        lines.append(Text((" " * GAP).join(cells).rstrip()))
+        lines[-1].highlight_regex(r"\S+ \| \S+ !|(broken|law failed)$", "red")
+    return lines
 
 
-def _table_of(report: RunReport, title: str, quantities: tuple[Quantity, ...]) -> list[RenderableType]:
+def _table_of(report: RunReport, title: str, quantities: tuple[Quantity, ...]) -> list[Text]:
     """Return a table of some quantities; what is shared means nothing over several islands, and is a dash there.
 
     A value that is not steady is no number: the first words of its reason stand there, and all of it below the table.
@@ -297,10 +290,10 @@ def _table_of(report: RunReport, title: str, quantities: tuple[Quantity, ...]) -
     sources = dict.fromkeys(one.source for one in beside)
     against = f", ours | paper's {' and '.join(sources)}" if sources else ""
     if any(found.islands.values()):
-        legend.insert(0, "-: where there are several islands, each shares for itself; see its own row")
+        legend.insert(0, "-: several islands, each of which shares for itself: see the rows of the islands")
     header = ["event", "case", *(heading(quantity, found.f_nom) for quantity in quantities)]
     header += ["restored in"] if timed else []
-    return _rendered(f"{title} after each event{against}", header, rows, legend)
+    return _titled(f"{title} after each event{against}", header, rows, legend)
 
 
 def _places(found: Findings) -> Iterator[tuple[str, str, str, Steady]]:
@@ -338,7 +331,7 @@ def _nothing_shared(values: Steady, name: str) -> bool:
     return values.reasons.get(name, "").startswith("nothing shared")
 
 
-def _own_metrics(report: RunReport) -> list[RenderableType]:
+def _own_metrics(report: RunReport) -> list[Text]:
     own, rows, legend = report.findings.own, [], []
     names = dict.fromkeys(name for of in own.values() for measured in of.values() for name in measured.values)
     for event in dict.fromkeys(event for of in own.values() for event in of):
@@ -346,4 +339,4 @@ def _own_metrics(report: RunReport) -> list[RenderableType]:
             values = (measured.values.get(name) for name in names)
             rows.append([event, _case(report, case), *("-" if value is None else f"{value:.5g}" for value in values)])
             legend += [f"case {case}, {event}: {name} {text}" for name, text in measured.reasons.items()]
-    return _rendered("Metrics of the scenario", ["event", "case", *names], rows, legend)
+    return _titled("Metrics of the scenario", ["event", "case", *names], rows, legend)

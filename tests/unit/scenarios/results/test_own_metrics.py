@@ -208,7 +208,7 @@ def test_a_users_benchmark_stands_beside_ours_and_judges(tmp_path: Path) -> None
 
     assert "ours | paper's Table 7" in text
     assert "0.090 | 0.05 !" in text
-    assert "1 of 1 claims hold.\nnothing more to say\n" in text
+    assert "1 of 1 claims of the paper hold\nnothing more to say\n" in text
 
 
 @pytest.mark.parametrize(

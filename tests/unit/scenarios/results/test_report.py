@@ -82,7 +82,7 @@ def test_what_several_islands_share_together_is_not_told() -> None:
     rows = [line.split() for line in text.splitlines()]
     assert [row[2:] for row in rows if row[1:2] == ["IV"]] == [["0.027", "-", "-"], ["0.0100", "-"]]
     assert [row[4:] for row in rows if row[1:2] == ["island"]] == [["0.041", "0.019", "0.37", "s"], ["0.0900", "0.135"]]
-    assert text.count("-: where there are several islands, each shares for itself") == 2
+    assert text.count("-: several islands, each of which shares for itself") == 2
     assert "-:" not in plain(report())
 
 
