@@ -23,7 +23,7 @@ class Experiment:
     sweep: str = ""
     """The sweep of `scenarios/catalogue/sweeps/` whose rows it draws."""
     scenario: str = ""
-    """The scenario of `scenarios/catalogue/` whose histories it draws, where there is no sweep."""
+    """The scenario of `scenarios/catalogue/` whose histories it draws, without a sweep."""
 
 
 EXPERIMENTS: Mapping[str, Experiment] = {

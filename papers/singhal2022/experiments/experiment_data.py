@@ -1,4 +1,4 @@
-"""The results that an experiment draws from, cases with histories or rows of a sweep, and the theory's predictions."""
+"""The data of an experiment: histories of cases or rows of a sweep, and the predictions of theory."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class CaseData:
         return measures.MPSI(self.histories[case], nameplates_of(self.scenario, self.feeder, case))
 
     def settling(self, case: str, start: float, end: float) -> Settling:
-        """Return how a case settled from a time to another (s)."""
+        """Return the settling of a case between two times (s)."""
         nameplates = nameplates_of(self.scenario, self.feeder, case)
         window = Window(label="", start=start, end=end)
         return measures.settling(self.histories[case], nameplates, window, self.feeder.f_nom)
@@ -56,7 +56,7 @@ class CaseData:
 
 
 def without(inverters: theory.InverterGroup, links: Iterable[tuple[str, str]]) -> theory.InverterGroup:
-    """Return the inverters as if these links (src, dst) were not there."""
+    """Return the inverters without these links (src, dst)."""
     A = np.array(inverters.A)
     for src, dst in links:
         A[inverters.names.index(dst), inverters.names.index(src)] = 0.0
@@ -64,7 +64,7 @@ def without(inverters: theory.InverterGroup, links: Iterable[tuple[str, str]]) -
 
 
 INDEXES = {"t_f_s": ("f", "Frequency within 0.01 Hz"), "t_share_s": ("sharing", "Power shared, MPSI < 0.01")}
-"""The two times of an event that most experiments are about: index, word in a table, title of a panel."""
+"""The two times of an event in most experiments: index, word in a table, title of a panel."""
 
 
 def times_of(predicted: theory.Times) -> dict[str, float]:
@@ -102,7 +102,7 @@ class SweepData:
         return sorted(self.where(equal or {})[column].unique().tolist())
 
     def measured(self, index: str, rows: pd.DataFrame) -> Floats:
-        """Return an index of some rows: infinite for a time that never came, not a number where a run broke."""
+        """Return an index of some rows: infinite for never, nan for a run that broke."""
         values = rows[f"{self.window}.{index}"].to_numpy(float)
         ran = rows["status"].to_numpy() == "ran" if "status" in rows else True
         return np.where(np.isnan(values) & ran & index.startswith("t_"), np.inf, values)
@@ -133,7 +133,7 @@ class SweepData:
 
     @cached_property
     def calm(self) -> theory.ScenarioModel:
-        """The scenario with links that do nothing, its first event alone, and an end before long."""
+        """The scenario with good links, only its first event, and an early end."""
         return theory.first_window(self.base, 3.0)
 
     @cached_property

@@ -36,7 +36,7 @@ wide pale line, which is drawn first and stays visible below others."""
 class Curve:
     x: Floats
     y: Floats
-    """A time that never came is infinite: it is drawn as a sign at the upper edge."""
+    """An infinite value (never) is a mark at the upper edge."""
     style: int
     """Number of its colour and marker: one for the same case in all panels."""
     look: Look = "measured"
@@ -54,7 +54,7 @@ class PlotPanel:
     lines: Sequence[tuple[float, int]] = ()
     """Vertical lines at predicted limits: x, and the style of the curve that it belongs to."""
     spans: Sequence[tuple[float, float]] = ()
-    """Times (s) in which something was down, shaded."""
+    """Shaded times (s), with a link or group cut."""
     level: float | None = None
     """A horizontal line, e.g. the band of the measure."""
     log: Literal["", "x", "y", "xy"] = ""

@@ -33,7 +33,7 @@ RUN = ("case", "node", "link", "law")
 
 
 def hostile(sweep: SweepData) -> ExperimentResult:
-    """Return how far every attack gets against every defence, on every graph."""
+    """Return the effect of every attack against every defence, on every graph."""
     lies = replace(sweep, window=EVENT)
     rows = lies.rows
     attacks = {attack_words(*entries): entries for entries in zip(rows["node"], rows["link"], strict=True)}
@@ -69,7 +69,7 @@ def hostile(sweep: SweepData) -> ExperimentResult:
         for (index, label, limit, ends, least), case in product(MEASURES, GRAPHS)
     ]
     page = PlotPage(
-        title="Agents that lie from 4 s on, as a third of the load is lost; lines: limits of the checks",
+        title="Agents lie from 4 s, when a third of the load is lost; lines: limits of the checks",
         panels=panels,
         columns=len(GRAPHS),
         names=dict(enumerate(defences)),

@@ -170,6 +170,6 @@ def _limit(sweep: SweepData, case: str, index: str, *, of_plant: bool) -> float:
 
 
 def _between(x: Floats, calm: Flags) -> tuple[float, float]:
-    """Return the last delay up to which all is calm, and the next one; infinite where nothing ever swings."""
+    """Return the last calm delay and the next one; infinite without a swing."""
     first = int(np.argmin(calm)) if not calm.all() else len(x)
     return float(x[first - 1]) if first else 0.0, float(x[first]) if first < len(x) else np.inf

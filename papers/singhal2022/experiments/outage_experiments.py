@@ -22,11 +22,11 @@ HELD, EXPIRED, WHOLE = 0, 1, 6
 """Styles."""
 
 LOST = 1.0 - 1e-12
-"""Probability that a message is lost in a partition, for the model, which asks for less than 1."""
+"""Probability of losing a message in a partition, below 1 for the model."""
 
 
 def partition(runs: CaseData) -> ExperimentResult:
-    """Return f and MPSI over time, with their values at the end of the partition and the times to come back."""
+    """Return f and MPSI over time, their values at the end of the partition, and the times to return."""
     split = runs.scenario.cases["halves"].netem.partitions[0]
     event, last, f_nom = runs.scenario.events[-1], runs.scenario.time.end_s, runs.feeder.f_nom
     start, end = split.from_s, split.to_s or last
@@ -147,7 +147,7 @@ def extra_age(rule: theory.Case) -> float:
 
 
 def _flapping_predicted(runs: CaseData, case: str, label: str) -> dict[str, float]:
-    """Return times with the flapping link as one that is always late by its mean age; one that is cut is not there."""
+    """Return times with the flapping link late by its mean age, or without the link if it is cut."""
     rule, inverters = runs.scenario.cases[case], runs.inverters(case)
     late = dict.fromkeys((("inv4", "inv5"), ("inv5", "inv4")), inverters.T_c + extra_age(rule))
     if any(entry.cut for entry in rule.netem.links):

@@ -72,8 +72,8 @@ def test_where_only_the_leaders_act_the_frequency_answers_by_their_weight() -> N
     assert modes(leaders).slowest_rate == pytest.approx(modes(leaders).frequency_rate, rel=1e-9)
 
 
-def test_one_leader_alone_has_nobody_to_share_with() -> None:
-    """Its sharing mode is infinitely fast, its frequency mode kappa."""
+def test_a_lone_leader_has_no_sharing_mode() -> None:
+    """The sharing mode is infinitely fast, and the frequency mode is kappa."""
     alone = inverters("full").part(np.arange(9) == 0)
 
     assert modes(alone).sharing_rate == math.inf
@@ -102,7 +102,7 @@ def random_graph(seed: int, n: int, *, directed: bool = False) -> np.ndarray:
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_it_is_what_its_definition_says(seed: int) -> None:
+def test_robustness_equals_its_definition(seed: int) -> None:
     """For directed and undirected graphs of two to six agents, by all pairs of sets."""
     A = random_graph(seed, 2 + seed % 5, directed=seed % 2 == 0)
 
@@ -131,7 +131,7 @@ def notes(law: dict[str, object], graph: str) -> list[str]:
     return list(robustness_notes(scenario.spec, scenario.feeder))
 
 
-def test_a_graph_that_does_not_bear_F_is_named() -> None:
+def test_a_graph_that_does_not_tolerate_F_gives_a_note() -> None:
     """Of nine agents a full graph (r 5) resists two liars and a ring (r 1) none; without F there is no note."""
     (said,) = notes({"use": "resilient", "F": 3}, "full")
     assert said.startswith("case IV: W-MSR with F = 3 needs a graph with r 7, and this one has r 5: even without liars")

@@ -63,8 +63,8 @@ def drawn(seed: int) -> tuple[InverterGroup, Ticks]:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_the_model_is_the_law(seed: int) -> None:
-    """With any delays of links and measurements the linear map gives the law's own numbers."""
+def test_the_linear_model_equals_the_law(seed: int) -> None:
+    """The linear map gives the law's own numbers with any delays of links and measurements."""
     case, ticks = drawn(seed)
     e, y = plainly(case, ticks, 60)
 
@@ -111,7 +111,7 @@ def test_just_below_the_limit_a_swing_decays_and_just_above_it_grows(graph: str,
 
 @pytest.mark.parametrize("graph", GRAPHS)
 def test_late_neighbours_destabilise_a_star_around_a_leader_alone(graph: str) -> None:
-    """With own values fresh all graphs but one are stable at any delay, and so say the eigenvalues at some of them."""
+    """With fresh own values all graphs but one are stable at any delay; eigenvalues at some delays agree."""
     case = inverters(graph)
     radii = [Loop(inverters=case, ticks=Ticks(link=n)).spectral_radius for n in (0, 8, 26)]
 
@@ -119,8 +119,8 @@ def test_late_neighbours_destabilise_a_star_around_a_leader_alone(graph: str) ->
     assert (max(radii) < 1.0) == (graph != "star")
 
 
-def test_what_the_law_never_moves_is_counted() -> None:
-    """Each part of the graph beyond the first keeps one difference for ever; it is no instability."""
+def test_constant_differences_between_parts_of_the_graph_are_counted() -> None:
+    """Each further part of the graph keeps one difference for ever, which is no instability."""
     apart = dataclasses.replace(inverters("full"), A=np.kron(np.eye(3), 1.0 - np.eye(3)))
 
     assert Loop(inverters=apart).resting == 2
@@ -137,6 +137,6 @@ def test_what_the_law_never_moves_is_counted() -> None:
     ],
 )
 def test_impossible_delays_and_losses_are_refused(ticks: Ticks, said: str) -> None:
-    """A problem of an experiment is told and not computed with."""
+    """They are errors."""
     with pytest.raises(ValueError, match=said):
         _ = Loop(inverters=inverters("path"), ticks=ticks).matrix

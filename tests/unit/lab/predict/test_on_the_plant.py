@@ -29,14 +29,14 @@ def answers() -> VarResponse:
 
 
 def test_the_load_of_islanding_is_found_on_droop_alone(event: LoadStep) -> None:
-    """It is the load that the paper's 0.14 Hz on 1 % droop implies, 0.647 + 0.14 / 0.6, to 1 %."""
+    """It equals the load by the paper's 0.14 Hz at 1 % droop, 0.647 + 0.14 / 0.6, to 1 %."""
     assert event.start_pu == pytest.approx(0.647, abs=1e-6)
     assert event.load_pu == pytest.approx(0.647 + 0.14 / 0.6, rel=0.01)
 
 
 @pytest.mark.parametrize("graph", ["full", "path"])
-def test_with_the_voltage_left_alone_the_predicted_time_to_restore_is_the_plants(graph: str, event: LoadStep) -> None:
-    """Two control periods or 8 % is all that the linear model misses on the plant with its limits and angles."""
+def test_with_constant_V_set_the_plant_restores_in_the_predicted_time(graph: str, event: LoadStep) -> None:
+    """The linear model differs from the plant, which has limits and angles, by two control periods or 8 % at most."""
     predicted = predicted_times(inverters(graph), load=event).report_s
     measured = on_the_plant(graph, still_voltage=True, end_s=4.0).restored
 
@@ -45,7 +45,7 @@ def test_with_the_voltage_left_alone_the_predicted_time_to_restore_is_the_plants
 
 
 def test_a_star_around_a_leader_swings_when_its_links_are_too_slow() -> None:
-    """Agent-agent delay alone destabilises it beyond the predicted limit; around a follower the same delay does not."""
+    """Delay between agents destabilises it beyond the predicted limit, and not a star around a follower."""
     ticks = round(delay_limit(inverters("star"), "neighbours") / T_C) + 10
     leader = on_the_plant("star", link=ticks, end_s=12.0)
     follower = on_the_plant("star around inv2", link=ticks, end_s=12.0)
@@ -55,8 +55,8 @@ def test_a_star_around_a_leader_swings_when_its_links_are_too_slow() -> None:
 
 
 @pytest.mark.parametrize("graph", ["path"])
-def test_vars_are_the_first_to_suffer_from_a_late_plant(graph: str, answers: VarResponse) -> None:
-    """The voltage stays calm a period below the predicted limit of the var law and swings two periods above it."""
+def test_vars_swing_first_with_a_late_plant(graph: str, answers: VarResponse) -> None:
+    """The voltage is calm one period below the predicted limit of the var law, and swings two periods above it."""
     limit = round(var_delay_limit(inverters(graph), answers) / T_C)
     calm = on_the_plant(graph, setpoint=limit - 1, end_s=9.0)
     wild = on_the_plant(graph, setpoint=limit + 2, end_s=9.0)
@@ -66,8 +66,8 @@ def test_vars_are_the_first_to_suffer_from_a_late_plant(graph: str, answers: Var
     assert wild.V[-50:].max() - wild.V[-50:].min() > 0.01
 
 
-def test_an_inverter_without_agent_counts_neither_in_the_run_nor_in_its_prediction() -> None:
-    """It stays on droop: the others restore the frequency and share alike, and both come when predicted."""
+def test_run_and_prediction_leave_out_an_inverter_without_agent() -> None:
+    """It stays on droop; the others restore the frequency and share equally in the predicted times."""
     event = {"label": "islanding", "t_s": 0.5, "open": ["13-152"]}
     scenario = gp.Scenario(
         time={"end_s": 2.5},

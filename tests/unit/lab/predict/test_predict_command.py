@@ -23,8 +23,8 @@ links = [["inv1", "inv2"], ["inv2", "inv3"], ["inv4", "inv5"], ["inv5", "inv6"],
 pytestmark = pytest.mark.usefixtures("elsewhere")
 
 
-def test_every_case_is_told_within_a_hundred_columns_and_without_nan(elsewhere: Path) -> None:
-    """All of the paper's cases and a graph in parts, each with words instead of what does not exist."""
+def test_every_case_is_printed_within_a_hundred_columns_and_without_nan(elsewhere: Path) -> None:
+    """The paper's cases and an unconnected graph; words replace missing numbers."""
     (elsewhere / "mine.toml").write_text(ISLANDING.replace('paper = "islanding"', "") + APART)
 
     code, text = invoke("predict", "mine.toml")
@@ -41,7 +41,7 @@ def test_every_case_is_told_within_a_hundred_columns_and_without_nan(elsewhere: 
     assert re.search(r"sharing 2 % +never", blocks["apart"])
 
 
-def test_who_leaves_and_returns_is_predicted_too() -> None:
+def test_leave_and_return_are_predicted() -> None:
     """Plug-n-play: both events restored, the return without a step of the load."""
     code, text = invoke("predict", "plug-n-play", "--case", "IV", "--no-vars")
 
@@ -59,8 +59,8 @@ def test_who_leaves_and_returns_is_predicted_too() -> None:
         (["predict", "bad.toml"], "bad.toml:15: time.T_c_s: 20 s is not plausible"),
     ],
 )
-def test_bad_input_is_told_as_by_the_other_commands(elsewhere: Path, words: list[str], said: str) -> None:
-    """Exit code 2 and a line that says what would be right."""
+def test_bad_input_is_refused_as_by_the_other_commands(elsewhere: Path, words: list[str], said: str) -> None:
+    """Exit code 2 and a line with the remedy."""
     (elsewhere / "bad.toml").write_text(ISLANDING.replace("T_c_s = 0.02", "T_c_s = 20"))
 
     code, text = invoke(*words)
