@@ -33,7 +33,7 @@ def fates(judge: Channel, numbers: Iterable[int], size: int = 120) -> list[Fate]
 
 
 def delays(judge: Channel, n: int) -> list[float]:
-    """Delay (s) of the first copies of n messages, of which none is lost."""
+    """Delay (s) of the first copy of each of n messages; no message is lost."""
     return [fate.deliveries[0][0] for fate in fates(judge, range(n))]
 
 

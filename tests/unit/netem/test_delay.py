@@ -28,7 +28,7 @@ LAWS = {
 
 @pytest.mark.parametrize("name", LAWS)
 def test_delays_follow_their_law(name: str) -> None:
-    """A Kolmogorov-Smirnov test against scipy's own form of the law does not tell the drawn delays from it."""
+    """A Kolmogorov-Smirnov test accepts the drawn delays as samples of scipy's own form of the law."""
     model, law = LAWS[name]
 
     assert stats.kstest(delays(channel(delay=model), N), law.cdf).pvalue > 0.01
@@ -36,7 +36,7 @@ def test_delays_follow_their_law(name: str) -> None:
 
 @pytest.mark.parametrize("name", LAWS)
 def test_the_quantile_is_that_of_the_law(name: str) -> None:
-    """It agrees with scipy's, from the first thousandth of a millionth to the last."""
+    """It agrees with scipy's from u = 1e-9 to 1 - 1e-9."""
     model, law = LAWS[name]
 
     for u in (1e-9, 0.001, 0.3, 0.5, 0.9, 1 - 1e-9):
@@ -45,8 +45,8 @@ def test_the_quantile_is_that_of_the_law(name: str) -> None:
 
 @pytest.mark.parametrize("phi", [0.5, 0.95])
 @pytest.mark.parametrize("name", ["normal, truncated", "pareto"])
-def test_correlated_delays_keep_their_law_and_are_autoregressive_beneath_it(name: str, phi: float) -> None:
-    """The normal scores of correlated delays are an AR(1) process, of standard normal, independent innovations."""
+def test_correlated_delays_keep_their_law_and_come_from_an_ar1_process(name: str, phi: float) -> None:
+    """The normal scores of correlated delays are an AR(1) process with independent standard normal innovations."""
     model, law = LAWS[name]
     drawn = delays(channel(delay=msgspec.structs.replace(model, correlation=phi)), N)
     scores = [NormalDist().inv_cdf(share) for share in law.cdf(drawn)]
@@ -59,8 +59,8 @@ def test_correlated_delays_keep_their_law_and_are_autoregressive_beneath_it(name
 
 @steady
 @given(st.lists(st.floats(0.0, 5.0), min_size=1, max_size=20), st.booleans())
-def test_a_trace_is_played_in_order_and_again(recorded: list[float], spread: bool) -> None:
-    """Message n has the delay n places after the link's start, which without spread is the first of the trace."""
+def test_a_trace_repeats_in_order(recorded: list[float], spread: bool) -> None:
+    """Message n has row (start + n) of the trace; without spread every link starts at the first row."""
     drawn = delays(channel(delay=Trace(delays_s=tuple(recorded), spread=spread)), 2 * len(recorded))
 
     starts = range(len(recorded)) if spread else (0,)
@@ -72,7 +72,7 @@ def test_a_trace_is_played_in_order_and_again(recorded: list[float], spread: boo
 @steady
 @given(st.integers(0, 50), st.floats(0.05, 0.5))
 def test_fifo_delays_never_let_a_message_overtake(seed: int, sigma: float) -> None:
-    """With fifo arrivals are in the order of sending, and no delay is shortened; without it, some are not."""
+    """With fifo, messages arrive in the order of sending, and no delay gets shorter; without it, some overtake."""
     model = Lognormal(median_s=0.1, sigma=2 * sigma)
     free = delays(channel(seed, delay=model), 200)
     kept = delays(channel(seed, delay=Lognormal(median_s=0.1, sigma=2 * sigma, fifo=True)), 200)
@@ -82,8 +82,8 @@ def test_fifo_delays_never_let_a_message_overtake(seed: int, sigma: float) -> No
     assert all(short <= long + 1e-12 for short, long in zip(free, kept, strict=True))
 
 
-def test_a_delay_that_changes_in_time_keeps_the_draws_of_each_message() -> None:
-    """Which entry holds is a matter of time, which number is drawn one of the message: the two do not mix."""
+def test_a_change_of_the_delay_leaves_the_random_number_of_each_message() -> None:
+    """Time decides the entry, and the message number decides the random number; neither affects the other."""
     whole = fates(channel(delay=Uniform(low_s=0.0, high_s=1.0)), range(100))
     late = fates(channel(delay=Uniform(low_s=0.0, high_s=1.0), from_s=1.0), range(100))
 

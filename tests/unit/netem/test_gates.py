@@ -22,8 +22,8 @@ def spans(*entries: tuple[str, float, float, object]) -> Channel:
 
 @steady
 @given(st.integers(0, 500), st.integers(0, 500))
-def test_a_cut_drops_what_is_sent_from_its_beginning_up_to_its_end(start: int, end: int) -> None:
-    """Of messages at ticks k T_c, those of start <= k < end are dropped, whatever binary makes of k T_c."""
+def test_a_cut_drops_messages_sent_from_its_start_until_before_its_end(start: int, end: int) -> None:
+    """Messages of ticks start <= k < end are dropped, whatever the rounding of k T_c."""
     assume(start < end)
     judge = channel(cut=True, from_s=round(start * 0.02, 9), to_s=round(end * 0.02, 9))
 
@@ -32,7 +32,7 @@ def test_a_cut_drops_what_is_sent_from_its_beginning_up_to_its_end(start: int, e
     assert dropped == list(range(start, min(end, 501)))
 
 
-def test_a_holding_cut_lets_everything_go_at_its_end() -> None:
+def test_a_holding_cut_releases_all_messages_at_its_end() -> None:
     """With hold, messages of the cut arrive together when it ends; none is lost."""
     kept = fates(spans(("cut", 0.1, 0.5, Cut(hold=True)), ("delay", 0.0, 9.0, Constant(delay_s=0.01))), range(40))
 
@@ -42,8 +42,8 @@ def test_a_holding_cut_lets_everything_go_at_its_end() -> None:
     assert {fate.held_until for fate in kept[5:25]} == {0.5}
 
 
-def test_what_a_cut_lets_go_into_another_cut_meets_that_one() -> None:
-    """A kept message is lost if the link is down where it would go on, and kept on where it is kept again."""
+def test_messages_released_by_one_cut_meet_the_next_cut() -> None:
+    """A released message is lost by a cut that loses, and held again by a cut that holds."""
     lost = spans(("cut", 0.0, 1.0, Cut(hold=True)), ("partition", 1.0, 2.0, Cut()))
     kept = spans(("cut", 0.0, 1.0, Cut(hold=True)), ("flap", 0.0, 9.0, Flap(up_s=0.5, down_s=1.0, hold=True)))
 
@@ -53,8 +53,8 @@ def test_what_a_cut_lets_go_into_another_cut_meets_that_one() -> None:
 
 @steady
 @given(st.integers(1, 20), st.integers(1, 20), st.integers(0, 300))
-def test_a_flap_is_up_and_down_in_turn(up: int, down: int, start: int) -> None:
-    """From its beginning on, a flapping link is up for up_s and down for down_s, tick by tick."""
+def test_a_flap_alternates_between_up_and_down(up: int, down: int, start: int) -> None:
+    """From its start on, a flapping link is up for up_s and down for down_s, tick by tick."""
     flap = Flap(up_s=round(up * T_C, 9), down_s=round(down * T_C, 9))
     judged = fates(channel(flap=flap, from_s=round(start * T_C, 9)), range(400))
 
@@ -64,8 +64,8 @@ def test_a_flap_is_up_and_down_in_turn(up: int, down: int, start: int) -> None:
 
 @steady
 @given(st.integers(1, 40), st.integers(0, 40), st.integers(1, 40), st.integers(0, 2000))
-def test_a_message_goes_in_the_first_slot_that_is_open(period: int, offset: int, length: int, tick: int) -> None:
-    """It goes at once if a slot is open, else at the beginning of the next, as counted in whole milliseconds."""
+def test_a_message_leaves_in_the_first_open_slot(period: int, offset: int, length: int, tick: int) -> None:
+    """It leaves at once in an open slot, else at the start of the next; a count in whole milliseconds agrees."""
     assume(offset < period and length <= period)
     slots = Slots(period_s=period / 1000, offset_s=offset / 1000, length_s=length / 1000)
 
@@ -78,8 +78,8 @@ def test_a_message_goes_in_the_first_slot_that_is_open(period: int, offset: int,
 @given(
     st.lists(st.tuples(st.integers(0, 300), st.integers(1, 400)), max_size=40), st.integers(1, 20), st.integers(1, 900)
 )
-def test_a_slow_line_sends_one_byte_after_the_other(gaps: list[tuple[int, int]], rate: int, queue: int) -> None:
-    """Messages fare as on a line that is counted byte by byte: in order, with waiting, and with a full queue."""
+def test_a_slow_line_sends_byte_after_byte(gaps: list[tuple[int, int]], rate: int, queue: int) -> None:
+    """A simulation byte by byte gives the same times and drops, with waiting and with a full queue."""
     judge = channel(rate=Rate(bytes_per_s=1000.0 * rate, queue_bytes=queue))
     now, free = 0, 0.0  # ms; bytes per ms is the rate
     for seq, (gap, size) in enumerate(gaps):
@@ -94,8 +94,8 @@ def test_a_slow_line_sends_one_byte_after_the_other(gaps: list[tuple[int, int]],
             assert fate.deliveries[0][0] == pytest.approx((free - now) / 1000, abs=1e-9)
 
 
-def test_everything_at_once_adds_up_in_the_order_told() -> None:
-    """Kept by a cut to 1.0 s, 0.1 s on the line, on to the slot at 1.25 s, 0.5 s of delay, and a copy 0.125 s later."""
+def test_all_faults_together_act_in_the_documented_order() -> None:
+    """Held by a cut until 1.0 s, 0.1 s on the line, slot at 1.25 s, 0.5 s of delay, and a copy 0.125 s later."""
     judge = spans(
         ("cut", 0.0, 1.0, Cut(hold=True)),
         ("rate", 0.0, 9.0, Rate(bytes_per_s=1000.0)),

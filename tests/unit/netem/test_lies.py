@@ -26,14 +26,14 @@ def state(k: int, sender: str = "inv3") -> State:
 
 
 def heard(lie: Lie, receiver: str = "inv1", *, seed: int = 1, since: float = 1.0, until: float = 2.0) -> list[State]:
-    """Return what a receiver hears of inv3 in ticks 0 to 29."""
+    """Return the states of inv3 that a receiver hears in ticks 0 to 29."""
     live = LiveHearing(HeardFrom(seed, "inv3", receiver, [LieTime(since, until, "inv3", lie)]))
     return [live.told(state(k)) for k in range(30)]
 
 
 @pytest.mark.parametrize("lie", LIES, ids=lambda lie: type(lie).__name__)
 def test_a_lie_is_a_valid_message_with_the_number_and_time_of_the_true_one(lie: Lie) -> None:
-    """What is heard decodes, keeps sender, epoch, number, time and island, and is true outside of its time."""
+    """A false state decodes and keeps sender, epoch, number, time and island; outside of the lie, states are true."""
     for k, told in enumerate(heard(lie)):
         true = state(k)
         assert decode(encode(told)) == told
@@ -41,8 +41,8 @@ def test_a_lie_is_a_valid_message_with_the_number_and_time_of_the_true_one(lie: 
         assert (told != true) == (10 <= k < 20), k
 
 
-def test_each_lie_says_what_its_name_says() -> None:
-    """Offsets add, factors multiply, a freeze stays, a replay is late, extremes are the bounds of the fields."""
+def test_each_lie_changes_values_as_its_name_says() -> None:
+    """Offsets add, factors multiply, a freeze repeats, a replay is late, extremes are the bounds of the fields."""
     assert heard(Offset(P_set_W=5.0, Q_var=2.0))[12].P_set == 12_005.0
     assert heard(Scale(Q=-2.0))[12].Q == -240.0
     assert {told.P_set for told in heard(Freeze())[10:20]} == {9000.0}
@@ -51,8 +51,8 @@ def test_each_lie_says_what_its_name_says() -> None:
     assert [(told.P_set, told.V_set) for told in heard(Extreme(side="alternate"))[10:12]] == [(1e11, 1e6), (-1e11, 0.0)]
 
 
-def test_random_lies_depend_on_seed_and_number_and_only_the_two_faced_on_who_hears() -> None:
-    """All neighbours hear the same noise of one seed, unless the liar is two-faced; another seed has other noise."""
+def test_only_a_two_faced_random_lie_depends_on_the_receiver() -> None:
+    """Otherwise seed and message number alone decide the noise: all neighbours hear the same."""
     plain, faced = Random(P_set_W=1e3), Random(P_set_W=1e3, two_faced=True)
     values = [told.P_set - 1000.0 * k for k, told in enumerate(heard(plain))][10:20]
 
@@ -63,8 +63,8 @@ def test_random_lies_depend_on_seed_and_number_and_only_the_two_faced_on_who_hea
     assert heard(faced) != heard(faced, "inv2")
 
 
-def test_who_hears_a_lie() -> None:
-    """Neighbours do, the plant only if the entry says so; a liar does not believe what it says in another's name."""
+def test_neighbours_hear_a_lie_and_the_plant_only_if_the_entry_says_so() -> None:
+    """A liar itself hears the true states of an agent in whose name it lies."""
     own = NodeFault(name="inv3", lies=Offset(P_set_W=1.0))
     other = NodeFault(name="inv4", lies=Scale(Q=2.0, in_name_of="inv3", plant=True))
     netem = Netem(nodes=(other, own))

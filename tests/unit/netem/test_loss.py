@@ -37,7 +37,7 @@ def lost(model: LossModel, n: int = N) -> list[bool]:
 
 @pytest.mark.parametrize("p", [0.001, 0.02, 0.5, 0.9])
 def test_independent_losses_are_as_frequent_as_configured(p: float) -> None:
-    """A binomial test does not tell the losses from those of probability p, nor a run test from independent ones."""
+    """A binomial test accepts probability p, and a run test accepts independence."""
     drawn = lost(Bernoulli(p=p))
     pairs = Counter(pairwise(drawn))
 
@@ -47,7 +47,7 @@ def test_independent_losses_are_as_frequent_as_configured(p: float) -> None:
 
 @pytest.mark.parametrize("name", PATTERNS)
 def test_patterns_of_losses_have_the_probabilities_of_the_chain(name: str) -> None:
-    """Over 8000 seeds, each pattern of six messages with gaps over a start of the chain is as frequent as it should."""
+    """Over 8000 seeds, each pattern of six messages, also across a restart of the chain, has its frequency."""
     model, numbers = PATTERNS[name], (0, 1, 3, RESTART, RESTART + 1, RESTART + 3)
     drawn: Counter[tuple[bool, ...]] = Counter()
     for seed in range(8000):
@@ -68,7 +68,7 @@ def test_patterns_of_losses_have_the_probabilities_of_the_chain(name: str) -> No
 
 
 def probability(model: LossModel, numbers: Sequence[int], lost: Sequence[bool]) -> float:
-    """Probability of one pattern of losses, by going along the chain message by message."""
+    """Probability of one pattern of losses, message by message along the chain."""
     P, pi, loss = np.array(model.transitions), np.array(model.stationary), np.array(model.loss_in_state)
     state, before = pi, None
     for number, is_lost in zip(numbers, lost, strict=True):
@@ -81,16 +81,16 @@ def probability(model: LossModel, numbers: Sequence[int], lost: Sequence[bool]) 
 
 @steady
 @given(st.integers(0, 20), st.floats(0.0, 0.9), st.floats(0.0, 0.1))
-def test_a_higher_loss_loses_what_a_lower_one_loses_and_more(seed: int, p: float, more: float) -> None:
-    """A message's number is the same whatever the probability: sweeps over loss compare like with like."""
+def test_messages_lost_at_a_lower_probability_are_lost_at_a_higher_one(seed: int, p: float, more: float) -> None:
+    """The random number of a message does not depend on the probability, so sweeps over loss compare like with like."""
     low = fates(channel(seed, loss=p), range(200))
     high = fates(channel(seed, loss=p + more), range(200))
 
     assert {i for i, fate in enumerate(low) if fate.reason} <= {i for i, fate in enumerate(high) if fate.reason}
 
 
-def test_corrupted_messages_have_any_bit_flipped_alike() -> None:
-    """Corruption comes with probability p, and each bit of a message is as likely as any other."""
+def test_corruption_flips_every_bit_with_equal_probability() -> None:
+    """A message is corrupted with probability p, and each of its bits is equally likely."""
     bits = [fate.deliveries[0][1] for fate in fates(channel(corrupt=Corrupt(p=0.2)), range(N), size=4)]
     flipped = Counter(bit for bit in bits if bit is not None)
 
@@ -100,7 +100,7 @@ def test_corrupted_messages_have_any_bit_flipped_alike() -> None:
 
 @steady
 @given(st.binary(min_size=1, max_size=40), st.data())
-def test_a_flip_changes_one_bit_and_undoes_itself(payload: bytes, data: st.DataObject) -> None:
+def test_a_flip_changes_one_bit_and_a_second_flip_restores_it(payload: bytes, data: st.DataObject) -> None:
     """A flipped payload differs in exactly one bit."""
     bit = data.draw(st.integers(0, 8 * len(payload) - 1))
     flipped = flip(payload, bit)
@@ -110,7 +110,7 @@ def test_a_flip_changes_one_bit_and_undoes_itself(payload: bytes, data: st.DataO
 
 
 def test_numbers_are_uniform_normal_and_independent_from_one_to_the_next() -> None:
-    """The draws that the laws are made of have the distribution they claim, along the messages of a link."""
+    """The draws behind all models have their distribution along the messages of a link."""
     stream = Stream(3, "inv1", "inv2", "loss")
     uniform = [stream.uniform(seq) for seq in range(N)]
     normal = [stream.normal(seq, 1) for seq in range(N)]
@@ -132,8 +132,8 @@ def test_every_seed_link_and_purpose_has_numbers_of_its_own(keys: list[tuple[str
 
 @steady
 @given(st.lists(st.integers(0, 3 * RESTART), min_size=1, max_size=5))
-def test_a_chains_state_depends_on_the_number_and_not_on_what_was_asked_before(numbers: list[int]) -> None:
-    """A receiver that missed messages, or joined late, is in the state of one that saw them all."""
+def test_the_state_of_a_chain_depends_only_on_the_message_number(numbers: list[int]) -> None:
+    """A receiver that missed messages or joined late has the same state as one that saw them all."""
     uniform = Stream(1, "a", "b", "x").uniform
     jumping = Chain(uniform, lambda x, seq: 0.9 * x + uniform(seq))
 

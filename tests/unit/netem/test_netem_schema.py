@@ -84,7 +84,7 @@ def test_a_scenarios_entries_are_read_as_written() -> None:
         ),
     ],
 )
-def test_a_lie_that_cannot_be_says_where_and_why(text: str, path: str, words: list[str]) -> None:
+def test_an_impossible_lie_is_a_problem_at_its_key(text: str, path: str, words: list[str]) -> None:
     """The only problem found, at its key; those of links, partitions and other nodes are in tests/golden/problems."""
     (found,) = problems_of(text)
 
@@ -104,10 +104,10 @@ def test_a_lie_that_cannot_be_says_where_and_why(text: str, path: str, words: li
         ({"on": "MG1 -> MG2", "cut": True}, {"on": "inv1 -> inv4", "cut": Cut(hold=True), "from_s": 5.0}, True),
     ],
 )
-def test_two_entries_of_one_kind_link_and_time_contradict_each_other(
+def test_two_entries_of_one_kind_on_one_link_at_one_time_contradict_each_other(
     first: dict[str, Any], second: dict[str, Any], clash: bool
 ) -> None:
-    """Only entries that meet on a link, in time and in kind are a problem, which names the link and the other entry."""
+    """Only entries of equal link, time and kind are a problem, which names the link and the other entry."""
     found = Netem(links=(Fault(**first), Fault(**second))).problems(NAMES, MICROGRIDS, 10.0)
 
     assert [problem.path.partition(".")[0] for problem in found] == ["link[1]"] * clash
@@ -125,7 +125,7 @@ def test_two_entries_of_one_kind_link_and_time_contradict_each_other(
     ],
 )
 def test_a_partition_cuts_exactly_the_links_between_its_groups(partition: Partition, groups: list[list[str]]) -> None:
-    """Within a group all hear each other; of two groups nobody does; the plant hears all unless it is in a group."""
+    """Agents hear each other within a group and not across groups; the plant hears all unless it is in a group."""
     group = {name: i for i, names in enumerate(groups) for name in names}
     for src, dst in links_among(NAMES):
         apart = src in group and dst in group and group[src] != group[dst]
@@ -133,7 +133,7 @@ def test_a_partition_cuts_exactly_the_links_between_its_groups(partition: Partit
 
 
 def test_a_partition_by_island_follows_the_switches() -> None:
-    """While all are in one island nothing is cut; from the split on, links between islands are."""
+    """Nothing is cut while there is one island; after the split, links between islands are cut."""
     timeline = [(0.0, dict.fromkeys(NAMES, "grid")), (2.0, MICROGRIDS), (4.0, dict.fromkeys(NAMES, "inv1"))]
     netem = Netem(partitions=(Partition(by="island", from_s=1.0),)).over(timeline)
 
@@ -142,8 +142,8 @@ def test_a_partition_by_island_follows_the_switches() -> None:
 
 
 @pytest.mark.parametrize("name", PROFILES)
-def test_a_profile_is_plausible_and_tells_its_source(name: str) -> None:
-    """Every profile passes the checks that a user's numbers pass, and says what is assumed or where it is from."""
+def test_a_profile_is_plausible_and_names_its_source(name: str) -> None:
+    """Every profile passes the checks of a user's numbers, and names its source or its assumptions."""
     fault = Fault(on="* <-> *", profile=name)
 
     assert not Netem(links=(fault,)).problems(NAMES, MICROGRIDS, 10.0)
@@ -162,8 +162,8 @@ def test_a_profile_is_plausible_and_tells_its_source(name: str) -> None:
         cut=st.sampled_from([None, True, Cut(hold=True)]),
     )
 )
-def test_what_is_plausible_is_no_problem_and_survives_the_way_to_an_agent(fault: Fault) -> None:
-    """Numbers within their ranges pass, and an agent is told exactly what the file says."""
+def test_plausible_faults_have_no_problem_and_reach_an_agent_unchanged(fault: Fault) -> None:
+    """Numbers within their ranges pass, and the agent's configuration equals the file."""
     assert fault.problems() == [] or fault.models() == {}
     assert msgspec.json.decode(msgspec.json.encode(fault), type=Fault) == fault
 
@@ -179,7 +179,7 @@ def test_a_traces_file_is_read_from_the_scenarios_folder(tmp_path: Path) -> None
 
 
 def test_a_trace_with_decimal_commas_has_its_delays(tmp_path: Path) -> None:
-    """One column and no separator: 0,012 is 12 ms, and was 0 s without a word."""
+    """In one column without a separator, 0,012 is 12 ms and not 0 s."""
     (tmp_path / "d.csv").write_bytes("delay_s\r\n0,012\r\n0,5\r\n".encode("utf-16"))
 
     netem, wrong = with_traces(Netem(links=(Fault(on="* -> *", delay=Trace(file="d.csv")),)), tmp_path)
@@ -217,8 +217,8 @@ def test_bad_rows_of_a_trace_are_named(tmp_path: Path, rows: str | None, words: 
 TEXT = (Path(__file__).parents[3] / "docs" / "reference" / "link-faults.md").read_text(encoding="utf-8")
 
 
-def test_every_model_with_its_keys_every_kind_and_every_profile_is_told_of() -> None:
-    """Nothing that a scenario may say is missing from the tables."""
+def test_the_page_has_every_model_with_its_keys_every_kind_and_every_profile() -> None:
+    """No name of a scenario file is missing from the tables of docs/reference/link-faults.md."""
     for model in (*get_args(AnyDelay), *get_args(AnyLoss), *get_args(AnyLie)):
         (row,) = re.findall(rf"^\| `{model.__struct_config__.tag}` \|.*$", TEXT, flags=re.M)
         keys = {field.encode_name for field in msgspec.structs.fields(model)} - {

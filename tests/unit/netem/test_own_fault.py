@@ -64,7 +64,7 @@ def channel(entry: Fault, seed: int = 1) -> Channel:
     return Channel(LINK, entry.spans(*LINK, {}), seed)
 
 
-def test_its_numbers_are_looked_up_so_that_every_driver_has_the_same(folder: str) -> None:
+def test_its_random_numbers_are_the_same_under_every_driver(folder: str) -> None:
     """A message's fate depends on seed, link and number alone, not on which messages were judged before it."""
     entry = fault(folder, "Jam", parameters=(("share", 0.5),))
     one, other = channel(entry), channel(msgspec.json.decode(msgspec.json.encode(entry), type=Fault))
@@ -78,8 +78,8 @@ def test_its_numbers_are_looked_up_so_that_every_driver_has_the_same(folder: str
     assert fates != [channel(entry, seed=2).judge(seq, 0.02 * seq, 100) for seq in range(200)]
 
 
-def test_it_adds_to_a_delay_and_leaves_other_faults_their_fates(folder: str) -> None:
-    """It acts after loss: what is lost is lost with it or without."""
+def test_it_adds_delay_and_leaves_the_fates_of_other_faults(folder: str) -> None:
+    """It acts after loss: the same messages are lost with it and without it."""
     both = channel(fault(folder, "Jam", delay=0.2, loss=0.3))
     plain = channel(Fault(on="inv1 -> inv2", delay=0.2, loss=0.3))
     pairs = [(both.judge(seq, 0.02 * seq, 100), plain.judge(seq, 0.02 * seq, 100)) for seq in range(100)]
@@ -100,7 +100,7 @@ def test_it_adds_to_a_delay_and_leaves_other_faults_their_fates(folder: str) -> 
     ],
 )
 def test_a_fault_that_fails_is_ignored_from_then_on_and_reported_once(folder: str, name: str, said: str) -> None:
-    """The messages go on as if it were not there; the report of the link has the sentence."""
+    """Messages then pass as without it; the report of the link has the sentence."""
     receiver = Receiver("inv2", Netem(links=(fault(folder, name),)), {"inv1": "MG1", "inv2": "MG1"})
     for seq in range(6):
         receiver.offer("inv1", seq, 0.02 * seq, 0.02 * seq, b"state")
@@ -112,8 +112,8 @@ def test_a_fault_that_fails_is_ignored_from_then_on_and_reported_once(folder: st
     assert receiver.take_failures() == ()
 
 
-def test_nobody_can_have_a_running_run_import_a_module(folder: str) -> None:
-    """A live order with a fault of somebody's own is no order; in the setup of a run it travels unharmed."""
+def test_a_live_command_cannot_make_a_run_import_a_module(folder: str) -> None:
+    """A live command with a user-defined fault is rejected; the setup of a run may contain one."""
     entry = fault(folder, "Jam")
     setup = EmulationConfig(netem=Netem(links=(entry,)), microgrids={"inv1": "MG1"})
 

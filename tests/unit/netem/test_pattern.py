@@ -40,7 +40,7 @@ def pairs(left: list[str], right: list[str]) -> set[Link]:
         ("MG1->inv5", pairs(NAMES[:3], ["inv5"])),
     ],
 )
-def test_a_pattern_means_these_links(pattern: str, links: set[Link]) -> None:
+def test_a_pattern_matches_these_links(pattern: str, links: set[Link]) -> None:
     """Names, microgrids in any case, sets, all agents, and the plant where it is named."""
     assert meant(pattern) == links
     assert objections(pattern, NAMES, MICROGRIDS) == []
@@ -54,12 +54,12 @@ side = st.one_of(
 
 @steady
 @given(side, side)
-def test_both_ways_is_one_way_and_the_other(left: str, right: str) -> None:
-    """`<->` means what the two arrows mean together."""
+def test_a_double_arrow_matches_both_directions(left: str, right: str) -> None:
+    """`<->` matches the links of both single arrows."""
     assert meant(f"{left} <-> {right}") == meant(f"{left} -> {right}") | meant(f"{right} -> {left}")
 
 
-def test_a_newcomer_is_meant_by_patterns_written_before_it_came() -> None:
+def test_patterns_match_an_agent_that_joins_later() -> None:
     """A spare inverter matches by its microgrid and by `*` as soon as it is known."""
     known = MICROGRIDS | {"inv10": "MG3"}
 
@@ -78,8 +78,8 @@ def test_a_newcomer_is_meant_by_patterns_written_before_it_came() -> None:
         ("plant -> {plant, plant}", ["matches no link: both ends are plant;", 'e.g. "plant <-> *"']),
     ],
 )
-def test_a_pattern_that_means_nothing_is_told_why(pattern: str, words: list[str]) -> None:
-    """The problem quotes the pattern and says what would be right."""
+def test_a_pattern_without_a_link_is_a_problem(pattern: str, words: list[str]) -> None:
+    """The problem quotes the pattern and names the right form."""
     (text,) = objections(pattern, NAMES, MICROGRIDS)
 
     assert all(word in text for word in words), text
@@ -94,7 +94,7 @@ def test_a_pattern_that_means_nothing_is_told_why(pattern: str, words: list[str]
         ("* -> *", [], "there is no inverter"),
     ],
 )
-def test_only_what_is_no_link_in_any_run_is_refused_before_names_are_known(
+def test_before_names_are_known_only_patterns_without_any_possible_link_are_refused(
     pattern: str, agents: list[str] | None, words: str
 ) -> None:
     """A microgrid may have the name of an inverter."""

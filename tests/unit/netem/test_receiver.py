@@ -44,7 +44,7 @@ def faults(on: str) -> st.SearchStrategy[Fault]:
 
 
 def send(to: Receiver, ticks: range, *sources: str) -> list[Arrival]:
-    """Arrivals of a message a tick from each source, taken at every tick."""
+    """Arrivals of one message per tick from each source, taken at every tick."""
     arrived = []
     for k in ticks:
         for src in sources or ("inv1",):
@@ -61,8 +61,8 @@ def outcomes(traces: tuple[LinkTrace, ...]) -> dict[str, Any]:
 @given(
     st.lists(faults("* -> inv2"), max_size=4), st.lists(st.tuples(st.integers(1, 99), faults("* -> inv2")), max_size=3)
 )
-def test_accounting_closes_whatever_happens(entries: list[Fault], live: list[tuple[int, Fault]]) -> None:
-    """At every tick sent + duplicated = delivered + dropped + in flight, and what is handed out counts as delivered."""
+def test_the_account_of_every_link_balances(entries: list[Fault], live: list[tuple[int, Fault]]) -> None:
+    """At every tick sent + duplicated = delivered + dropped + in flight, and delivered has all handed out."""
     to = receiver(*entries)
     handed = 0
     for k in range(100):
@@ -81,7 +81,7 @@ def test_accounting_closes_whatever_happens(entries: list[Fault], live: list[tup
 
 @steady
 @given(faults("inv1 -> inv2"), faults("* -> inv3"), faults("inv4 -> inv2"), st.integers(1, 5))
-def test_nothing_elsewhere_changes_a_links_fates(own: Fault, other: Fault, third: Fault, extra: int) -> None:
+def test_faults_elsewhere_change_no_fate_on_a_link(own: Fault, other: Fault, third: Fault, extra: int) -> None:
     """Faults and agents on other links leave every verdict of a link as it was."""
     alone, among = receiver(own), receiver(third, other, own)
     send(alone, range(100))
@@ -92,8 +92,8 @@ def test_nothing_elsewhere_changes_a_links_fates(own: Fault, other: Fault, third
 
 @steady
 @given(st.sets(st.sampled_from(["delay", "loss", "duplicate", "corrupt", "slots"]), min_size=1), st.integers(0, 90))
-def test_a_cut_on_a_link_shifts_no_other_fate_on_it(kinds: set[str], start: int) -> None:
-    """Before and after a cut each message fares as if there had been none."""
+def test_a_cut_changes_no_fate_before_or_after_it(kinds: set[str], start: int) -> None:
+    """Each message before and after a cut has the fate that it has without the cut."""
     own = {kind: KINDS[kind] for kind in kinds}
     whole, cut = (
         receiver(Fault(on="inv1 -> inv2", **own)),
@@ -114,8 +114,8 @@ def test_a_cut_on_a_link_shifts_no_other_fate_on_it(kinds: set[str], start: int)
 
 @steady
 @given(st.sets(st.sampled_from(["delay", "loss", "duplicate", "corrupt"]), min_size=1), st.sets(st.integers(0, 99)))
-def test_a_message_fares_alike_in_simulated_and_real_time(kinds: set[str], missed: set[int]) -> None:
-    """Times that wander, a way that takes time and messages never seen change no fate, nor does another process."""
+def test_a_message_has_the_same_fate_in_simulated_and_real_time(kinds: set[str], missed: set[int]) -> None:
+    """Jitter, the delay of real links, unseen messages and other processes change no fate."""
     fault = Fault(on="inv1 -> inv2", **{kind: KINDS[kind] for kind in kinds})
     simulated, realtime = receiver(fault), receiver(fault)
     send(simulated, range(100))
@@ -129,7 +129,7 @@ def test_a_message_fares_alike_in_simulated_and_real_time(kinds: set[str], misse
 @steady
 @given(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 8)), max_size=30))
 def test_messages_are_handed_out_in_the_order_of_arrival_number_and_sender(offers: list[tuple[int, int]]) -> None:
-    """Messages that arrive at one time are sorted by number, then by sender, in any order of offering."""
+    """Messages of one arrival time are sorted by number, then by sender, in whatever order they are offered."""
     to = receiver(Fault(on="* -> inv2", delay=0.3))
     for src, seq in dict.fromkeys(offers):
         to.offer(f"inv{3 + src}", seq, seq * 0.1, seq * 0.1, bytes([seq, src]))
@@ -140,7 +140,7 @@ def test_messages_are_handed_out_in_the_order_of_arrival_number_and_sender(offer
 
 
 def test_a_delay_of_whole_ticks_ends_at_that_tick() -> None:
-    """A message of tick k with a delay of 5 T_c is there at tick k + 5 and not before, at every one of 10 000 ticks."""
+    """A message of tick k with a delay of 5 T_c arrives at tick k + 5 and not before, for each of 10 000 ticks."""
     to = receiver(Fault(on="* -> inv2", delay=0.1))
     for k in range(10_000):
         to.offer("inv1", k, k * T_C, k * T_C, PAYLOAD)
@@ -149,8 +149,8 @@ def test_a_delay_of_whole_ticks_ends_at_that_tick() -> None:
 
 @steady
 @given(st.lists(st.floats(0.0, 0.015), min_size=20, max_size=20))
-def test_the_way_to_the_receiver_reorders_nothing_that_netem_leaves_in_order(jitter: list[float]) -> None:
-    """In real time the real way's jitter adds to netem's delays, and no message overtakes another by it."""
+def test_real_jitter_reorders_no_messages_that_netem_keeps_in_order(jitter: list[float]) -> None:
+    """In real time the jitter of the real link adds to netem's delays, and no message overtakes another through it."""
     to = receiver(Fault(on="inv1 -> inv2", delay=Uniform(low_s=0.01, high_s=0.2, fifo=True)))
     at = 0.0
     for k in range(20):
@@ -177,8 +177,8 @@ def test_a_corrupted_message_has_one_flipped_bit_or_is_dropped_by_the_checksum()
     assert [arrival.payload for arrival in sound] == [PAYLOAD] * changed.count(0)
 
 
-def test_a_link_without_a_fault_is_known_as_such_and_leaves_no_trace() -> None:
-    """Whether a fault may ever act is known before any message; what passes untouched is counted and not recorded."""
+def test_a_link_without_a_fault_is_known_and_not_recorded() -> None:
+    """A link knows before any message whether a fault can act; untouched messages are counted and not recorded."""
     to = receiver(Fault(on="inv1 -> inv2", delay=0.1, from_s=50.0), Fault(on="plant -> inv3", loss=0.1))
 
     assert [to.touched(src) for src in ("inv1", "inv3", "plant")] == [True, False, False]
@@ -188,7 +188,7 @@ def test_a_link_without_a_fault_is_known_as_such_and_leaves_no_trace() -> None:
 
 
 def test_a_live_fault_acts_from_its_time_on_and_heals() -> None:
-    """Messages sent before the change or after the healing fare as the scenario has it, those between as was said."""
+    """Messages sent before the change or after the healing follow the scenario, those between follow the change."""
     to = receiver(Fault(on="* -> inv2", delay=0.1))
     send(to, range(50))
     assert to.apply(Fault(on="inv1 <-> inv2", from_s=1.0, delay=0.5, loss=0.0)) == ("inv1",)
@@ -202,8 +202,8 @@ def test_a_live_fault_acts_from_its_time_on_and_heals() -> None:
     assert [seen[k] for k in range(200)] == [0.1] * 50 + [0.5] * 100 + [0.0] * 50
 
 
-def test_healing_a_holding_cut_lets_go_at_once_as_if_it_had_been_planned() -> None:
-    """A live cut without an end, healed at 1 s, delivers the same messages, as late, as one planned to 1 s."""
+def test_healing_a_holding_cut_releases_messages_like_a_planned_end() -> None:
+    """A live cut, healed at 1 s, delivers the same messages at the same times as a cut planned until 1 s."""
     rest = Fault(on="* -> inv2", delay=0.05, rate=Rate(bytes_per_s=20_000.0), loss=0.2, duplicate=0.2)
     live, planned = receiver(rest), receiver(rest, Fault(on="inv1 -> inv2", cut=Cut(hold=True), from_s=0.5, to_s=1.0))
     arrived = send(live, range(25))
@@ -220,8 +220,8 @@ def test_healing_a_holding_cut_lets_go_at_once_as_if_it_had_been_planned() -> No
     assert outcomes(live.take_trace()) == outcomes(planned.take_trace())
 
 
-def test_faults_that_were_over_long_ago_are_forgotten_and_change_no_fate() -> None:
-    """A run of hours has hundreds of commands; a link that had a fault once is still told apart from one without."""
+def test_faults_of_long_ago_are_forgotten_and_change_no_fate() -> None:
+    """A run of hours has hundreds of commands; a link with a past fault still differs from one without."""
     lossy = Fault(on="inv1 -> inv2", loss=0.3, delay=0.05, from_s=0.0, to_s=1.0)
     ahead = [replace(lossy, from_s=10.0 * k, to_s=10.0 * k + 1.0) for k in range(60)]
     live, planned, known = receiver(), receiver(*ahead), dict[int, int]()

@@ -40,7 +40,7 @@ graph = "full"
 
 @pytest.mark.parametrize("name", catalogue())
 def test_every_scenario_of_the_catalogue_can_be_run(name: str) -> None:
-    """Every scenario that comes with gridpeers has no problem and is named as its file."""
+    """Every scenario that comes with gridpeers has no problem and has the name of its file."""
     scenario, feeder = load_scenario(name)
 
     assert scenario.name == name
@@ -48,8 +48,8 @@ def test_every_scenario_of_the_catalogue_can_be_run(name: str) -> None:
     assert feeder.inverters
 
 
-def test_an_agent_is_told_its_own_nameplate_and_the_rule_and_no_neighbour() -> None:
-    """The configuration of an agent names nobody but itself."""
+def test_the_configuration_of_an_agent_has_its_nameplate_and_the_rule_and_no_neighbour() -> None:
+    """It names no other agent."""
     _, agents = configs(*load_scenario("islanding"), "IV", "tcp/127.0.0.1:7447")
 
     for agent in agents:
@@ -58,8 +58,8 @@ def test_an_agent_is_told_its_own_nameplate_and_the_rule_and_no_neighbour() -> N
         assert agent.connect == ("tcp/127.0.0.1:7447",)
 
 
-def test_a_case_changes_only_the_handling_it_names_and_agents_are_told(tmp_path: Path) -> None:
-    """A case's table starts from the common one, also in a case of that name, and agents get the result."""
+def test_a_case_changes_only_the_keys_of_degraded_communication_that_it_names(tmp_path: Path) -> None:
+    """The other keys come from the common table, and agents get the result."""
     text = SHORT.replace("case.only", "case.degraded_communication")
     text += '[case.degraded_communication.degraded_communication]\nstale = "skip"\n\n'
     text += '[degraded_communication]\nT_age_s = 0.1\nweights = "degree-normalised"\n'
@@ -91,7 +91,7 @@ finite = st.floats(min_value=1e-3, max_value=100.0)
 @given(
     k_p=finite, k_q=finite, alpha=finite, seed=st.integers(0, 2**31), title=st.text(max_size=20).filter(str.isprintable)
 )
-def test_a_runs_copy_means_the_same_as_the_scenario(
+def test_the_copy_of_a_run_equals_the_scenario(
     tmp_path_factory: pytest.TempPathFactory, k_p: float, k_q: float, alpha: float, seed: int, title: str
 ) -> None:
     """Written out with all defaults and read again, a scenario is equal to itself, to the last bit."""
@@ -108,7 +108,7 @@ def test_a_runs_copy_means_the_same_as_the_scenario(
 
 
 def test_a_synchronised_event_closes_its_switches_in_step(tmp_path: Path) -> None:
-    """The keys reach the plant: only what is closed waits, and the windows are in the units of their keys."""
+    """The keys reach the plant: only closing switches wait, and the windows are in the units of their keys."""
     path = tmp_path / "resync.toml"
     path.write_text("""
 [time]
@@ -147,7 +147,7 @@ def with_plant(keys: str) -> str:
 
 
 def test_factors_and_an_inverters_own_data_reach_the_plant_and_the_agents(tmp_path: Path) -> None:
-    """A factor acts on every inverter but those with a value of their own; the copy of a run says the same."""
+    """A factor acts on every inverter without a value of its own; the copy of a run has the same."""
     keys = "m_p_factor = 0.5\nm_q_factor = 2.0\nload_factor = 0.9\ninverter.inv3 = { m_p_pu = 0.02, P_rated_kW = 450 }"
     plain, _ = load_scenario("islanding")
     scenario, feeder = load_scenario(written(tmp_path, with_plant(keys)))
@@ -170,8 +170,8 @@ def test_factors_and_an_inverters_own_data_reach_the_plant_and_the_agents(tmp_pa
         ("inverter = 3", "plant.inverter: must be written as tables [plant.inverter.NAME], got 3"),
     ],
 )
-def test_data_that_cannot_be_meant_are_told_at_their_key(tmp_path: Path, keys: str, said: str) -> None:
-    """Key, value with its unit, and what would be right."""
+def test_implausible_data_are_a_problem_at_their_key(tmp_path: Path, keys: str, said: str) -> None:
+    """It has the key, the value with its unit, and the right values."""
     found = problems(tmp_path, with_plant(keys))
 
     assert len(found) == 1
@@ -212,8 +212,10 @@ def test_trip_settings_are_judged_at_the_nominal_frequency(tmp_path: Path) -> No
         ),
     ],
 )
-def test_who_cannot_be_left_without_agent_or_run_the_law_is_told(tmp_path: Path, old: str, new: str, said: str) -> None:
-    """Which name, and what to write."""
+def test_impossible_names_without_an_agent_or_with_the_law_are_a_problem(
+    tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    """It has the name, and what to write."""
     text = ISLANDING.replace(CASE, CASE.replace(old, new)).replace('graph = "full"', "")
     text = text.replace("[case.IV]", '[case.IV]\ngraph = "full"')
     found = problems(tmp_path, text)
@@ -239,8 +241,8 @@ def test_a_case_has_its_own_available_power(tmp_path: Path) -> None:
 PLUG = (CATALOGUE / "plug-n-play.toml").read_text(encoding="utf-8")
 
 
-def test_a_spare_that_joins_is_there_but_not_awaited_at_the_start(tmp_path: Path) -> None:
-    """Its agent is configured like the others, the plant has its inverter, and begins without it."""
+def test_a_spare_that_joins_is_configured_but_not_awaited_at_the_start(tmp_path: Path) -> None:
+    """The plant has its inverter and starts without it."""
     scenario, feeder = load_scenario(written(tmp_path, PLUG.replace('join = ["inv2"]', 'join = ["inv2", "inv10"]')))
     plant, agents = configs(scenario, feeder, "IV")
 
@@ -251,7 +253,7 @@ def test_a_spare_that_joins_is_there_but_not_awaited_at_the_start(tmp_path: Path
 
 
 def test_in_a_live_run_people_move_the_agents(tmp_path: Path) -> None:
-    """The plant of a live run lets nobody leave by itself, and knows each inverter once."""
+    """The plant of a live run has no schedule of agents, and knows each inverter once."""
     text = PLUG.replace('join = ["inv2"]', 'join = ["inv2", "inv10"]')
     plant, agents = configure(*load_scenario(written(tmp_path, text)), "tcp/127.0.0.1:7447", run="lab")
 
@@ -275,9 +277,7 @@ def test_in_a_live_run_people_move_the_agents(tmp_path: Path) -> None:
         ("t_s = 2.0", "t_s = 2.01", r"event\[1\].t_s: 2.01 s is not a multiple of T_c_s = 0.02 s, .* nearest is 2"),
     ],
 )
-def test_each_problem_is_told_with_its_place_and_what_would_be_right(
-    tmp_path: Path, old: str, new: str, said: str
-) -> None:
+def test_each_problem_has_its_place_and_a_remedy(tmp_path: Path, old: str, new: str, said: str) -> None:
     """A problem names the file, the line, the key, the value, and what to write instead."""
     assert PLUG.count(old) == 1
     found = problems(tmp_path, PLUG.replace(old, new))
@@ -286,8 +286,8 @@ def test_each_problem_is_told_with_its_place_and_what_would_be_right(
     assert all(line.startswith("mine.toml:") for line in found)
 
 
-def test_an_event_is_measured_from_when_it_came() -> None:
-    """A process that came up late schedule the start of its window, which is told; what never came keeps its time."""
+def test_a_window_starts_when_its_event_happened() -> None:
+    """A late join moves the start of its window and is reported; a join that never happens keeps its time."""
     scenario, _ = load_scenario("plug-n-play")
     left = PlantEvent(t=2.0, kind="inverter", subject="inv2", text="inv2 disconnected")
     back = PlantEvent(t=3.32, kind="inverter", subject="inv2", text="inv2 connected")
@@ -300,8 +300,8 @@ def test_an_event_is_measured_from_when_it_came() -> None:
     assert late_moves(scenario, [left, back])[0].startswith("return, meant for t = 3 s, came at 3.32 s")
 
 
-def test_a_run_saved_with_a_key_that_is_no_more_can_be_read(tmp_path: Path) -> None:
-    """Its default means what there is without it; another value asks for what is gone, and is refused."""
+def test_a_saved_run_with_a_removed_key_can_be_read(tmp_path: Path) -> None:
+    """The default of a removed key is ignored; another value is refused."""
     load_scenario(written(tmp_path, f"{PLUG}\n[plant.helics]\nfederates = 0\n"))
 
     assert "unknown key" in problems(tmp_path, f"{PLUG}\n[plant.helics]\nfederates = 2\n")[0]

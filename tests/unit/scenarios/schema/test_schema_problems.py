@@ -49,9 +49,7 @@ ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
         ),
     ],
 )
-def test_each_problem_is_told_with_its_place_and_what_would_be_right(
-    tmp_path: Path, old: str, new: str, said: str
-) -> None:
+def test_each_problem_has_its_place_and_a_remedy(tmp_path: Path, old: str, new: str, said: str) -> None:
     """A problem names the file, the line, the key, the value with its unit, and what to write instead."""
     assert ISLANDING.count(old) >= 1
     found = problems(tmp_path, ISLANDING.replace(old, new, 1))
@@ -75,7 +73,7 @@ def test_the_longest_step_depends_on_the_method(tmp_path: Path) -> None:
 
 
 def test_an_unknown_feeder_hides_only_what_depends_on_it(tmp_path: Path) -> None:
-    """Links, agents' faults and events are checked without it; whose names are right cannot be known."""
+    """Links, faults of agents and events are checked without it, except their names."""
     text = ISLANDING.replace('feeder = "microgrid123"', 'feeder = "microgrid124"').replace('open = ["60-160"]', "")
     text += """
 [[case.IV.link]]
@@ -102,8 +100,8 @@ from_s = 1.0
     ]
 
 
-def test_an_event_off_the_grid_has_its_place_among_the_others_nevertheless(tmp_path: Path) -> None:
-    """Two problems of one time are told together."""
+def test_an_event_off_its_grid_is_still_compared_with_the_others(tmp_path: Path) -> None:
+    """Both problems of its time are reported."""
     text = ISLANDING.replace("t_s = 4.0", "t_s = 0.9995").replace("end_s = 7.0", "end_s = 0.501")
 
     found = [re.sub(r".*?: ([^:]*: .*?)[;,(].*", r"\1", line) for line in problems(tmp_path, text)]
@@ -118,7 +116,7 @@ def test_an_event_off_the_grid_has_its_place_among_the_others_nevertheless(tmp_p
 
 
 def test_a_feeders_problems_are_passed_on(tmp_path: Path) -> None:
-    """Every problem of the feeder is told, with the table and the row."""
+    """Every problem of the feeder is reported with its table and row."""
     folder = Path(shutil.copytree(DATA / "microgrid123", tmp_path / "broken"))
     with (folder / "inverters.csv").open(newline="") as stream:
         rows = list(csv.reader(stream))
@@ -142,14 +140,14 @@ def test_a_feeders_problems_are_passed_on(tmp_path: Path) -> None:
         ("[time]\nend_s = 1.0\n[case]\n", r"case: there is no case; write at least one table"),
     ],
 )
-def test_a_malformed_file_is_told_with_its_line(tmp_path: Path, text: str, said: str) -> None:
-    """No text whatever ends in anything but problems."""
+def test_a_malformed_file_is_reported_with_its_line(tmp_path: Path, text: str, said: str) -> None:
+    """Any text gives problems, never a traceback."""
     assert any(re.search(said, line) for line in problems(tmp_path, text)), problems(tmp_path, text)
 
 
 @pytest.mark.parametrize("name", ["süd", "su\u0308d", "my study (2)", "東京", "_"])
 def test_a_scenario_is_not_refused_by_the_name_of_its_file(tmp_path: Path, name: str) -> None:
-    """Where the file says no name, the scenario's is made of the file's, in whichever form a system keeps that."""
+    """A scenario without a name gets one from its file, in whatever form the system stores that."""
     path = tmp_path / f"{name}.toml"
     path.write_text(re.sub(r"(?m)^name = .*$", "", (CATALOGUE / "islanding.toml").read_text()))
 
@@ -175,8 +173,8 @@ def test_a_scenario_that_powershell_wrote_is_read(tmp_path: Path, encoding: str)
         (".", r"\.: this is a folder"),
     ],
 )
-def test_a_missing_scenario_is_told(name: str, said: str) -> None:
-    """A name that is neither in the catalogue nor a file names what there is."""
+def test_a_missing_scenario_is_reported(name: str, said: str) -> None:
+    """The message lists the scenarios of the catalogue."""
     with pytest.raises(ScenarioError, match=said):
         load_scenario(name)
 
@@ -199,7 +197,7 @@ LINK = BASE + '\n[[link]]\non = "inv1 -> inv2"\n'
     ],
 )
 def test_a_hostile_file_is_refused_in_lines_that_can_be_printed(tmp_path: Path, text: str, said: str) -> None:
-    """No file ends in a traceback or a hang, and none writes to a terminal what it likes."""
+    """No file causes a traceback or a hang, or writes control characters to a terminal."""
     found = problems(tmp_path, text)
     assert any(said in line for line in found)
     assert all(line.isprintable() for line in found)

@@ -41,7 +41,7 @@ graph = "full"
 
 
 def test_changes_of_loads_reach_the_plant(tmp_path: Path) -> None:
-    """In the order of time, in SI units, and what is left out stays left out."""
+    """In the order of time and in SI units; a power that is left out stays unset."""
     plant, _ = configs(*load_scenario(written(tmp_path, TEXT)), "IV")
 
     assert plant.settings.loads == (
@@ -53,7 +53,7 @@ def test_changes_of_loads_reach_the_plant(tmp_path: Path) -> None:
 
 
 def test_a_load_is_named_by_its_bus_once(tmp_path: Path) -> None:
-    """What is wrong with the loads of all events is told at once."""
+    """All problems of the loads of all events come at once."""
     found = problems(tmp_path, TEXT.replace("factor = 1.5", "P_kW = 1e9").replace("65.factor", "650.factor"))
 
     assert [text.partition(" ")[0] for text in found] == ["mine.toml:11:", "mine.toml:12:"]
@@ -61,8 +61,8 @@ def test_a_load_is_named_by_its_bus_once(tmp_path: Path) -> None:
     assert 'event[2].load: load "650": no such load; did you mean "65"?' in found[1]
 
 
-def test_an_island_is_noted_with_the_load_that_it_has_then(tmp_path: Path) -> None:
-    """A load that an event raises may be more than an island's inverters are rated for."""
+def test_a_note_on_an_island_has_its_load_at_that_time(tmp_path: Path) -> None:
+    """An event may raise a load above the rating of the inverters of an island."""
     heavy = TEXT.replace("factor = 1.5", "factor = 10")
     light, notes = (supply_notes(*load_scenario(written(tmp_path, text))) for text in (TEXT, heavy))
 
@@ -103,8 +103,8 @@ def test_a_feeder_of_followers_alone_cannot_begin_without_the_grid(tmp_path: Pat
     ), found
 
 
-def test_the_last_leader_that_leaves_is_told(tmp_path: Path) -> None:
-    """An agent that leaves takes its inverter with it, and an island its frequency if it was the last leader."""
+def test_the_departure_of_the_last_leader_is_noted(tmp_path: Path) -> None:
+    """An agent that leaves takes its inverter off the network, and an island without a leader has no voltage."""
     text = ISLANDING.replace('open = ["60-160"]', 'leave = ["inv1", "inv4", "inv7"]')
 
     (note,) = supply_notes(*load_scenario(written(tmp_path, text)))
@@ -113,8 +113,8 @@ def test_the_last_leader_that_leaves_is_told(tmp_path: Path) -> None:
     assert "inv2, inv3, inv5, inv6, inv8, inv9" in note
 
 
-def test_an_island_with_more_load_than_rating_is_told(tmp_path: Path, folder: Path) -> None:
-    """One inverter of 600 kW cannot feed what is left to it: the event that leaves it so is told, with both powers."""
+def test_an_island_with_more_load_than_rating_is_noted(tmp_path: Path, folder: Path) -> None:
+    """The note has the event, and both powers: one inverter of 600 kW cannot feed the island."""
     table = (folder / "inverters.csv").read_text().splitlines(keepends=True)
     (folder / "inverters.csv").write_text("".join(table[:2]))
 
@@ -126,7 +126,7 @@ def test_an_island_with_more_load_than_rating_is_told(tmp_path: Path, folder: Pa
 
 
 def test_check_prints_its_notes_and_tries_the_operating_point(tmp_path: Path, folder: Path) -> None:
-    """A feeder whose lines are too long to carry its load is found by solving it: no table shows it."""
+    """A feeder with lines too long to carry its load is found by solving it, as no table shows it."""
     code, said = invoke("check", "islanding")
     assert (code, said.startswith('NOTE  event "event2" at 4 s de-energises 18 buses ')) == (0, True)
     lines = [line.split(",") for line in (folder / "lines.csv").read_text().splitlines()]
@@ -159,7 +159,7 @@ lies = { model = "offset", P_set_W = 1e5 }
 """
 
 
-def test_nobody_lies_in_anothers_name_behind_certificates(tmp_path: Path) -> None:
+def test_a_lie_in_another_name_is_refused_with_certificates(tmp_path: Path) -> None:
     """With `security = "mtls"` such an entry is a problem at its key."""
     (tmp_path / "liars.toml").write_text('security = "mtls"\n' + LIARS, encoding="utf-8")
 
