@@ -35,7 +35,9 @@ def init(
     site: Annotated[Path, argument("SITE", "New folder for the certificates; its name is the site's.")],
     days: _Days = 365.0,
 ) -> None:
-    """Make a site: an authority, and certificates of a plant, an operator and a viewer.
+    """Make a site with its first certificates.
+
+    These are an authority, and certificates of a plant, an operator and a viewer.
 
     Example:  gridpeers keys init lab
     """
@@ -76,7 +78,9 @@ def revoke(
     name: Annotated[str, argument("NAME", "Its name; an agent has that of its inverter, e.g. inv4.")],
     keys: _Keys = Path(),
 ) -> None:
-    """Revoke a certificate: processes that start later with the new list refuse it.
+    """Revoke a certificate.
+
+    Processes that start later with the new list refuse it.
 
     Example:  gridpeers keys revoke inv4 --keys lab
     """
@@ -90,7 +94,9 @@ def revoke(
 
 @app.command()
 def show(keys: _Keys = Path()) -> None:
-    """Show the members of a site: role, end of the certificate, whether the key is here.
+    """Show the members of a site.
+
+    Each line has the role, the end of the certificate, and whether the key is here.
 
     Example:  gridpeers keys show --keys lab
     """

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from gridpeers.scenarios.live.live_processes import ProcessOutcome
     from gridpeers.scenarios.live.run_client import RunClient
 
-Run = Annotated[str, option("NAME", "Name of the run; runs of other names do not meet.")]
+Run = Annotated[str, option("NAME", "Name of the run; runs of other names do not hear each other.")]
 Connect = Annotated[
     list[str] | None, option("ENDPOINT", f"Where the plant listens, {ENDPOINT} if left out; repeatable.")
 ]
@@ -40,9 +40,9 @@ Wait = Annotated[float, option("SECONDS", "Longest wait for the plant.")]
 Keys = Annotated[
     Path | None, option("DIR", "Folder with certificates; links are then TLS (docs/how-to/several-hosts.md).")
 ]
-As = Annotated[str, option("NAME", "With --keys: whose certificate; the operator's if left out.", "--as")]
+As = Annotated[str, option("NAME", "With --keys, the member whose certificate is used; operator if left out.", "--as")]
 Insecure = Annotated[
-    bool, flag("Let an endpoint be open to everybody who reaches it, beyond the loopback.", "--insecure")
+    bool, flag("Allow an open endpoint beyond the loopback: everybody who reaches it has access.", "--insecure")
 ]
 
 
@@ -105,7 +105,7 @@ def opened(access: Access, roles: tuple[Role, ...], name: str = "") -> Credentia
     """Return the credentials of a command; say so if the certificate ends soon."""
     if access.keys is None:
         if access.name:
-            raise UsageError("--as: chooses a certificate; say --keys DIR, too")
+            raise UsageError("--as: needs --keys DIR, the folder of the certificates")
         return None
     credentials, note = open_credentials(access.keys, roles, name or access.name)
     if note:

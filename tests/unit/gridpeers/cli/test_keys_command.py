@@ -107,7 +107,7 @@ OPEN = (
             ["status", "--connect", NEAR, "--keys", "lab"],
             f"--connect: {NEAR} is open, and --keys needs TLS",
         ),
-        (["status", "--as", "eve"], "--as: chooses a certificate; say --keys DIR, too"),
+        (["status", "--as", "eve"], "--as: needs --keys DIR, the folder of the certificates"),
         (["status", "--keys", "nowhere"], "nowhere: does not exist"),
         (["agent", "inv7", "--keys", "lab"], 'no certificate was issued to "inv7"; those of role agent: none'),
         (["agent", "inv1", "inv2", "--keys", "lab"], "--keys: a process has one certificate"),
