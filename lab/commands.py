@@ -70,8 +70,8 @@ def why(
 ) -> None:
     """Explain why an agent decided as it did.
 
-    That is what it measured, whom it heard and whom not and why, each term of its law, and the limits, from the record
-    of the run. docs/how-to/explain-a-run.md has examples.
+    The answer comes from the record of the run: the measurement, the neighbours that the agent heard or missed, each
+    term of its law, and the limits. docs/how-to/explain-a-run.md has examples.
 
     Example:  gridpeers why runs/islanding/latest/IV inv4 4.3
     """
@@ -139,8 +139,8 @@ def replay(
 ) -> None:
     """Replay a recorded run, or show what would have been.
 
-    The cores get again what they got, when they got it, and must decide the same within 1e-9. With a change, the loop
-    is closed on our plant from then on. docs/how-to/explain-a-run.md explains both.
+    Without a change, every process gets its recorded inputs again, and must decide the same within 1e-9. With a change,
+    the run goes on in a closed loop with gridpeers' own plant. docs/how-to/explain-a-run.md explains both.
 
     Example:  gridpeers replay runs/islanding/latest/IV --without "inv4 <-> inv7" --from 2
     """
@@ -178,9 +178,9 @@ def _key_and_value(text: str) -> tuple[str, Any]:
 
 def _replay(record: RunRecord, since: float, out: Path | None) -> bool:
     if since:
-        fail(f"--from {since:g}: nothing is changed from then on; give {CHANGES}")
+        fail(f"--from {since:g}: nothing changes from then on; give {CHANGES}")
     if out is not None:
-        text = f"a replay without a change writes no folder; leave it out, or give {CHANGES}"
+        text = f"a replay without a change writes no folder; leave --out away, or give {CHANGES}"
         fail(f"--out {out}: {text}")
 
     from gridpeers.cli.progress import explained
@@ -188,7 +188,7 @@ def _replay(record: RunRecord, since: float, out: Path | None) -> bool:
 
     typer.echo(f"{_about(record)}: {record.t_end:.2f} s recorded")
     span = f"{record.t_end:.0f} s of {len(record.agents)} agents"
-    with explained(lambda: typer.echo(f"still at work: every call of {span} is made again ...")):
+    with explained(lambda: typer.echo(f"still at work: replaying {span} ...")):
         done = replay_record(record)
     for part in done.parts:
         of = "rows" if part.name == "plant" else "states"
@@ -196,7 +196,7 @@ def _replay(record: RunRecord, since: float, out: Path | None) -> bool:
         typer.echo(f"  {part.name:<8}{part.count:>7} {of} up to {part.t_end:.2f} s: {verdict}")
     if done.difference is None and not any(part.count for part in done.parts):
         _tell_notes(done.notes)
-        fail("the record ends before anything that a replay could be compared with")
+        fail("the record ends before the first decision that a replay could compare")
     if done.difference is None:
         same = "The replay gives what was recorded, within 1e-9"
         partly = bool(done.notes or record.damage)  # the command prints the damage after these notes
@@ -233,7 +233,7 @@ def _counterfactual(record: RunRecord, changes: Changes, out: Path | None) -> bo
     _tell_notes(done.notes)
     typer.echo(f"\nWhat would have been: {shown(folder)}/; figure: {shown(figure)}")
     if done.difference is not None:
-        typer.echo(f"It is not to be trusted: before the change, {done.difference}")
+        typer.echo(f"Do not trust it: before the change, {done.difference}")
     failed = len(done.would_be.failures) > 0 and judges_laws(rule.scenario)
     return done.difference is not None or failed
 

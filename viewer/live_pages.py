@@ -156,11 +156,11 @@ class OwnAgents:
 
 
 def looks_only(credentials: Credentials | None) -> str:
-    """Return that a page without `--control` only looks, and how the same person could act."""
+    """Return that a page without `--control` is read-only, and how the same person could act."""
     if credentials is None or credentials.own.role in COMMANDING:
-        return "the page only looks (--control lets it act)"
+        return "the page is read-only (--control lets it act)"
     folder = Path(credentials.certificate).parent
     may = (member.name for member in credentials.members if member.role in COMMANDING and not member.revoked)
     here = next((name for name in may if (folder / f"{name}.key").is_file()), None)
     way = f"--as {here} --control lets it act" if here else f"to act takes --control and the key of an {COMMANDING[0]}"
-    return f"the page only looks, as {credentials.own.name} has the role {credentials.own.role} ({way})"
+    return f"the page is read-only, as {credentials.own.name} has the role {credentials.own.role} ({way})"

@@ -39,7 +39,7 @@ class PageAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     def __post_init__(self) -> None:
         for name in (self.subject, self.other):
             if name.startswith("-"):  # the command that does the same would take it for an option
-                raise ValueError(f"{name!r:.40} is no name of a switch, load, inverter or agent: those begin otherwise")
+                raise ValueError(f"{name!r:.40} is not the name of a switch, load, inverter or agent")
 
     def words(self) -> list[str]:
         """Return the words of the command that does the same."""

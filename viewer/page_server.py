@@ -221,7 +221,9 @@ def listen(address: str, port: int) -> socket.socket:
     try:
         family, kind, protocol, _, where = socket.getaddrinfo(address, port, type=socket.SOCK_STREAM)[0]
     except OSError:
-        raise UsageError(f'--address: "{address}" is no address; 127.0.0.1 is this host alone, 0.0.0.0 all') from None
+        raise UsageError(
+            f'--address: "{address}" is not an address; 127.0.0.1 is this host alone, 0.0.0.0 all'
+        ) from None
     listening = socket.socket(family, kind, protocol)
     try:
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -244,7 +246,7 @@ def access(address: str, token: str) -> tuple[str, tuple[str, ...]]:
     given one it is made up.
     """
     if token != token.encode(errors="replace").decode():
-        raise UsageError("--token: has bytes that are no text; give letters and digits")
+        raise UsageError("--token: is not text; give letters and digits")
     if is_loopback_host(address):
         return token, tuple(dict.fromkeys((*LOOPBACK, address)))
     return token or secrets.token_urlsafe(16), ()

@@ -189,7 +189,7 @@ class RecordedRun:
         files = self._files()
         if not files and not self._is_coming():
             raise RecordFileError(
-                f"{path}: there is no {FILE}: the run was not recorded, or this is no folder of a run"
+                f"{path}: there is no {FILE}: the run was not recorded, or this is not the folder of a run"
             )
         if len(files) == 1:
             self.view(next(iter(files)))
@@ -252,7 +252,7 @@ class RecordedRun:
             outcome = record.outcome
             if outcome:
                 return "broken", f"The run broke: {outcome}"
-            return "ended", "" if outcome is not None else "The recorder was ended before the run."
+            return "ended", "" if outcome is not None else "The recorder ended before the run."
         try:
             still = time() - record.path.stat().st_mtime
         except OSError:

@@ -104,7 +104,7 @@ class RecordView:
         frame, _ = view.frame(Cursor(), t)
         links: dict[str, tuple[LinkView, ...]] = dict.fromkeys(self._configs, ()) | frame.links
         stale = row is None or t - row > self._rows.longest_gap
-        text = "There are no rows of this time in the record." if stale else "record"
+        text = "The record has no rows of this time." if stale else "record"
         points = tuple(self._with_shared(self._rows.points(max(since, t - LENGTH), t)))
         return replace(
             frame,
@@ -250,11 +250,11 @@ def _status(agent: AgentMoment, sent: int, impaired: tuple[str, ...]) -> AgentSt
 def _missing(record: RunRecord, *, has_feeder: bool) -> Iterator[str]:
     info = record.info
     if info.level == "physics":
-        yield 'It was recorded with record = "physics": no links and no decisions are in it.'
+        yield 'The record has no links and no decisions (record = "physics").'
     elif info.level == "decisions" and info.clock == "realtime":
-        yield 'It was recorded with record = "decisions": what else arrived, and the fates of messages, are not in it.'
+        yield 'The record has no arrivals and no fates of messages (record = "decisions").'
     if not has_feeder:
-        yield f"The feeder {info.plant.settings.feeder} is not here: its inverters stand in a ring."
+        yield f"The feeder {info.plant.settings.feeder} is not on this host: its inverters are drawn in a ring."
 
 
 def feeder_of(info: RecordInfo) -> Tables | None:

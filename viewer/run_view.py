@@ -271,7 +271,7 @@ class Liveness:
         elif silent is None:
             word, text = "waiting", "The run has not begun: the plant waits for its agents."
         elif self._gone_at is not None:
-            word, text = "gone", f"The plant is gone; its last word came {silent:.1f} s ago."
+            word, text = "gone", f"The plant is gone; its last message came {silent:.1f} s ago."
         elif silent > FROZEN:
             word, text = "frozen", f"The plant has been silent for {silent:.1f} s: frozen, or out of reach."
         if self._restarts and word != "live":

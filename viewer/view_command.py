@@ -41,11 +41,11 @@ def view(
         bool, typer.Option("--control", help="Let the page act: switches, loads, agents, links.")
     ] = False,
     address: Annotated[
-        str, typer.Option("--address", metavar="HOST", help="Where the page listens; any other asks for a token.")
+        str, typer.Option("--address", metavar="HOST", help="Address of the page; any other asks for a token.")
     ] = HERE,
     port: Annotated[int, typer.Option("--port", metavar="N", help="Port of the page; 0 takes any free one.")] = PORT,
     token: Annotated[
-        str, typer.Option("--token", metavar="TEXT", help="What a page must know; made up for other addresses.")
+        str, typer.Option("--token", metavar="TEXT", help="Token that the page asks for; random for other addresses.")
     ] = "",
 ) -> None:
     """Show a run in the browser: feeder, links, strips and agents.
@@ -63,7 +63,7 @@ def view(
         _serve(lambda: _live(live, control=control), address, port, token)
     if control or live.connect or live.keys or live.run != RUN:
         option = "--control" if control else "--connect" if live.connect else "--keys" if live.keys else "--run"
-        fail(f"{option}: goes with a live run; nothing can be done to a record")
+        fail(f"{option}: needs a live run; a record cannot be changed")
     _serve(lambda: _recorded(record, case), address, port, token)
 
 

@@ -37,13 +37,13 @@ from gridpeers.wire.journal import Decision
 from gridpeers.wire.schema.table_schema import Plausible, Unit
 from gridpeers.wire.timing import PATIENCE
 
-_NO_ARRIVALS = 'in real time a record = "decisions" does not have what arrived'
+_NO_ARRIVALS = 'in real time, record = "decisions" has no arrivals'
 
 _SAID = re.compile(r"\S+ (leaves|left|dies)\b")  # Events of an agent that ends as the scenario, or a person, wants it
 
 
 class MessageAccount(Check):
-    """Every state that was sent is accounted for at its receiver, link by link.
+    """The fate of every state that was sent is known at its receiver, link by link.
 
     Of emulated links the accounts of their receivers count; of others in simulated time every decision
     has the neighbours' states of the tick before; in real time every number arrives, from the first one on that
@@ -95,10 +95,10 @@ class MessageAccount(Check):
 
 
 class Rejoined(Check):
-    """Some time after the end of each cut, the receiver uses what the sender has sent since: no split is for ever."""
+    """Some time after the end of each cut, the receiver uses new states of the sender again."""
 
     within_s: Annotated[float, Unit("s"), Plausible("a time to rejoin", 0.0, 3600.0, above_zero=True)] = 6.0
-    """Longest time (s): what Zenoh needs at most to find again a peer that it has lost."""
+    """Longest time (s) after the cut. Zenoh needs at most the default to find a lost peer."""
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
         found: CommunicationSummary = case.communication
@@ -168,7 +168,7 @@ class StaleValues(Check):
 
 
 class LastWords(Check):
-    """Each process of an agent speaks until the run ends, or it leaves or is killed as the scenario or a person says.
+    """Each agent sends states until the run ends, or until an event says that it left or was killed.
 
     An unexplained silence is a failure of the agent, of its process, or of its connection.
     """
@@ -202,9 +202,9 @@ class LastWords(Check):
                     continue
                 later = [max(0.0, first - last) for first, then in epochs.values() if then > last]
                 yield Violation(
-                    text="its process ends, and no event says why; its next one sends after"
+                    text="its process ends, and no event says why; the next one sends after"
                     if later
-                    else "sends nothing more, and no event says why",
+                    else "stops sending, and no event says why",
                     agent=agent,
                     t=last,
                     value=min(later, default=end - last),

@@ -161,7 +161,7 @@ WORDS = {
     "flap": "cut off by a flapping link",
     "loss": "lost on the link",
     "queue": "lost in a full queue of the link",
-    "fault": "lost by a fault of the user's",
+    "fault": "lost by a fault of your own",
     "checksum": "damaged on the link, and dropped",
     "damaged": "damaged on the link, and rejected: its CRC-32 differs",
     "late": "still on the way",

@@ -59,9 +59,9 @@ def law_step(record: RunRecord, decision: RecordedDecision) -> LawStep | None:
     try:
         law = make_law(decision.config.control)
     except ValueError as error:
-        return _parts(decision, None, limits, f"the law cannot be made here: {error}")
+        return _parts(decision, None, limits, f"the law cannot be loaded here: {error}")
     limits = {name: getattr(law, name) for name in LIMITS}
-    problem = "computed again, the law makes another step: it is not the law of the run, or its memory is older"
+    problem = "computed again, the law makes another step: it has changed since, or remembers more than the record"
     with closing(law):
         has_no_memory = type(law).start is Law.start
         for since_start in (False, True) if has_no_memory else (True,):

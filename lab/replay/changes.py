@@ -75,7 +75,7 @@ class ChangedRule:
         if not self.links_written:
             yield "The changes of links are not in this file: their entries would contradict others."
         if clock == "realtime":
-            yield "Not in this file: delays and losses on the wire, and what people did; a run of it has its own."
+            yield "Not in this file: delays and losses on the wire, and commands of people."
 
 
 def changed_rule(record: RunRecord, changes: Changes) -> ChangedRule:
@@ -84,8 +84,8 @@ def changed_rule(record: RunRecord, changes: Changes) -> ChangedRule:
     simulator, bridged = record.info.plant.settings.simulator, record.info.plant.bridged
     if simulator != "gridpeers" or bridged:
         raise ReplayError(
-            f"{record.path}: its plant was {'a federate' if bridged else f'that of {simulator}'}, which cannot be "
-            "closed into a loop again; what would have been needs our own plant"
+            f"{record.path}: its plant was {'a federate' if bridged else f'that of {simulator}'}, which "
+            "cannot run again; a counterfactual needs gridpeers' own plant"
         )
     before, feeder = _checked(record, _tables(record), frozenset())
     case, since = record.info.case, changes.since
@@ -136,7 +136,7 @@ def changed_rule(record: RunRecord, changes: Changes) -> ChangedRule:
 def _tables(record: RunRecord) -> Tree:
     info = record.info
     if not info.toml:
-        raise ReplayError(f"{record.path}: it has no scenario, so that nothing in it can be changed")
+        raise ReplayError(f"{record.path}: it has no scenario, so nothing in it can be changed")
     try:
         tables = tomllib.loads(info.toml)
         tables["case"] = {info.case: tables["case"][info.case]}
@@ -176,7 +176,7 @@ def _put(tables: Tree, case: str, path: str, value: Any, *, whole: bool) -> str:
         path, way = path.removeprefix(prefix), way[2:]
     first = way[0] if way else ""
     if first not in (*OF_CASE, *OF_BOTH):
-        raise ValueError(f"is no key of agents or links; {suggestion(first, (*OF_BOTH, *OF_CASE), 'keys')}")
+        raise ValueError(f"is not a key of agents or links; {suggestion(first, (*OF_BOTH, *OF_CASE), 'keys')}")
     if first in OF_CASE or own.get(first) or whole:
         put(own, path, value)
         return prefix + path

@@ -134,7 +134,7 @@ class ClosedLoop:
         found = [LoopProcess(process) for process in processes_of(self._record)]
         first = found[0]
         if first.name != PLANT:
-            raise ReplayError(f"{self._record.path}: the plant kept no journal, so that nothing can follow from it")
+            raise ReplayError(f"{self._record.path}: the plant kept no journal, so the loop cannot be closed")
         plant = start_plant_of(info, self._make_plant)
         try:
             first.again = plant_again(first.recorded, info, plant, self._links(PLANT, info.plant.links))
@@ -196,7 +196,7 @@ class ClosedLoop:
     def _make_agent(self, process: LoopProcess, step: RecordedStep) -> None:
         config = self._record.info.agent(process.name)
         if config is None or not step.instance:
-            self._note(f"the record lacks the start of {process.name}, so that its states are as recorded")
+            self._note(f"the record lacks the start of {process.name}; its states stay as recorded")
             return
         if self._control is not None:
             config = replace(config, control=self._control)
@@ -220,7 +220,7 @@ class ClosedLoop:
             return
         if not (isinstance(head.entry, ProcessEvent) and head.entry.kind == "session"):
             node.session_broken = node.post.closed = False
-            self._note(f"{process.name} would have opened a new session; what that would have brought is not known")
+            self._note(f"{process.name} would have opened a new session; the effect is not known")
 
     def _note(self, text: str) -> None:
         if text not in self.notes:
@@ -321,7 +321,7 @@ def _listeners(record: RunRecord) -> dict[str, frozenset[str]]:
     nameplates = {config.name: nameplate_of(config) for config in record.info.agents}
     found = {}
     for config in record.info.agents:
-        with made_here(f"{config.name}: its graph cannot be made here"):
+        with made_here(f"{config.name}: its graph cannot be loaded here"):
             names = in_neighbours(config.control, config.name, nameplates, rule_of(config.control))
         found[config.name] = frozenset(names)
     return found

@@ -40,8 +40,8 @@ if TYPE_CHECKING:
 Take = Callable[[Telemetry | Other], None]
 
 MISSING = (
-    "-: no number: not steady at the end of the window, or never restored (f, and MPSI where it counts); metrics.json "
-    "has the reasons. Where there are several islands, each shares for itself and has rows of its own"
+    "-: no number, as the value is not steady, or f or MPSI is never restored; metrics.json has the reasons. "
+    "Several islands have rows of their own"
 )
 
 

@@ -277,11 +277,11 @@ def made_here(failing: str, errors: tuple[type[Exception], ...] = (ValueError,))
 def agent_again(
     recorded: RecordedProcess, config: AgentConfig, instance: str, laws: list[Law], links: Links | None
 ) -> ReplayedProcess:
-    with made_here(f"{config.name}: its law cannot be made here"):
+    with made_here(f"{config.name}: its law cannot be loaded here"):
         laws.append(make_law(config.control))
     # the deadline is that of a process, which has found its plant in this run
     config = replace(config, epoch=recorded.epoch, record="physics", deadline=0.0)
-    with made_here(f"{config.name}: cannot be made again here"):
+    with made_here(f"{config.name}: cannot be repeated here"):
         return ReplayedProcess(AgentNode(config, instance, links, laws[-1]), links)
 
 
@@ -294,7 +294,7 @@ def plant_again(recorded: RecordedProcess, info: RecordInfo, plant: PlantLike, l
 def recorded_links(info: RecordInfo, name: str) -> Links | None:
     config = info.agent(name)
     tree = info.plant.links if name == PLANT else {} if config is None else config.links
-    with made_here(f"{name}: its emulated links cannot be made here"):
+    with made_here(f"{name}: its emulated links cannot be loaded here"):
         return links_of(name, tree)
 
 

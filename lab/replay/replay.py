@@ -102,7 +102,7 @@ def replay(run: Result | RunRecord | str | Path, make_plant: MakePlant | None = 
     own = record.info.plant.settings.simulator == "gridpeers" and not record.info.plant.bridged
     found = list((_in_simulated_time if record.info.simulated else _in_real_time)(record, make_plant if own else None))
     if not own:
-        note = "the physics was not replayed: it was not that of our plant alone"
+        note = "the physics was not replayed: another simulator was part of the plant"
         found.append(ReplayedPart(PLANT, note))
     names = [PLANT, *in_order({part.name for part in found} - {PLANT})]
     return ReplayedRun(parts=tuple(sorted(found, key=lambda part: names.index(part.name))))
@@ -223,7 +223,7 @@ class _AgentReplay:
             self._again = agent_again(self.process, config, step.instance, self._laws, links)
         message = self.process.message(step)
         if message is None and step.is_arrival:
-            part.note = f"the record lacks a message that {name} heard at t = {step.t:.2f} s; it was replayed to there"
+            part.note = f"the record lacks a message that {name} heard at t = {step.t:.2f} s; its replay ends there"
             return
         ours = [decoded for sent in self._again.take(step, message) if (decoded := tick_message(sent)) is not None]
         theirs = [decoded for sent in step.sent if (decoded := tick_message(sent)) is not None]
@@ -291,11 +291,9 @@ def _in_simulated_time(record: RunRecord, make_plant: MakePlant | None) -> Itera
         recorded = (int(record.t_end / T_c) + 1) * T_c  # a killed run may have been meant to go on
         broke = run_again(record, rows.take, make_plant, end=min(end, recorded))
         if not all(message.reproducible for message in record.telemetry()):
-            rows.part.note = (
-                "something happened in this run that its scenario does not tell, so it cannot be made again"
-            )
+            rows.part.note = "this run had an event that its scenario does not have, so it cannot be repeated"
         elif broke and record.outcome == "":
-            rows.part.note = f"the run breaks when it is made again: {broke}"
+            rows.part.note = f"the repeated run breaks: {broke}"
         yield rows.part
     for agent in record.agents:
         yield _decisions(record, agent)
@@ -311,7 +309,7 @@ def run_again(
 ) -> str:
     """Run a scenario in simulated time again, with other values of configurations; return why it broke, if it did."""
     info = record.info
-    with closing(start_plant_of(info, make_plant)) as plant, made_here("the run cannot be made again here"):
+    with closing(start_plant_of(info, make_plant)) as plant, made_here("the run cannot be repeated here"):
         return run_inprocess(
             replace(info.plant, record="physics", **of_plant),
             [replace(agent, record="physics", **of_agents) for agent in info.agents],
@@ -323,11 +321,11 @@ def run_again(
 
 def _decisions(record: RunRecord, agent: str) -> ReplayedPart:
     part = ReplayedPart(agent)
-    with made_here(f"{agent}: its law cannot be made here"):
+    with made_here(f"{agent}: its law cannot be loaded here"):
         for each in recomputed(record, agent):
             part.compare(each.decision.t, message_difference(each.decision.state, each.state))
             if part.difference is not None:
                 return part
     if record.damage and part.t_end < record.t_end - 1.5 * record.info.T_c:
-        part.note = "the record lacks later decisions of some agents, so that these were not compared"
+        part.note = "the record lacks the last decisions of some agents; they were not compared"
     return part

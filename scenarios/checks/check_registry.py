@@ -1,4 +1,4 @@
-"""Checks: what judges every run, their registry, and the choice that a scenario makes.
+"""Checks: functions that judge every run, their registry, and the choice of a scenario.
 
     @gridpeers.check("nadir")
     def nadir(case):

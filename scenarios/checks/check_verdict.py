@@ -171,12 +171,12 @@ Since = Annotated[
     float,
     Unit("s"),
     Plausible("a time of the run", 0.0, 86_400.0),
-    "Run time (s) from which on it is judged: the end of the last fault of links or agents, say.",
+    "Run time (s) from which the check judges, for example the end of the last fault.",
 ]
 """Key of a check that does not judge the start of a run: only events open windows, the end of a fault opens none."""
 
 WithKilled = Annotated[
-    bool, "Whether inverters count whose agents the scenario has killed: they stay at their last set-points."
+    bool, "Whether inverters of agents that the scenario kills count; they stay at their last set-points."
 ]
 
 

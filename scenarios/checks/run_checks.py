@@ -27,7 +27,7 @@ _SWING = Plausible("a swing", 1e-6, 10.0, above_zero=True)
 
 
 class LawFailed(Check):
-    """No agent's law, and no graph of a user, fails: its inverter would go on on primary droop."""
+    """No law and no graph of a user fails in an agent, which would leave its inverter on primary droop."""
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
         failures = law_failures(case.events)
@@ -55,14 +55,14 @@ class Returned(Check):
 
 
 class Rating(Check):
-    """No inverter delivers more real or apparent power than it is made for, but for a while."""
+    """No inverter delivers more real or apparent power than its limits for long."""
 
     P_limit_pu: Annotated[float, Unit("pu"), _LOADING] = 1.05
     """Largest real power (pu of the rating) that may last; the margin is for ripple."""
     S_limit_pu: Annotated[float, Unit("pu"), _LOADING] = 1.2
     """Largest apparent power (pu of the rating) that may last: S_max of the grid-following inverters."""
     longest_s: Annotated[float, Unit("s"), Plausible("a time of overload", 0.0, 3600.0)] = 1.0
-    """Longest time (s) above one of them."""
+    """Longest time (s) above a limit."""
     since_s: Since = 0.0
     with_killed: WithKilled = True
 
@@ -154,15 +154,15 @@ class Oscillation(Check):
     """
 
     damping_percent: Annotated[float, Unit("%"), Plausible("a damping ratio", 0.0, 100.0)] = 3.0
-    """Least damping ratio of the dominant mode (%): what system operators take for the least acceptable."""
+    """Least damping ratio of the dominant mode (%); system operators commonly accept no less."""
     f_swing_Hz: Annotated[float, Unit("Hz"), _SWING] = 0.01
-    """Swing of a grid-forming inverter's frequency (Hz, highest minus lowest) that is no ripple any more."""
+    """Largest swing of a grid-forming inverter's frequency (Hz, highest minus lowest) that counts as ripple."""
     P_swing_pu: Annotated[float, Unit("pu"), _SWING] = 0.01
-    """The same of real power (pu of rating)."""
+    """Largest swing of real power (pu of rating) that counts as ripple."""
     V_swing_pu: Annotated[float, Unit("pu"), _SWING] = 0.005
-    """The same of the terminal voltage (pu of nominal)."""
+    """Largest swing of the terminal voltage (pu of nominal) that counts as ripple."""
     tail_s: Annotated[float, Unit("s"), Plausible("the length of a tail", 0.2, 3600.0, above_zero=True)] = 4.0
-    """Longest tail of the run that is looked at (s); at most the second half of the time since the last event."""
+    """Longest judged part of the end of the run (s), at most half of the time since the last event."""
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
         history, plates, t = case.history, case.nameplates, case.history.t

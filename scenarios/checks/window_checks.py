@@ -59,9 +59,9 @@ class Frequency(Check):
 
     since_s: Since = 0.0
     band_Hz: Annotated[float, Unit("Hz"), Plausible("a band of frequency", 1e-4, 10.0, above_zero=True)] = 0.01
-    """Largest abs(f - f_nom) (Hz): what the paper calls restored."""
+    """Largest abs(f - f_nom) (Hz); below it, the paper calls the frequency restored."""
     within_s: Annotated[float, Unit("s"), _SETTLING] = 2.0
-    """Time (s) after the event from which on it holds."""
+    """Time (s) after the event from which the band applies."""
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
         def judge(part: IslandWindow, late: Flags) -> list[Violation] | None:
@@ -83,11 +83,11 @@ class Voltage(Check):
 
     since_s: Since = 0.0
     low_pu: Annotated[float, Unit("pu"), Plausible("a least voltage", 0.3, 1.2), Below("high_pu")] = 0.88
-    """Least voltage (pu of nominal): the end of continuous operation of IEEE 1547-2018."""
+    """Lowest voltage (pu of nominal) of continuous operation by IEEE 1547-2018."""
     high_pu: Annotated[float, Unit("pu"), Plausible("a greatest voltage", 0.8, 1.5)] = 1.10
-    """Greatest voltage (pu of nominal), of the same."""
+    """Highest voltage (pu of nominal) of continuous operation."""
     within_s: Annotated[float, Unit("s"), _SETTLING] = 2.0
-    """Time (s) after the event from which on it holds: the clearing time of OV1 of IEEE 1547-2018."""
+    """Time (s) after the event from which the band applies; the clearing time of OV1 of IEEE 1547-2018."""
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
         def judge(part: IslandWindow, late: Flags) -> list[Violation] | None:
@@ -106,7 +106,7 @@ class PowerSharing(Check):
     after_s: _After = 2.0
     with_killed: WithKilled = True
     limit: Annotated[float, Plausible("a sharing index", 1e-4, 2.0, above_zero=True)] = 0.01
-    """Largest MPSI, (16): what the paper calls shared."""
+    """Largest MPSI, (16); below it, the paper calls power shared."""
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
         return _unequal(self, case, "MPSI")
@@ -119,7 +119,7 @@ class VarSharing(Check):
     after_s: _After = 2.0
     with_killed: WithKilled = True
     limit: Annotated[float, Plausible("a sharing index", 1e-4, 2.0, above_zero=True)] = 0.2
-    """Largest MQSI, (17): a fifth of what islanding leaves without coordination, as in the paper."""
+    """Largest MQSI, (17): a fifth of the value of uncoordinated islanding, as in the paper."""
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
         return _unequal(self, case, "MQSI")
@@ -147,7 +147,7 @@ def _unequal(check: PowerSharing | VarSharing, case: CheckedCase, index: str) ->
 
 
 class SteadyEnd(Check):
-    """At the end of each window, frequency, powers and voltages are steady values: they can be measured.
+    """At the end of each window, frequency, powers and voltages are steady.
 
     A value is steady where the report prints it as a number (`docs/reference/measures-and-checks.md`).
     """

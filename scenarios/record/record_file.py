@@ -71,7 +71,7 @@ class RecordFile:
         self._info: RecordInfo | None = None
         self.refresh()
         if self._info is None:
-            raise RecordFileError(f"{path}: it ends before it says what was recorded: {self._size} bytes")
+            raise RecordFileError(f"{path}: the file ends before its description of the run: {self._size} bytes")
         self.info: RecordInfo = self._info
 
     @property
@@ -123,7 +123,7 @@ class RecordFile:
                 file.seek(self._offset)
                 if not self._offset and file.read(len(_MAGIC)) != _MAGIC:
                     raise RecordFileError(
-                        f"{self.path}: this is no record: it does not begin as an MCAP file; give a {FILE}"
+                        f"{self.path}: this is not a record: it does not begin as an MCAP file; give a {FILE}"
                     )
                 self._offset = file.tell()
                 if not self.complete:
@@ -166,7 +166,7 @@ class RecordFile:
             profile = ""
         if profile != PROFILE:
             raise RecordFileError(
-                f"{self.path}: an MCAP file, but no record of gridpeers: its profile is {profile!r:.42}"
+                f"{self.path}: an MCAP file, but not a record of gridpeers: its profile is {profile!r:.42}"
             )
 
     def _info_of(self, data: bytes) -> RecordInfo | None:
@@ -188,7 +188,7 @@ class RecordFile:
             return decode_foreign(msgspec.json.Decoder(RecordInfo).decode, info)
         except (KeyError, msgspec.MsgspecError) as error:
             raise RecordFileError(
-                f"{self.path}: what it says about its run (written by gridpeers {by[:40]}) cannot be read: {error}"
+                f"{self.path}: its description of the run (written by gridpeers {by[:40]}) cannot be read: {error}"
             ) from None
 
 
@@ -220,7 +220,9 @@ def records_in(path: Path, case: str = "") -> tuple[Path, ...]:
         return (file,)
     found = {file.parent.name: file for file in sorted(path.glob(f"*/{FILE}"))}
     if not found:
-        raise RecordFileError(f"{path}: there is no {FILE}: the run was not recorded, or this is no folder of a run")
+        raise RecordFileError(
+            f"{path}: there is no {FILE}: the run was not recorded, or this is not the folder of a run"
+        )
     if case and case not in found:
         raise RecordFileError(f'{path}: no record of case "{case}"; {suggestion(case, found, "cases")}')
     return (found[case],) if case else tuple(found.values())

@@ -161,17 +161,16 @@ class RunRecord:
         tick = int(t / self.info.T_c + 1e-6)
         state = self.index.state(agent, tick, t) if self.info.simulated else None
         if state is not None and not (state.idle or self.entries_of_decisions.know(state, state.t)):
-            last = "" if found is None else f"; its last decision in the record is of t = {found.t:.2f} s"
+            last = "" if found is None else f"; its last decision in the record is at t = {found.t:.2f} s"
             raise RecordFileError(
-                f"{self.path}: it lacks how {agent} decided at t = {t:g} s: its journal ends before{last}"
+                f"{self.path}: it lacks the decision of {agent} at t = {t:g} s: its journal ends before{last}"
             )
         if found is None:
             first = next(self.decisions(agent), None)
             if first is None:
                 raise RecordFileError(f"{self.path}: it has no decision of {agent}")
             raise RecordFileError(
-                f"{self.path}: {agent} had not decided anything by t = {t:g} s; "
-                f"its first decision is of t = {first.t:.2f} s"
+                f"{self.path}: {agent} made no decision by t = {t:g} s; its first decision is at t = {first.t:.2f} s"
             )
         return found
 

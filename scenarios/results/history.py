@@ -199,8 +199,8 @@ def windows(scenario: ScenarioModel, recorded: Iterable[PlantEvent]) -> tuple[Wi
 def late_moves(scenario: ScenarioModel, recorded: Iterable[PlantEvent]) -> list[str]:
     """Return sentences on events that came later than the scenario says, as processes, or people, took their time."""
     return [
-        f"{event.label}, meant for t = {event.t_s:g} s, came at {came.start:g} s, when the last of its agents had "
-        "moved; what is measured of it begins there"
+        f"{event.label}, planned for t = {event.t_s:g} s, came at {came.start:g} s, when the last of its agents had "
+        "moved; its window begins there"
         for event, came in zip(scenario.events, windows(scenario, recorded), strict=True)
         if came.start > event.t_s + 1e-9
     ]

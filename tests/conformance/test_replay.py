@@ -114,7 +114,7 @@ def test_a_replay_of_a_part_claims_equality_of_that_part_alone(run: Result, tmp_
         (("--law", "dappi"), 'did you mean "dapi"'),
         (("--set", "gains.kp=1"), 'did you mean "k_p"'),
         (("--set", "gains.k_p"), "needs a key and its value, as gains.k_p=0.001"),
-        (("--from", "0.5"), "nothing is changed from then on"),
+        (("--from", "0.5"), "nothing changes from then on"),
     ],
 )
 def test_an_impossible_change_is_refused(words: tuple[str, ...], told: str, run: Result, elsewhere: Path) -> None:

@@ -62,7 +62,7 @@ function take(message) {
   if (message.hello) {
     S.hello = message.hello; player.keepTime(); entitle("", "", S.hello.run);
     $("control").hidden = $("tools").hidden = !S.hello.control; $("player").hidden = $("decision").hidden = !S.hello.record; strips.end = null; strips.length = 30; put($("strips-title"), "Last 30 s");
-    $("rights").textContent = S.hello.record ? `${S.hello.where}: a record: nothing can be changed` : S.hello.control ? "" : "nothing can be changed; start it with --control to act";
+    $("rights").textContent = S.hello.record ? `record ${S.hello.where}, read-only` : S.hello.control ? "" : "read-only; start the view with --control to act";
     document.body.classList.toggle("can-act", S.hello.control); document.body.classList.toggle("record", !!S.hello.record); heads();
     diagram.keys.setRoles(kind => S.hello.control || S.hello.record && kind === "agent" ? "button" : "img");
     clear();
@@ -123,7 +123,7 @@ function draw() {
   const frame = S.frame, lost = S.heard && (performance.now() - S.heard > silence() || S.socket.readyState !== 1);
   const live = lost ? "lost" : frame ? S.hello.record ? player.grows ? "recording" : "record" : frame.live.word : "waiting", current = ["live", "record", "recording"].includes(live);
   if (document.body.dataset.live !== live) document.body.dataset.live = live;
-  put($("live-text"), lost ? "no word from this page's server: nothing here is of now" : !frame ? "connecting" : S.hello.record ? ["record", player.news?.text, frame.live.text === "record" ? "" : frame.live.text].filter(Boolean).join(". ") : frame.live.text);
+  put($("live-text"), lost ? "the server of this page does not answer: these numbers are old" : !frame ? "connecting" : S.hello.record ? ["record", player.news?.text, frame.live.text === "record" ? "" : frame.live.text].filter(Boolean).join(". ") : frame.live.text);
   if (!frame) return;
   put($("time"), frame.t === null ? "" : `t = ${frame.t.toFixed(2)} s`); put($("pace"), current ? frame.pace : "");
   const inverters = frame.inverters.map(one => current ? one : stale(one));
@@ -133,7 +133,7 @@ function draw() {
   const states = new Map(inverters.map(one => [one.name, { absent: one.note === "no agent", V: one.V, off: one.off_voltage }]));
   for (const [key, kind] of S.pending) if (kind === "stop" && states.get(key)?.absent || kind === "start" && states.get(key)?.absent === false) S.pending.delete(key);
   diagram.update(S.pairs, S.switches, states, S.pending, S.lit, S.loads, S.dead);
-  put($("diagram-text"), `${current ? "" : "Not of now, but as it was last. "}${diagramText(S.map, S.pairs, S.switches, frame.inverters, islands, S.loads, S.dead)}`);
+  put($("diagram-text"), `${current ? "" : "Last known state, not the present one. "}${diagramText(S.map, S.pairs, S.switches, frame.inverters, islands, S.loads, S.dead)}`);
   const silent = frame.live.since || (lost ? (performance.now() - S.heard) / 1000 : 0);
   // most frames have statuses alone: the strips, which take most of the time, stay as they are
   const now = [strips.latest, strips.end, strips.points.length, S.lit, current ? 0 : silent.toFixed(1), S.events.length, innerWidth, devicePixelRatio, colours.join()].join("|");

@@ -110,11 +110,11 @@ def export(
 ) -> None:
     """Write a run's tables as CSV, Parquet, MATLAB or Excel files.
 
-    Rows, events and fates of messages come of the record run.mcap, also where the run was killed or still goes on: then
-    they end with it, and a note says so. csv, parquet and feather have a file for each table, mat and xlsx one for all.
-    Files of the same name are replaced.
+    The tables come from the record run.mcap, also of a run that was killed or goes on; a note then says where they
+    end. csv, parquet and feather write a file for each table, mat and xlsx one for all. Files of the same name are
+    replaced.
 
-    Exit code: 0 they were written, 2 bad usage, no record, no rows, or a folder that cannot be written.
+    Exit code: 0 written, 2 bad usage, no record, no rows, or a folder that cannot be written.
 
     Example:  gridpeers export runs/islanding/latest --to parquet
     """

@@ -222,9 +222,9 @@ def test_bad_input_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.chdir(tmp_path)
     (tmp_path / "run.mcap").write_bytes(b"nothing of the kind")
     for words, complaint in (
-        (("view", "run.mcap"), "run.mcap: this is no record: it does not begin as an MCAP file; give a run.mcap"),
+        (("view", "run.mcap"), "run.mcap: this is not a record: it does not begin as an MCAP file; give a run.mcap"),
         (("view", "gone"), "gone: cannot be read: No such file or directory"),
-        (("view", "run.mcap", "--control"), "--control: goes with a live run; nothing can be done to a record"),
+        (("view", "run.mcap", "--control"), "--control: needs a live run; a record cannot be changed"),
         (("view", "--case", "IV"), "--case: goes with a RECORD; a live run has one case"),
         (("view", "--port", "70000"), "--port: a port is a number from 0 to 65535, got 70000"),
     ):

@@ -65,7 +65,7 @@ def sets_a_load(desk: Desk, plant: Terminal, page: Page, other: Page) -> None:
 def test_a_click_is_a_command_and_stale_numbers_are_not_shown_as_live(desk: Desk, browser: Browser) -> None:
     """A click does to the run what its command does, on every open page.
 
-    A frozen or killed plant leaves no number as of now; those of the plant that comes after it begin anew.
+    A frozen or killed plant leaves no present number; those of the plant that comes after it begin anew.
     """
     plant = run_of(desk)
     view, url = view_of(desk, "--control")
@@ -120,7 +120,7 @@ def test_a_click_is_a_command_and_stale_numbers_are_not_shown_as_live(desk: Desk
 
     view.signal(signal.SIGSTOP)
     page.wait_for_selector('body[data-live="lost"]')
-    assert "nothing here is of now" in page.locator("#live").inner_text()
+    assert "these numbers are old" in page.locator("#live").inner_text()
     view.signal(signal.SIGCONT)
     page.wait_for_selector('body[data-live="live"]')
     view.signal(signal.SIGINT)
@@ -233,12 +233,12 @@ def test_views_are_for_those_who_may_see_them_and_only_look(desk: Desk, browser:
     looking.keyboard.press("Enter")
     assert not looking.locator("#load-dialog").is_visible()
     looking.evaluate("""() => gridpeersView.socket.send('{"kind":"open","subject":"60-160"}')""")
-    looking.wait_for_selector("#command-list li.bad :text('only looks')", state="attached")
+    looking.wait_for_selector("#command-list li.bad :text('read-only')", state="attached")
 
     assert desk.type("down")[0] == 0
     looking.wait_for_selector('body[data-live="ended"]')
     assert "The run has ended" in looking.locator("#live").inner_text()
-    assert looking.locator("#diagram-text").inner_text().startswith("Not of now")
+    assert looking.locator("#diagram-text").inner_text().startswith("Last known state")
     assert looking.locator("tbody tr").first.locator("td").all_inner_texts()[:9] == ["\N{EN DASH}"] * 9
     view.signal(signal.SIGTERM)
     assert view.end() == 143
@@ -248,4 +248,4 @@ def test_an_address_that_cannot_be_is_one_line(desk: Desk, tmp_path: Path) -> No
     """No traceback; nothing is sought before."""
     code, text = desk.type("view", "--address", "nowhere.invalid", "--port", "0")
     assert code == 2
-    assert '--address: "nowhere.invalid" is no address' in text
+    assert '--address: "nowhere.invalid" is not an address' in text

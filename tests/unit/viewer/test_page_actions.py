@@ -195,7 +195,7 @@ def test_to_start_an_agent_is_the_command_too(monkeypatch: pytest.MonkeyPatch) -
 def test_a_name_is_no_option_of_its_command(name: str) -> None:
     """An agent of that name would be help on the terminal, and exit code 0 here."""
     for field in ("subject", "other"):
-        with pytest.raises(msgspec.ValidationError, match="is no name of a switch, load, inverter or agent"):
+        with pytest.raises(msgspec.ValidationError, match="is not the name of a switch, load, inverter or agent"):
             msgspec.json.decode(msgspec.json.encode({"kind": "start", field: name}), type=PageAction)
 
 
@@ -230,9 +230,9 @@ def test_a_page_that_only_looks_names_what_would_let_the_same_person_act(elsewhe
     make_site(Path("lab"))
     operator = open_credentials(Path("lab"), ("operator",))[0]
     viewer = open_credentials(Path("lab"), ("viewer",))[0]
-    said = "the page only looks, as viewer has the role viewer "
+    said = "the page is read-only, as viewer has the role viewer "
 
-    assert looks_only(operator) == "the page only looks (--control lets it act)"
+    assert looks_only(operator) == "the page is read-only (--control lets it act)"
     assert looks_only(viewer) == f"{said}(--as operator --control lets it act)"
     (elsewhere / "lab" / "operator.key").unlink()
     assert looks_only(viewer) == f"{said}(to act takes --control and the key of an operator)"

@@ -63,5 +63,5 @@ def test_on_this_host_no_token_is_needed_but_a_name_of_this_host_is(address: str
 
 def test_a_token_of_no_text_is_refused() -> None:
     """Bytes of a command line that are no UTF-8 can be typed into no page."""
-    with pytest.raises(UsageError, match="--token: has bytes that are no text"):
+    with pytest.raises(UsageError, match="--token: is not text"):
         access("127.0.0.1", "a\udcff")

@@ -126,7 +126,7 @@ def test_a_folder_without_a_record_is_one_sentence(whole: Path, tmp_path: Path) 
     (tmp_path / FILE).write_bytes(b"PK\x03\x04")
     for path, complaint in (
         (tmp_path / "none", "there is no run.mcap"),
-        (tmp_path / FILE, "this is no record"),
+        (tmp_path / FILE, "this is not a record"),
         (tmp_path / "gone", "cannot be read"),
     ):
         with pytest.raises(RecordFileError, match=complaint) as refused:

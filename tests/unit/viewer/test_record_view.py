@@ -150,7 +150,7 @@ def test_a_record_of_the_physics_shows_them_eachsays_what_it_lacks(tmp_path: Pat
     assert frame.inverters[0].P is not None
     assert {one.note for one in frame.inverters} == {""}
     assert not any(frame.links.values())
-    assert view.missing == ('It was recorded with record = "physics": no links and no decisions are in it.',)
+    assert view.missing == ('The record has no links and no decisions (record = "physics").',)
 
 
 def test_without_the_feeder_the_inverters_steachin_a_ring(record: RunRecord, tmp_path: Path) -> None:
@@ -163,7 +163,7 @@ def test_without_the_feeder_the_inverters_steachin_a_ring(record: RunRecord, tmp
     assert [row.name for row in view.map.inverters] == list(copy.info.inverters)
     assert len({bus[1:] for bus in view.map.buses}) == len(copy.info.inverters)
     assert view.map.branches == ()
-    assert "gone is not here" in view.missing[-1]
+    assert "gone is not on this host" in view.missing[-1]
     assert view.frame(0.3).inverters[0].P is not None
 
 

@@ -190,5 +190,5 @@ def test_states_that_were_rejected_have_arrived(tmp_path: Path) -> None:
 
 def test_a_record_without_arrivals_is_not_judged(tmp_path: Path) -> None:
     """Where nobody has noted what arrived, nothing is missing; after 7 s every state would be."""
-    with pytest.raises(NotJudgedError, match='record = "decisions" does not have what arrived'):
+    with pytest.raises(NotJudgedError, match='record = "decisions" has no arrivals'):
         violations(tmp_path, lambda run: None, end=8.5, record="decisions")

@@ -109,7 +109,7 @@ def test_a_scenario_names_checks_of_its_own_and_other_limits() -> None:
         ([{"use": "rating", "name": "a b"}], "checks[0].name: a name in the verdict is up to 41 letters"),
         (["rating", "rating"], 'checks[1]: there is a check "rating" in this list already'),
         ([{"use": "rating", "name": "steady"}], 'checks[0]: every run has a check "steady" already'),
-        ([{"use": "rating", "name": "mine", "off": True}], 'checks[0].off: no run has a check "mine" unless'),
+        ([{"use": "rating", "name": "mine", "off": True}], 'checks[0].off: the check "mine" is off unless'),
         (["math:pi"], "checks[0]: math:pi is no check"),
         ([{"limit_pu": 1.0}], "checks[0]: names no check"),
     ],

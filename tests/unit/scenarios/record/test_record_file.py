@@ -143,10 +143,10 @@ def mcap(profile: str, **metadata: str) -> bytes:
 @pytest.mark.parametrize(
     ("content", "complaint"),
     [
-        (b"", "this is no record: it does not begin as an MCAP file"),
-        (b"t_s,inv1_f_Hz\n", "this is no record"),
-        (b"\x89MCAP0\r\n", "it ends before it says what was recorded: 8 bytes"),
-        (mcap("ros2"), "no record of gridpeers: its profile is 'ros2'"),
+        (b"", "this is not a record: it does not begin as an MCAP file"),
+        (b"t_s,inv1_f_Hz\n", "this is not a record"),
+        (b"\x89MCAP0\r\n", "the file ends before its description of the run: 8 bytes"),
+        (mcap("ros2"), "not a record of gridpeers: its profile is 'ros2'"),
         (
             mcap(PROFILE, format=str(FORMAT + 1), gridpeers="9.9", info="?"),
             f"of format {FORMAT + 1}, written by gridpeers 9.9; .*install the later",

@@ -297,7 +297,7 @@ def test_a_window_starts_when_its_event_happened() -> None:
     assert came == {"islanding": 1.0, "leave": 2.0, "return": 3.32}
     assert kept == {"islanding": 1.0, "leave": 2.0, "return": 3.0}
     assert late_moves(scenario, [left]) == []
-    assert late_moves(scenario, [left, back])[0].startswith("return, meant for t = 3 s, came at 3.32 s")
+    assert late_moves(scenario, [left, back])[0].startswith("return, planned for t = 3 s, came at 3.32 s")
 
 
 def test_a_saved_run_with_a_removed_key_can_be_read(tmp_path: Path) -> None:
