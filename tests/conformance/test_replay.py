@@ -101,7 +101,7 @@ def test_a_replay_of_a_part_claims_equality_of_that_part_alone(run: Result, tmp_
 
     assert code == 0, text
     said = text.partition("The replay gives what was recorded, within 1e-9, as far as it was compared:\n")[2]
-    assert "NOTE  the record lacks later decisions" in said, text
+    assert "NOTE  the record lacks the last decisions" in said, text
     assert "NOTE  the file is cut off within a " in said
     assert "within 1e-9." not in text
 
