@@ -51,6 +51,7 @@ class _FromFolder:
     """Scenario of the run, as typed values."""
     folder: Path
     """Folder with the files of the run (docs/reference/files-and-export.md)."""
+    _repr_html_ = lambda self: html(repr(self), self.plot(), self.metrics)  # noqa: E731  # in notebooks
 
     def __init__(self, folder: RunFolder, spec: model.ScenarioModel, feeder: Tables) -> None:
         self._folder, self._feeder = folder, feeder
@@ -162,9 +163,6 @@ class Results(_FromFolder, Mapping[str, "Result"]):
 
     def __repr__(self) -> str:
         return f"<Results {self.spec.name}: cases {', '.join(self)}; {self.driver}>"
-
-    def _repr_html_(self) -> str:
-        return html(repr(self), self.plot(), self.metrics)
 
 
 class Result(_FromFolder):
@@ -304,9 +302,6 @@ class Result(_FromFolder):
 
     def __repr__(self) -> str:
         return f"<Result {self.spec.name} {self.case}: {self.driver}; history {self.sha256[:12]}>"
-
-    def _repr_html_(self) -> str:
-        return html(repr(self), self.plot(), self.metrics)
 
 
 def html(title: str, figure: Figure, *tables: pd.DataFrame) -> str:
