@@ -35,14 +35,16 @@ CaseOfRun = Annotated[str, option("NAME", "Case of the run, if RUN has several."
 
 def predict(
     scenario: ScenarioName,
-    case: Annotated[str | None, option("NAMES", "Cases to predict, e.g. III,IV; all when left out.")] = None,
-    vars_: Annotated[bool, flag("Modes of voltage and vars, which take a second or two.", "--vars/--no-vars")] = True,
+    case: Annotated[str | None, option("NAMES", "Cases to predict, e.g. III,IV; all if left out.")] = None,
+    vars_: Annotated[
+        bool, flag("Predict modes of voltage and vars too, which takes a second or two.", "--vars/--no-vars")
+    ] = True,
 ) -> None:
     """Predict from theory how a scenario will go.
 
-    That is modes, settling times, limits of step and delay, and times to restore after each event.
-    Nothing is run but the plant on droop alone, to learn the load of each event and how vars answer to V_set.
-    docs/understand/findings.md has the equations, and how far they met the plant.
+    It prints modes, settling times, limits of step and delay, and times to restore after each event. It runs the
+    plant on droop alone, for the load of each event and the effect of V_set on vars. docs/understand/findings.md has
+    the equations, and compares predictions with the plant.
 
     Example:  gridpeers predict islanding --case IV
     """
@@ -65,7 +67,7 @@ def predict(
 def why(
     run: RecordedRun,
     agent: Annotated[str, argument("AGENT", "Name of the inverter, e.g. inv4.")],
-    t: Annotated[float, argument("TIME", "Run time (s): the decision in force then is explained.")],
+    t: Annotated[float, argument("TIME", "Run time (s) of the decision.")],
     case: CaseOfRun = "",
 ) -> None:
     """Explain why an agent decided as it did.
@@ -93,13 +95,15 @@ def _tell_notes(notes: Iterable[str]) -> None:
 
 def trace(
     run: RecordedRun,
-    out: Annotated[Path | None, option("FILE", "The trace; trace.pftrace beside the record when left out.")] = None,
+    out: Annotated[
+        Path | None, option("FILE", "File of the trace; trace.pftrace beside the record if left out.")
+    ] = None,
     case: CaseOfRun = "",
 ) -> None:
     """Write a run's messages as a Perfetto trace.
 
-    https://ui.perfetto.dev opens it: tracks of agents and links, an arrow for each message, losses and cuts, and f, P
-    and MPSI on the same axis.
+    https://ui.perfetto.dev opens the file. It has tracks of agents and links, an arrow for each message, losses and
+    cuts, and f, P and MPSI on the same time axis.
 
     Example:  gridpeers trace runs/islanding/latest/IV
     """
@@ -125,17 +129,15 @@ def replay(
     run: RecordedRun,
     case: CaseOfRun = "",
     without: Annotated[
-        list[str] | None, option("LINKS", 'Cut links: "inv4 -> inv7", "inv4 <-> inv7"; can be repeated.')
+        list[str] | None, option("LINKS", 'Cut these links: "inv4 -> inv7", "inv4 <-> inv7"; repeatable.')
     ] = None,
     law: Annotated[str, option("KEY", "Another law: a name, or module:Class.")] = "",
     values: Annotated[
         list[str] | None,
-        option("KEY=VALUE", "A key of agents or links, e.g. gains.k_p=0.001; can be repeated.", "--set"),
+        option("KEY=VALUE", "A key of agents or links, e.g. gains.k_p=0.001; repeatable.", "--set"),
     ] = None,
     since: Annotated[float, option("T", "Run time (s) from which links change; 0: the start.", "--from")] = 0.0,
-    out: Annotated[
-        Path | None, option("DIR", "New folder for what would have been; in runs/ when left out.", "--out")
-    ] = None,
+    out: Annotated[Path | None, option("DIR", "New folder for the changed run; in runs/ if left out.", "--out")] = None,
 ) -> None:
     """Replay a recorded run, or show what would have been.
 

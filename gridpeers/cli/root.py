@@ -147,9 +147,8 @@ def gridpeers(
 ) -> None:
     """Peer-to-peer consensus control of microgrid inverters: a plant process and one process per inverter, over Zenoh.
 
-    Exit codes of all commands: 0 all is well; 1 a claim, a law or a run of chaos failed, a check with --require-checks,
-    or a replay differs; 2 bad usage, a bad file, or nobody there; 3 a run broke, or somebody has not answered; 130
-    Ctrl-C; 143 SIGTERM.
+    Exit codes: 0 success; 1 a claim, a law, a run of chaos, or a check with --require-checks failed, or a replay
+    differs; 2 bad usage, a bad file, or no run found; 3 a run broke, or no answer came; 130 Ctrl-C; 143 SIGTERM.
 
     Example:  gridpeers run islanding
     """

@@ -30,17 +30,17 @@ if TYPE_CHECKING:
 
 
 def experiment(
-    name: Annotated[str, argument("NAME", "An experiment; `list`, or nothing, shows all of them.")] = "list",
+    name: Annotated[str, argument("NAME", "Name of an experiment; `list` shows all.")] = "list",
     out: Annotated[
-        Path | None, option("DIR", "Folder, new or this experiment's; runs/experiments/NAME when left out.")
+        Path | None, option("DIR", "Folder, new or of this experiment; runs/experiments/NAME if left out.")
     ] = None,
     figures: FigureFormat = "png",
-    jobs: Annotated[int | None, option("N", "Processes of a sweep; one per core when left out.", min=1)] = None,
+    jobs: Annotated[int | None, option("N", "Processes of a sweep; one per core if left out.", min=1)] = None,
 ) -> None:
     """Run an experiment on late, lossy or broken links.
 
-    It writes its figure and table, with theory beside.
-    A sweep that was interrupted goes on by the same command. docs/understand/findings.md has the findings.
+    It writes a figure and a table, with theory beside. The same command resumes an interrupted sweep.
+    docs/understand/findings.md has the findings.
 
     Example:  gridpeers experiment delay
     """

@@ -21,14 +21,14 @@ TEMPLATE = Path(__file__).parents[1] / "template"
 def init(
     folder: Annotated[Path, argument("DIR", "Folder of the project, new or empty.")],
     feeder: Annotated[
-        Path | None, option("FILE", "Island this feeder, a .dss or .glm file: a scenario is proposed.", "--feeder")
+        Path | None, option("FILE", "Propose an islanding of this feeder, a .dss or .glm file.", "--feeder")
     ] = None,
     switch: Switches = None,
     leave_out: LeaveOut = None,
 ) -> None:
     """Make a project of your own, or an islanding of your feeder.
 
-    Without --feeder it has a law, a scenario and a test; with it, the feeder's tables, inverters and a scenario.
+    The project has a law, a scenario and a test; with --feeder the tables of the feeder, inverters and a scenario.
 
     Example:  gridpeers init my-study --feeder Master.dss
     """

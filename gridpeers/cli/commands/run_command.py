@@ -47,24 +47,22 @@ def run(
         ),
     ] = "simulated",
     speed: Annotated[float, option("X", "With --clock realtime: seconds of the run per second of real time.")] = 1.0,
-    strict: Annotated[bool, flag("With --clock realtime: break the run when it cannot keep pace.", "--strict")] = False,
+    strict: Annotated[bool, flag("With --clock realtime: break the run if it cannot keep pace.", "--strict")] = False,
     plant: Annotated[
         str | None,
-        option("NAME", "What simulates the plant: gridpeers, gridlabd or helics; else as the scenario says."),
+        option("NAME", "Simulator of the plant: gridpeers, gridlabd or helics; that of the scenario if left out."),
     ] = None,
-    processes: Annotated[int, option("N", "Processes that the agents share; one an agent when left out.")] = 0,
+    processes: Annotated[int, option("N", "Number of processes that the agents share; 0: one per agent.")] = 0,
     keys: Keys = None,
-    case: Annotated[str | None, option("NAMES", "Cases to run, e.g. I,IV; all when left out.")] = None,
+    case: Annotated[str | None, option("NAMES", "Cases to run, e.g. I,IV; all if left out.")] = None,
     seed: Annotated[int | None, option("N", "Seed instead of the one in the scenario.", min=0)] = None,
-    require_checks: Annotated[
-        bool, flag("Exit code 1 also if a check fails; one that is not judged has not.", "--require-checks")
-    ] = False,
+    require_checks: Annotated[bool, flag("Exit with code 1 also if a check fails.", "--require-checks")] = False,
     details: Annotated[
         bool, flag("Print the whole report, as report.txt has it: tables, claims, checks, notes.", "--details")
     ] = False,
     figures: FigureFormat = "png",
     out: Annotated[
-        Path | None, option("DIR", "Folder for the results, new or empty; runs/SCENARIO/TIME when left out.")
+        Path | None, option("DIR", "Folder for the results, new or empty; runs/SCENARIO/TIME if left out.")
     ] = None,
 ) -> None:
     """Run a scenario and print its results.

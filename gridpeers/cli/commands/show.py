@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Literal
 
 import typer
 
@@ -33,8 +33,8 @@ def check(
 ) -> None:
     """Check a scenario file and its feeder for problems.
 
-    All problems come at once. A file without any is tried: whether its feeder has an operating point to start from.
-    Notes tell what its events de-energise, and where a graph bears fewer liars than its law should.
+    It lists all problems at once. If there is none, it solves the operating point of the feeder at the start. Notes
+    name the buses that an event de-energises, and graphs that bear fewer liars than their law should.
 
     Example:  gridpeers check my-islanding.toml
     """
@@ -50,12 +50,12 @@ def check(
 
 
 def doc(
-    topic: Annotated[Topic, argument("TOPIC", f"What to print: {', '.join(get_args(Topic))}.")],
+    topic: Annotated[Topic, argument("TOPIC", "Topic of the page.")],
 ) -> None:
     """Print a reference page that is made from the code.
 
-    keys and messages are those of the wire; scenario is the scenario file, with units and defaults; laws, inverters,
-    metrics, claims, checks, faults and graphs are what can be plugged in: those that there are, and your own.
+    keys and messages are those of the protocol; scenario has the keys of a scenario file, with units and defaults;
+    laws, inverters, metrics, claims, checks, faults and graphs list what you can plug in, yours included.
 
     Example:  gridpeers doc scenario
     """
@@ -71,7 +71,7 @@ def compare(
     first: _Run,
     second: _Run,
     out: Annotated[
-        Path | None, option("FILE", "Figure, as .png, .pdf or .svg; runs/comparison.png when left out.")
+        Path | None, option("FILE", "Figure, as .png, .pdf or .svg; runs/comparison.png if left out.")
     ] = None,
     figures: FigureFormat = "png",
 ) -> None:
@@ -105,8 +105,8 @@ def export(
     to: Annotated[
         Literal["csv", "parquet", "feather", "mat", "xlsx"], typer.Option(help="Format: text, Arrow, MATLAB or Excel.")
     ] = "csv",
-    case: Annotated[str, option("NAME", "Case of the run; all when left out.")] = "",
-    out: Annotated[Path | None, option("DIR", "Folder for the files; that of each record when left out.")] = None,
+    case: Annotated[str, option("NAME", "Case of the run; all if left out.")] = "",
+    out: Annotated[Path | None, option("DIR", "Folder for the files; that of each record if left out.")] = None,
 ) -> None:
     """Write a run's tables as CSV, Parquet, MATLAB or Excel files.
 

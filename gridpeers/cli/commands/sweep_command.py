@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 
 def sweep(
     file: Annotated[str, argument("FILE", "Path of a sweep file, or a name, e.g. gains, topology.")],
-    out: Annotated[Path | None, option("DIR", "Folder, new or of this sweep; runs/sweeps/NAME when left out.")] = None,
-    jobs: Annotated[int | None, option("N", "Processes; one per core when left out.", min=1)] = None,
+    out: Annotated[Path | None, option("DIR", "Folder, new or of this sweep; runs/sweeps/NAME if left out.")] = None,
+    jobs: Annotated[int | None, option("N", "Processes; one per core if left out.", min=1)] = None,
     dry_run: Annotated[bool, flag("Check every run, print their number, and run nothing.", "--dry-run")] = False,
 ) -> None:
     """Run a scenario many times over values of its keys.

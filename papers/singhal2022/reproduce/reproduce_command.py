@@ -31,19 +31,21 @@ def reproduce(
     ] = "processes",
     only: Annotated[
         str | None,
-        option("WHAT", "tables: what has tables, without figures; figures; or a part by its scenario's name."),
+        option("WHAT", "Part of the report: tables (without figures), figures, or the name of a scenario."),
     ] = None,
     seed: Annotated[
-        int | None, option("N", "Seed instead of the scenarios' own, also of random graphs.", min=0)
+        int | None, option("N", "Seed instead of those of the scenarios, also for random graphs.", min=0)
     ] = None,
-    jobs: Annotated[int | None, option("N", "Random graphs at a time; one per core when left out.", min=1)] = None,
+    jobs: Annotated[
+        int | None, option("N", "Random graphs that run at a time; one per core if left out.", min=1)
+    ] = None,
     out: Annotated[
-        Path | None, option("DIR", "Folder for the report, new or empty; runs/reproduce/TIME when left out.")
+        Path | None, option("DIR", "Folder for the report, new or empty; runs/reproduce/TIME if left out.")
     ] = None,
 ) -> None:
     """Reproduce the paper, and write one report.
 
-    Every table, figure and claim of ours stands beside the paper's.
+    The report compares every table, figure and claim with the paper.
 
     Example:  gridpeers reproduce --driver inprocess
     """
