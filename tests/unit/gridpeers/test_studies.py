@@ -75,8 +75,8 @@ def test_a_prediction_has_tables_and_the_words_of_the_command() -> None:
     assert found.times["t_restore_s"].tolist() == pytest.approx([0.64, 0.74], abs=0.02)
     assert invoke("predict", "islanding", "--case", "IV", "--no-vars") == (0, f"{found}\n")
     late = gp.load("islanding").replace({"case.IV.link": [{"on": "* <-> *", "delay": 0.1}]})
-    assert "without its faults" not in str(found)
-    assert "without its faults of links" in str(gp.predict(late, "IV", voltage=False))
+    assert "its faults of links" not in str(found)
+    assert "its faults of links and nodes are left out" in str(gp.predict(late, "IV", voltage=False))
     with pytest.raises(gp.ScenarioError, match="case IV: runs the law dapi"):
         gp.predict(gp.load("islanding").replace({"case.IV.law": "dapi"}), "IV", voltage=False)
     with pytest.raises(gp.ScenarioError, match='no case "V"; did you mean "IV"'):
