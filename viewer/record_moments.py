@@ -25,7 +25,7 @@ from gridpeers.scenarios.emulation.link_data import (
 )
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.viewer.run_view import FROZEN
-from gridpeers.viewer.strips import LENGTH, Point, Sampler, point_of
+from gridpeers.viewer.strips import LENGTH, Point, Sampler
 from gridpeers.wire.journal import Decision
 from gridpeers.wire.messages import LinkReport, LinkRequest, Measurement, State, Telemetry
 
@@ -69,7 +69,7 @@ class PlantRows:
         points.sort(key=lambda point: point[0])
         last = self.last(until)
         if last is not None and last[1][0] > max(since, points[-1][0] if points else since) + 1e-9:
-            points.append(point_of(*last, self._configs))
+            points += Sampler().points(last[0], (last[1],), self._configs)
         return points
 
     def _read_rows(self, part: int) -> tuple[tuple[str, ...], list[tuple[float, ...]]]:

@@ -79,10 +79,6 @@ class Sampler:
         return round(t, 4), tuple(value if isfinite(value) else None for value in values.tolist()), beyond
 
 
-def point_of(inverters: tuple[str, ...], row: tuple[float, ...], configs: Mapping[str, AgentConfig]) -> Point:
-    return next(Sampler().points(inverters, (row,), configs))
-
-
 def _values_of(
     inverters: tuple[str, ...], rows: Sequence[tuple[float, ...]], configs: Mapping[str, AgentConfig]
 ) -> Floats:
