@@ -89,23 +89,23 @@ def _notes(case: CheckedCase, recorded: Recorded, *, realtime: bool) -> Iterator
     """Yield sentences on what the scenario does not have, and on what of it is not measured."""
     ended, end_s = recorded.ended, case.scenario.time.end_s
     if realtime and not case.scenario.events:
-        yield "the scenario has no event, so there is no window to measure in"
+        yield "the scenario has no event, so there is nothing to measure"
     if ended > end_s + 1e-9:
-        yield f"measured up to {end_s:g} s, where the scenario ends; the history goes on to {ended:.2f} s"
+        yield f"measured up to {end_s:g} s, the end of the scenario; the history goes on to {ended:.2f} s"
     elif ended < end_s - 1e-9:
-        yield f"ended at {ended:.2f} s of {end_s:g} s; what is measured ends there"
+        yield f"ended at {ended:.2f} s of {end_s:g} s; the measures end there"
     if case.unmeasured:
-        yield f"not reached, too short, or without rows, so without numbers: {', '.join(case.unmeasured)}"
+        yield f"no numbers for {', '.join(case.unmeasured)}: not reached, too short, or without rows"
     if recorded.missing:
         spans = ", ".join(f"{before:.2f} and {after:.2f} s" for before, after in recorded.missing)
-        yield f"rows are missing between {spans}, as the record was out of the plant's reach"
+        yield f"rows are missing between {spans}: the plant did not reach the recorder"
     yield from late_moves(case.scenario, recorded.events)
     if commands := [event.text for event in recorded.events if event.kind == "command"]:
         count = counted(len(commands), "command")
-        yield f"people gave {count} that may change the run (events.csv), first: {commands[0]}"
+        yield f"people gave {count} (events.csv), first: {commands[0]}"
     if realtime and (moves := [each for each in recorded.events if each.kind == "roster" and each.t > 0.0]):
         times = counted(len(moves), "time")
-        yield f"agents came, left or were silent {times} after the start (events.csv), first: {moves[0].text}"
+        yield f"agents joined, left or were silent {times} (events.csv), first: {moves[0].text}"
     if shares := case.messages_saved:
         text = ", ".join(f"{100.0 * share:.0f} % in {window}" for window, share in shares.items())
         yield f"states not sent to neighbours: {text}"

@@ -99,10 +99,10 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
     from gridpeers.scenarios.measured_run import write_measures
 
     if request.clock == "realtime":
-        notes.append("in real time no two runs are the same: each has its own delays")
+        notes.append("in real time every run differs: each has its own delays")
     else:
         notes += [
-            f"case {case} cannot be reproduced: something happened in it that the scenario does not have"
+            f"case {case} cannot be reproduced: something happened that is not in the scenario"
             for case, record in recorded.items()
             if not record.reproducible
         ]

@@ -39,7 +39,7 @@ def compare(a: RunSource, b: RunSource, *, names: tuple[str, str] = ("a", "b")) 
     if not both:
         raise ScenarioError(
             [
-                f"the runs have no case in common: the first has {', '.join(first)}, the second {', '.join(second)}; "
+                f"the runs share no case: the first has {', '.join(first)}, the second {', '.join(second)}; "
                 f"run one case of each ({command_line('run')} --case), or choose in Python: "
                 f'gridpeers.compare(a["{next(iter(first))}"], b["{next(iter(second))}"])'
             ]

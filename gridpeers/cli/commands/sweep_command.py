@@ -59,7 +59,7 @@ def sweep(
     for why, count in summary.broke.most_common(3):
         typer.echo(f"  {count} x {why}")
     if len(summary.broke) > 3:
-        typer.echo(f"  and for {len(summary.broke) - 3} more reasons: see the column why")
+        typer.echo(f"  and {len(summary.broke) - 3} more reasons in the column why")
     typer.echo(f"table: {shown(summary.table)}")
     if broke == summary.runs:
         raise typer.Exit(BROKEN)

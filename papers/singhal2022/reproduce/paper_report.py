@@ -55,8 +55,9 @@ class Reproduction:
     def claims(self) -> str:
         """The number of claims that hold, in words."""
         counts = self.counts()
-        held = f"{counts['PASS']} of {len(self.verdicts)} claims hold, {counts['MISS']} missed for a known reason"
-        return f"{held}, {counts['FAIL']} failed."
+        held, missed, failed = (counts[status] for status in ("PASS", "MISS", "FAIL"))
+        known = f"{missed} known deviation{'s' * (missed != 1)}"
+        return f"{held} of {len(self.verdicts)} claims hold, {known}, {failed} failed."
 
     @property
     def took(self) -> str:

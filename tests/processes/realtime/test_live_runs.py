@@ -97,7 +97,7 @@ def test_terminals_in_the_order_of_people(desk: Desk) -> None:
     assert code == 0
     assert text.startswith("run lab ends at t = ")
     assert [terminal.end() for terminal in (plant, again, late)] == [0, 0, 0]
-    plant.expect("NOTE  case IV: people gave 3 commands that may change the run")
+    plant.expect("NOTE  case IV: people gave 3 commands")
     assert json.loads((desk.folder / "here" / "metrics.json").read_text())["cases"]["IV"]["commands"] == 3
     events = (desk.folder / "here" / "IV" / "events.csv").read_text()
     assert re.findall(",command,([^,]*),", events) == ["inv2", "48", "13-152"]
@@ -156,7 +156,7 @@ def test_up_stays_until_it_is_ended_and_leaves_no_process(desk: Desk) -> None:
     for child in children:
         with pytest.raises(ProcessLookupError):
             os.kill(child, 0)
-    up.expect(r"NOTE  case IV: ended at .* s of 3600 s; what is measured")
+    up.expect(r"NOTE  case IV: ended at .* s of 3600 s; the measures end")
     here = desk.folder / "here"
     events = (here / "IV" / "events.csv").read_text()
     assert " left" not in events

@@ -68,7 +68,7 @@ def test_a_recorder_that_stood_still_has_every_row(desk: Desk) -> None:
     times = [float(line.split(",")[0]) for line in (here / "IV" / "history.csv").read_text().splitlines()[1:]]
     assert times == pytest.approx([0.01 * k for k in range(len(times))])
     assert times[-1] >= 8.0
-    command.expect(r"NOTE  case IV: agents came, left or were silent \d+ times")
+    command.expect(r"NOTE  case IV: agents joined, left or were silent \d+ times")
     case = json.loads((here / "metrics.json").read_text())["cases"]["IV"]
     assert "missing" not in case
     measured = case["late"]

@@ -124,7 +124,7 @@ def test_runs_without_a_common_case_are_not_compared(runs: gp.Results) -> None:
     """Studies that cannot be compared are refused by name."""
     others = gp.load("islanding").replace({"time.end_s": 0.2, "event": None, "paper": ""}).run(["II", "III"])
 
-    with pytest.raises(gp.ScenarioError, match="no case in common: the first has I, IV, the second II, III; run one"):
+    with pytest.raises(gp.ScenarioError, match="the runs share no case: the first has I, IV, the second II, III;"):
         gp.compare(runs, others)
     with pytest.raises(gp.ScenarioError, match="needs results or folders of runs, got 3"):
         gp.compare(runs, 3)  # type: ignore[arg-type]

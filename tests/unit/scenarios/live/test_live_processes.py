@@ -180,7 +180,7 @@ def test_a_live_run_that_was_left_alone_has_the_numbers_of_its_case(tmp_path: Pa
         assert case[event] == pytest.approx(expected[event], rel=1e-6)
     assert case.keys() == expected.keys()
     assert "ours | paper's Table I\n" in report
-    assert "NOTE  case IV: measured up to 7 s, where the scenario ends; the history goes on to 8.00 s\n" in report
+    assert "NOTE  case IV: measured up to 7 s, the end of the scenario; the history goes on to 8.00 s\n" in report
 
 
 @pytest.mark.parametrize(("hole", "windows"), [((1.5, 3.0), ["event1", "event2"]), ((3.9, 4.5), ["event2"])])
@@ -194,8 +194,8 @@ def test_rows_that_are_missing_are_told(
 
     assert [name for name in case if name.startswith("event")] == windows
     assert case["missing"] == [{"after_s": before, "before_s": after}]
-    assert f"NOTE  case IV: rows are missing between {before:.2f} and {after:.2f} s, as the record" in report
-    assert ("without numbers: event1" in report) == (windows == ["event2"])
+    assert f"NOTE  case IV: rows are missing between {before:.2f} and {after:.2f} s: the plant" in report
+    assert ("no numbers for event1" in report) == (windows == ["event2"])
     assert "paper's Table I" not in report
 
 
@@ -211,8 +211,8 @@ def test_a_run_ended_early_is_measured_up_to_its_end(
     assert [mark.label for mark in drawing.events] == [
         label for label, t in (("event1", 1.0), ("event2", 4.0)) if t < until
     ]
-    assert f"NOTE  case IV: ended at {until:.2f} s of 7 s; what is measured ends there\n" in report
-    assert ("so without numbers" in report) == bool(unmeasured)
+    assert f"NOTE  case IV: ended at {until:.2f} s of 7 s; the measures end there\n" in report
+    assert ("no numbers for event" in report) == bool(unmeasured)
 
 
 def test_commands_of_people_are_counted_and_shown_in_figures(tmp_path: Path, recorded: Recorded) -> None:
@@ -224,9 +224,7 @@ def test_commands_of_people_are_counted_and_shown_in_figures(tmp_path: Path, rec
     )
 
     assert case["commands"] == 2
-    assert (
-        f"NOTE  case IV: people gave 2 commands that may change the run (events.csv), first: {said[0][1]}\n" in report
-    )
+    assert f"NOTE  case IV: people gave 2 commands (events.csv), first: {said[0][1]}\n" in report
     assert "paper's Table" not in report
     assert [(mark.label, mark.t, mark.what) for mark in drawing.events[2:]] == [("", 2.5, "67s-67"), ("", 2.5, "inv2")]
     assert drawing.moves
