@@ -15,12 +15,10 @@ from typing import Annotated, Any
 import typer
 
 from gridpeers.cli.usage import BROKEN, exit_code, fail, flag, interruptible, option
+from gridpeers.viewer.page_server import listen, url_of
 
-SITE = Path(__file__).with_name("site")
-"""The built pages: the wheel brings them, and a clone builds them here."""
-
-CONFIG = Path(__file__).parents[2] / "mkdocs.yml"
-"""In a clone alone: the site from which the pages are built."""
+SITE, CONFIG = Path(__file__).with_name("site"), Path(__file__).parents[2] / "mkdocs.yml"
+"""The built pages, which a wheel brings, and the file from which a clone builds them."""
 
 
 def docs(
@@ -33,21 +31,21 @@ def docs(
 
     Example:  gridpeers docs
     """
-    from gridpeers.viewer.page_server import listen, url_of
-
     with interruptible(), listen("127.0.0.1", port) as listening:
-        if CONFIG.is_file():
-            _build()
-        if not (SITE / "index.html").is_file():
-            fail(f"{SITE} has no pages; install gridpeers from a wheel, which has them")
-        url = url_of(listening, "127.0.0.1")
-        typer.echo(f"documentation: open {url} in a browser; Ctrl-C ends the command")
-        if not no_browser and (sys.platform != "linux" or {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys()):
-            webbrowser.open(url)  # without a display it would take the terminal
-        server = ThreadingHTTPServer(("127.0.0.1", 0), partial(_Quiet, directory=str(SITE)), bind_and_activate=False)
-        server.socket.close()
-        server.socket = listening
         try:
+            if CONFIG.is_file():
+                _build()
+            if not (SITE / "index.html").is_file():
+                fail(f"{SITE} has no pages; install gridpeers from a wheel, which has them")
+            url = url_of(listening, "127.0.0.1")
+            typer.echo(f"documentation: open {url} in a browser; Ctrl-C ends the command")
+            if not no_browser and (sys.platform != "linux" or {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys()):
+                webbrowser.open(url)  # without a display it would take the terminal
+            server = ThreadingHTTPServer(
+                ("127.0.0.1", 0), partial(_Quiet, directory=str(SITE)), bind_and_activate=False
+            )
+            server.socket.close()
+            server.socket = listening
             server.serve_forever()
         except KeyboardInterrupt as stop:
             fail("the documentation has ended", code=exit_code(stop))
