@@ -32,7 +32,7 @@ def build_plant(config: PlantConfig) -> Plant:
 
 
 def plant_at_rest(config: PlantConfig) -> Plant:
-    """Return our plant at its initial operating point, for who takes no step: the step is not compiled."""
+    """Return our plant at its initial operating point, without compiling the step."""
     network = Network(_feeder(config), spares=config.settings.spares)
     return Plant(network, config.settings, config.T_c, config.record_step)
 

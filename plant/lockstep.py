@@ -1,4 +1,4 @@
-"""The plant in simulated time: when it ticks, and who is on the roster of a tick. Pure.
+"""The plant in simulated time: its ticks, and the roster of each. Pure.
 
 Measurement(k) grants tick k, and the plant advances to k + 1 when it has State(k) of every agent on the roster. Each
 wait has a deadline, and names the agents that are missing. `now` (s on the driver's clock) serves deadlines only.

@@ -19,8 +19,8 @@ AGAIN = 1.0  # time (s) after which a question without an answer is asked again
 MOST_RECORDERS = 20  # recorders that are noted beside those that the run waits for: anybody may hold tokens
 
 REFUSALS, REFUSAL_INTERVAL = 20, 0.1
-"""Refused processes that are logged and told at once, and time (s) after which one more is told: each needs a publisher
-of its own, a millisecond or two in which a plant in real time does not step."""
+"""Refusals that are logged and answered at once, and time (s) until one more: each needs its own publisher, which holds
+up a plant in real time for a millisecond or two."""
 
 
 def agent_schedule(config: PlantConfig, inverters: tuple[str, ...]) -> dict[int, list[ScheduledAction]]:

@@ -1,13 +1,13 @@
 """The plant of a run as a node: it meets agents, measures for them, holds their set-points, and advances. Pure.
 
 It is the same in simulated and in real time. A tick policy decides when it ticks: `LockstepBarrier` once the whole
-roster has sent its states, `RealtimeTimer` by the clock. A roster decides who takes part: `LockstepRoster` changes
-between two ticks alone, `RealtimeRoster` at once.
+roster has sent its states, `RealtimeTimer` by the clock. A roster has the agents that take part: `LockstepRoster`
+changes only between two ticks, `RealtimeRoster` at once.
 
 *gathering*: until all agents and recorders of the configuration are there; in real time no longer than
 `wait_for_agents`. *preparing*, *joining*: the roster changes (`gridpeers.plant.lockstep`). *running*: from a
 measurement to the next one. *holding*: between two ticks of simulated time, while much telemetry has no
-acknowledgement of a recorder. It has no deadline: a recorder that stands still is waited for. *closing*: from `Stop`,
+acknowledgement of a recorder. It has no deadline, so the plant waits for a stopped recorder. *closing*: from `Stop`,
 until all tokens are gone, as proof that every node has heard it. *recording*: until recorders have all. *over*.
 
 What may be lost is asked again: for nameplates, and by the same `Prepare` for each `Ready`.

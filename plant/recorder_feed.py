@@ -22,8 +22,8 @@ KEPT_BYTES, KEPT_BYTES_RECORDED = 4_000_000, 40_000_000
 """Bytes that are kept in real time, without and with journals: two minutes of nine inverters."""
 
 WINDOW = 1_000_000
-"""Bytes without acknowledgement beyond which the plant waits before its next tick: a loopback link holds as many when
-nobody reads it, so Zenoh does not close it before."""
+"""Bytes without acknowledgement beyond which the plant waits before its next tick: an unread loopback link holds
+as many, so Zenoh does not close it before."""
 
 BLOCK = 1 << 20
 """Bytes of a block of kept messages: kept one by one, they leave the heap full of holes (40 MB in a live run)."""

@@ -41,9 +41,9 @@ class ProcessEndedError(RuntimeError):
 
 
 class RequestProcess:
-    """A program that is asked on standard input and answers on standard output; its standard error is kept.
+    """A program with requests on standard input and answers on standard output; its standard error is kept.
 
-    `folder`: where it stands; None: where this process stands; `environment`: variables beside those of this process.
+    `folder`: its working folder, by default this process's; `environment`: variables beside those of this process.
     """
 
     def __init__(

@@ -31,13 +31,13 @@ class Simulator:
         raise NotImplementedError
 
     def check(self, scenario: Any, feeder: Tables, problems: Any) -> None:
-        """Note what a scenario asks for beyond this simulator.
+        """Note the requests of a scenario that this simulator cannot serve.
 
         Types: `gridpeers.scenarios.schema.scenario_model.ScenarioModel`, and `Problems` beside it.
         """
 
     def starting(self, table: Any) -> str:
-        """Return what to tell a person who waits for the start; `table` is its own of the scenario, or None."""
+        """Return a message to show during the start; `table`: the simulator's own table of the scenario, or None."""
         return ""
 
 

@@ -1,6 +1,6 @@
 """Part "grid-forming": the microgrid feeder as an island behind one grid-forming storage, in OpenDSS and in our plant.
 
-The storage stands at 480 V behind a delta-wye transformer: OpenDSS's grid-forming source needs one, because its two
+The storage is at 480 V behind a delta-wye transformer: OpenDSS's grid-forming source needs one, because its two
 engines give it different impedances of zero sequence, and with `conn=wye` neither gives what `conn=delta` means.
 """
 

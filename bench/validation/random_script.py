@@ -13,7 +13,7 @@ MV, LV = 12.47, 0.4
 """Voltages (kV, line-to-line)."""
 
 TO_GROUND, TO_NEUTRAL, DELTA = "ground", "neutral", "delta"
-"""What the loads of a bus stand against."""
+"""The nodes to which the loads of a bus are connected."""
 
 ANTIFLOAT = "ppm_antifloat=10000"
 """Of a delta winding that feeds: 1 ppm, the default, resonates with a few meters of cable, 100 with a few hundred; the
@@ -263,7 +263,7 @@ New Circuit.random bus1=s basekv={MV} pu={rng.uniform(1.0, 1.04):.3f} angle={rng
         kvar = round(kW * rng.uniform(-0.1, 0.5), 2)
         model, limits = rng.choice((1, 1, 1, 2, 5)), rng.choice(LIMITS)
         if bus.loads == DELTA and len(nodes) == 1:
-            return  # nothing to stand against
+            return  # no node to connect to
         if len(nodes) == 3 and rng.random() < 0.6:
             delta = " conn=delta" if bus.loads == DELTA or (bus.loads == TO_GROUND and rng.random() < 0.3) else ""
             where = f"bus1={bus.name}{'.1.2.3.4' if bus.loads == TO_NEUTRAL else ''} phases=3 kv={bus.kV}{delta}"

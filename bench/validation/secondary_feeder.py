@@ -44,7 +44,7 @@ INVERTERS = {
 
 
 def island_tables() -> IslandTables:
-    """Return the tables with the load at 251 switched off; a machine stands in for the substation of `source`."""
+    """Return the tables with the load at 251 switched off; a machine replaces the substation of `source`."""
     tables = {path.stem: _read(path) for path in sorted(TABLES.glob("*.csv")) if path.stem != "published_voltages"}
     tables["line_configs"] = _read(Path(__file__).with_name("secondary_line_configs.csv"))
     for line in tables["lines"]:

@@ -73,7 +73,7 @@ class SecondaryControl:
     """The controller between two steps.
 
     `start` is GridLAB-D's clock at the first step (s): when a sample is due is decided by rounding at this magnitude.
-    `offsets` tell how far each participant's set-point is moved (pu).
+    `offsets`: change of each participant's set-point (pu).
     """
 
     def __init__(

@@ -165,9 +165,9 @@ def robustness(A: Floats, exact: int = EXACT) -> Robustness:
     disjoint sets, neither empty, one at least is r-reachable (LeBlanc et al., IEEE J. Sel. Areas Commun. 31(4), 2013).
     On a (2F + 1)-robust graph the honest agents agree by W-MSR with F, if each hears at most F liars.
 
-    For more than `exact` agents these are bounds. Above: nobody hears more agents than it has neighbours, and of two
-    sets one has at most half of all agents. Below, if all links go both ways: at least lambda_2 |S| |V - S| / |V| links
-    leave a set S, so in the smaller one of two sets, which is at most half, someone hears lambda_2 / 2 agents outside.
+    For more than `exact` agents these are bounds. Above: an agent hears at most its neighbours, and of two sets one has
+    at most half of all agents. Below, if all links go both ways: at least lambda_2 |S| |V - S| / |V| links
+    leave a set S, so in the smaller of two sets, which is at most half, one agent hears lambda_2 / 2 agents outside.
     """
     links = np.asarray(A) > 0.0
     np.fill_diagonal(links, val=False)

@@ -112,8 +112,8 @@ def inverter_group_of(
 ) -> InverterGroup:
     """Return the inverters of one case of a scenario.
 
-    The graph's rule is applied to the roster, who takes part in the run: those of the start, if left out. Of an island,
-    the others are not heard.
+    `roster`: inverters that take part, to which the graph's rule is applied; by default those of the start. `island`:
+    inverters that are heard; by default all.
     """
     present = {row.name for row in feeder.inverters} if roster is None else set(roster)
     rows = {row.name: row for row in inverters_of(scenario, feeder) if row.name in present}
@@ -180,7 +180,7 @@ class Response:
     F_p: Floats
 
     def rest(self, u: Floats, load: float) -> Floats:
-        """Return the state in which the plant stands still under set-points u and a load (both pu frequency)."""
+        """Return the steady state of the plant under set-points u and a load (both pu frequency)."""
         return np.asarray(np.linalg.solve(np.eye(len(self.A)) - self.A, self.B @ u + self.E * load))
 
 

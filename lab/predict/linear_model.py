@@ -174,12 +174,12 @@ class Loop:
         return self.spectral_radius < 1.0 - 1e-12
 
     def run(self, ticks: int, start: Floats, load: float, *, islanding: bool = False) -> Path:
-        """Step of the load: until t = 0 all stand still at nominal frequency, from then on the load is another.
+        """Return the response to a step of the load at t = 0, from rest at nominal frequency.
 
-        The start is m_p P_set of each, the load the mean m_p p that carries it (both pu frequency). Where the island is
-        new (`islanding`), agents leave out states that were sent in another island than theirs (but at the very tick of
-        the change), so a link with n ticks of delay carries nothing at the ticks 2 to n + 1. The measurement of the
-        event's own tick is taken before it, so the first that tells of it is the next one.
+        `start`: m_p P_set of each; `load`: mean m_p p after the step (both pu frequency); `islanding`: the step creates
+        an island, so agents leave out states from before it, but at the very tick of the change. Then a link with n
+        ticks of delay carries nothing at the ticks 2 to n + 1. The measurement of the event's own tick is taken before
+        the event, so the next one is the first to show it.
         """
         matrix, e_row, power_rows = self._built
         plant, inverters = response(self.inverters, self.plant), self.inverters

@@ -132,7 +132,7 @@ class Inverters:
     def rest(self, i: int, S: complex, v: float) -> None:
         """Set a controller to rest at its present J, V and I, and the power and voltage (pu) that it measures.
 
-        PlantError if its model fails, which may be somebody's, or leaves a state that is no number.
+        PlantError if its model, perhaps a user's, fails or leaves a state that is no number.
         """
         self.state[i, W], self.state[i, F] = 0.0, self.f_nom
         own, state = self.constants(i), self.state_of(i)

@@ -109,7 +109,7 @@ class Reduction:
         return self
 
     def _earthing(self, formers: Integers, no_earth: sp.csr_array) -> Iterator[int]:
-        """Earth each neutral of these inverters that nothing earths in an island without a source; yield who does.
+        """Earth the unearthed neutrals of these inverters in islands without a source; yield the earthing inverters.
 
         A filter of `no_earth` earths nothing: a GFL injects its current whatever the voltage is.
         """

@@ -102,7 +102,7 @@ class UnitRating(NamedTuple):
 
 
 class VoltVar(NamedTuple):
-    """Reactive power of a unit at rest: limits (pu) and dead band; as it stands, the droop alone."""
+    """Reactive power of a unit at rest: limits (pu) and dead band; by default only the droop."""
 
     S_max: float = inf  # bounds Q at sqrt(S_max^2 - P^2)
     Q_min: float = -inf

@@ -1,4 +1,4 @@
-"""The plant in real time: when it ticks, and who takes part. Pure.
+"""The plant in real time: its ticks, and the agents that take part. Pure.
 
 Step k is due at start + k T_c / speed, whatever came until then. At that time the plant measures; then it holds the
 set-points that it has heard, and advances ahead of time, so that what is measured at the next due time is ready.

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 AGAIN = 1.0  # time (s, real time) after which a command that was not acknowledged is sent again
 
 COMMANDS, COMMAND_INTERVAL = 100, 0.02
-"""Commands of one verb that are carried out at once, and time (s) after which one more is: a step must not wait for
-those who ask without end."""
+"""Commands of one verb that are carried out at once, and time (s) until one more: a flood of commands must not delay a
+step."""
 
 NOTED = ("open", "close", "synchronise", "load", "stop")
 """Verbs that change a run: each command is an event of it. Those to links are events of kind "command" too."""
@@ -119,7 +119,7 @@ class RunCommands:
 
     def _on_request(self, command: Command, payload: bytes, now: float) -> None:
         if command.verb not in READING:
-            raise RejectedError("unexpected", f'"{command.verb}" on the key of those who only read')
+            raise RejectedError("unexpected", f'"{command.verb}" on the key of read-only users')
         self._on_command(command, payload, now)
 
     def _on_command(self, command: Command, payload: bytes, now: float) -> None:

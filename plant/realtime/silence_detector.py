@@ -1,10 +1,10 @@
-"""Detect agents that take part and are not heard: not by the plant, or not by a neighbour. Pure.
+"""Detect silent agents: those that take part, but that the plant or a neighbour does not hear. Pure.
 
 A frozen agent keeps its token for Zenoh's lease of 2 s, and two hosts that lose the path between them may both keep
-theirs to the plant. The neighbours leave such a state out after `max_age`, so the run is another one from then on. The
-plant sees the first by the age of the agent's last state, and the second by the ages in `AgentStatus`.
+theirs to the plant. The neighbours leave such a state out after `max_age`, which changes the run. The
+plant detects the first by the age of the agent's last state, and the second by the ages in `AgentStatus`.
 
-Ages count the time for which the plant itself listened: while it stood still, states came that it has not read.
+Ages count the time for which the plant itself listened: during a stall, states arrived that it has not read.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ class SilenceDetector:
             yield from self._take_unheard(name, agent)
 
     def _take_unheard(self, name: str, agent: _Agent) -> Iterator[tuple[str, str]]:
-        """Yield the neighbours that an agent no longer hears, or hears again; one that nobody hears is silent."""
+        """Yield the neighbours that an agent no longer hears, or hears again, without silent agents."""
         back = sorted(agent.reported.difference(agent.unheard))
         agent.reported.intersection_update(agent.unheard)
         recent = self._clock - RECENT * self._period

@@ -28,7 +28,7 @@ class PhaseLetters:
 
 
 class CsvRow(Generic[C]):
-    """One line of a table. A wrong cell is noted, and has a harmless stand-in: of a number NaN."""
+    """One line of a table. A wrong cell is noted, and replaced by a harmless value: NaN for a number."""
 
     def __init__(self, table: type[C], where: str, cells: Mapping[str, str], problems: list[str]) -> None:
         self._table, self._where, self._problems = table, where, problems
@@ -64,7 +64,7 @@ class CsvRow(Generic[C]):
 
 
 def _converted(field: Field, cell: str) -> tuple[Any, str]:
-    """Return the value of a cell and "", or a stand-in and the end of a sentence on the cell."""
+    """Return the value of a cell and "", or a replacement and the end of a sentence on the cell."""
     if letters := field.mark(PhaseLetters):
         ordered = "".join(phase for phase in (NODES if letters.others else PHASES) if phase in cell)
         if cell and sorted(cell) == sorted(ordered):

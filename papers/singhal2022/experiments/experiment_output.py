@@ -147,7 +147,7 @@ DASHES: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (3
 """Of traces over time, which have no markers."""
 
 SLANTED = 12
-"""Most names at an axis that slant; more of them stand upright."""
+"""Most names at an axis that are drawn slanted; more are drawn upright."""
 
 DPI = 130
 """Points per inch: readable in print, and small enough for a repository."""

@@ -24,7 +24,7 @@ class Picture(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     key: str
     """Its name in claims, and its file's name."""
     title: str
-    """Its contents, and the figure of the paper that it stands for."""
+    """Its contents, and the figure of the paper that it reproduces."""
     note: str = ""
     """A hint for the reader, besides the claims."""
     plot: str = ""

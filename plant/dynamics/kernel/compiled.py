@@ -55,7 +55,7 @@ def is_compiled(function: str) -> bool:
 
 
 class _Place:
-    """The folder of machine code as numba's cache asks for it; its name tells the sources."""
+    """The folder of machine code for numba's cache; its name has the hash of the sources."""
 
     def __init__(self, folder: Path | None) -> None:
         self._folder = folder

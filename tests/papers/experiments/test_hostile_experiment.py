@@ -1,4 +1,4 @@
-"""The experiment `hostile`: its graphs bear as many liars as r-robustness says, and its table has every run."""
+"""The experiment `hostile`: its graphs resist the liars that r-robustness predicts, and its table has every run."""
 
 from __future__ import annotations
 

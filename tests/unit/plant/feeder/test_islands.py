@@ -74,7 +74,7 @@ def test_an_island_without_gfm_is_de_energised_and_reported_once(network: Networ
 T_C, H, END = 0.02, 0.002, 2.0
 SWITCHES = ("13-152", "60-160", "sw1_2", "sw2_3")
 BAND = {"off": (25.0, 95.0), "III": (54.0, 63.0)}
-"""Frequencies (Hz) of who delivers. Without protection a GFM can have 60 and the bound of its limiters, 200 rad/s, and
+"""Frequencies (Hz) of connected inverters. Without protection a GFM can have 60 and its limiters' bound, 200 rad/s, and
 a bit for the droop; with it, what lies 0.16 s beyond 56.5 and 62 Hz."""
 
 NO_SOLUTION = ("overload", "out of phase", "voltage collapse")

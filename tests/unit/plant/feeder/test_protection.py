@@ -237,7 +237,7 @@ def test_underfrequency_trips_at_the_very_step_and_without_protection_never() ->
 
 
 def test_a_de_energised_island_has_no_frequency_and_its_inverters_no_island() -> None:
-    """After a blackout every inverter reads 0 V, 0 W, 0 Hz, and is told that it is out of service; the run goes on."""
+    """After a blackout every inverter measures 0 V, 0 W, 0 Hz, and is out of service; the run continues."""
     p = blackout(Protection())
     run(p, 4.0)
 

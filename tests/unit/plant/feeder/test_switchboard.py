@@ -30,7 +30,7 @@ def event(t: float, switch: str, action: str) -> SwitchEvent:
 
 
 def test_a_step_operates_its_switches_together(network: Network) -> None:
-    """All switches of one step are operated at once, by whatever name, and each is told with its alias."""
+    """All switches of one step operate at once, by any name, and each event has the alias."""
     board = Switchboard(network, (event(0.5, "sw1_2", "open"), event(0.5, "152-13", "open")), H)
 
     told = board.operate(250)

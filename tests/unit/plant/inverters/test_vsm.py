@@ -135,7 +135,7 @@ def scenario(folder: Path, gfm: str, inv4: str, keys: str = "") -> Path:
 
 
 def test_a_model_of_a_user_gives_the_same_bytes(tmp_path: Path) -> None:
-    """It stands in a folder beside the scenario, for a kind and for one inverter: nothing else knows it."""
+    """Its file is in a folder beside the scenario; a kind or one inverter uses it."""
     ours = gp.load(scenario(tmp_path / "ours", "vsm", "vsm")).run("A")
     path = scenario(tmp_path / "own", "machine:Machine", "machine:Machine")
     (path.parent / "machine.py").write_text(OF_A_USER)

@@ -119,7 +119,7 @@ def test_rows_beyond_the_plants_memory_are_a_known_gap(monkeypatch: pytest.Monke
 
 @pytest.mark.parametrize("argument", ["", "x", "-1", "1" * 30, "٣"])
 def test_an_invalid_question_is_answered_and_changes_nothing(argument: str) -> None:
-    """Somebody else's problem is theirs."""
+    """The plant answers and continues."""
     lab = running(end=None)
     lab.step(50)
     lab.take(Telemetry)
@@ -180,7 +180,7 @@ def test_a_session_that_brings_nothing_is_opened_anew_ever_more_seldom() -> None
 
 @pytest.mark.parametrize("end", ["close", "interrupt"])
 def test_the_end_of_a_run_does_not_wait_for_what_is_published_again(end: str) -> None:
-    """A plant that is told to end while a recorder is being served sends all of it, and the last word, at once."""
+    """If the run ends while a recorder is served, the plant sends the rest and the last message at once."""
     lab = running(end=None)
     lab.step(2000)
     assert lab.ask("telemetry", "0").ok

@@ -50,7 +50,7 @@ def test_the_inverter_of_an_agent_that_died_stays_on_primary_droop() -> None:
 
 
 def test_a_spare_inverter_comes_on_line_with_its_agent() -> None:
-    """It is not waited for; nobody else is touched."""
+    """The start does not wait for it, and other inverters do not change."""
     lab = running(4, spares=("inv4",))
     lab.step()
     assert lab.toy.measure()["inv4"].P == 0.0
@@ -63,7 +63,7 @@ def test_a_spare_inverter_comes_on_line_with_its_agent() -> None:
 
 
 def test_a_second_agent_of_a_name_and_one_of_no_inverter_are_refused() -> None:
-    """By name; who was first goes on, and a ghost's messages count for nothing."""
+    """By name; the first agent continues, and messages of the second are ignored."""
     lab = running()
     lab.token("inv2", "b")
     lab.token("inv9", "c")
@@ -81,7 +81,7 @@ def test_a_second_agent_of_a_name_and_one_of_no_inverter_are_refused() -> None:
 
 
 def test_the_scenario_asks_agents_to_leave_and_awaits_those_that_join() -> None:
-    """At its tick the leaver alone is told to stop, and is off once it says so; telemetry tells once who is to come."""
+    """At its tick only the leaving agent is stopped, and off when it answers; telemetry names the awaited one."""
     schedule = (
         ScheduledAction(t=0.1, inverter="inv2", action="leave"),
         ScheduledAction(t=0.2, inverter="inv2", action="join"),
@@ -135,7 +135,7 @@ def test_an_agent_that_comes_while_the_run_ends_receives_the_end() -> None:
 
 
 def test_of_thousands_of_refused_agents_some_get_an_answer() -> None:
-    """Anybody may hold tokens: the first are told, then ten a second; the log has one line for each kind."""
+    """Any process may hold a token: the first get answers, then ten a second; the log has one line for each kind."""
     lab = running(3)
     lab.take(Stop)
     for i in range(5_000):

@@ -1,4 +1,4 @@
-"""The plant notices who is not heard: an agent that stands still, and two agents between whom the path is gone."""
+"""The plant detects silent agents: a frozen one, and two without a path between them."""
 
 from __future__ import annotations
 
