@@ -171,8 +171,8 @@ def _messages() -> Iterator[str]:
 def _scenario() -> Iterator[str]:
     yield from ("# The scenario file", "")
     yield "TOML. A key that is a time, a frequency or a per-unit value ends in its unit: `_s`, `_Hz`, `_pu` (of the"
-    yield "inverter's own rating or nominal voltage); parameters of laws alone have no suffix. What has no default"
-    yield "must be given. A value out of its range is an error, and so is an unknown key."
+    yield "inverter's own rating or nominal voltage); parameters of laws have no suffix. A key without a default"
+    yield "is required. An unknown key, or a value out of its range, is an error."
     titles: dict[type, list[str]] = {ScenarioModel: ["Top of the file"]}
     for title, cls in tables_in(ScenarioModel):
         titles.setdefault(cls, []).append(title)
