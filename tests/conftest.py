@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import sys
+import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -75,9 +76,9 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
     """Say what was left out, and how to run it."""
     if not config.option.all:
-        terminalreporter.write_line(f"Left out, as they take minutes: tests of {', '.join(SLOW.values())}.")
-        terminalreporter.write_line("pytest -n 2 --all runs everything; pytest FOLDER runs one folder, such as:")
-        terminalreporter.write_line("  " + " ".join(SLOW))
+        left_out = f"left out, as they take minutes: tests of {', '.join(SLOW.values())}"
+        terminalreporter.write_line(textwrap.fill(left_out, terminalreporter._tw.fullwidth))  # noqa: SLF001
+        terminalreporter.write_line("pytest -n 2 --all runs everything; pytest FOLDER runs one folder whole")
 
 
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> RealTimeApart:
