@@ -12,6 +12,7 @@ import msgspec
 
 from gridpeers.scenarios.checks.check_verdict import FILE, judge_case, verdicts_json
 from gridpeers.scenarios.checks.checked_case import CheckedCase
+from gridpeers.scenarios.console import in_order
 from gridpeers.scenarios.results.claims import NO_BENCHMARK, benchmark_of, claim_of, judge
 from gridpeers.scenarios.results.findings import Findings, find
 from gridpeers.scenarios.results.history import late_moves
@@ -22,6 +23,7 @@ from gridpeers.scenarios.results.recorded_events import law_failures
 from gridpeers.scenarios.results.report import RunReport, plain
 from gridpeers.scenarios.results.run_files import write_whole
 from gridpeers.scenarios.run_request import Request
+from gridpeers.scenarios.schema.participants import without_agent
 from gridpeers.scenarios.schema.plugin_keys import claims_of
 from gridpeers.wire.messages import Pacing
 from gridpeers.wire.wording import counted
@@ -99,6 +101,8 @@ def _notes(case: CheckedCase, recorded: Recorded, *, realtime: bool) -> Iterator
     if recorded.missing:
         spans = ", ".join(f"{before:.2f} and {after:.2f} s" for before, after in recorded.missing)
         yield f"rows are missing between {spans}: the plant did not reach the recorder"
+    if names := in_order(without_agent(case.scenario, case.case)):
+        yield f"{', '.join(names)} without an agent: MPSI, MQSI and the time to restore leave them out"
     yield from late_moves(case.scenario, recorded.events)
     if commands := [event.text for event in recorded.events if event.kind == "command"]:
         count = counted(len(commands), "command")

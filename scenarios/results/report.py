@@ -55,15 +55,7 @@ class RunReport:
 
 
 def plain(report: RunReport) -> str:
-    return text_of(lambda console: _print(report, console))
-
-
-def show(report: RunReport, console: Console) -> None:
-    """Print a report, with colours on a terminal."""
-    if console.is_terminal:
-        _print(report, console)
-    else:
-        console.print(plain(report), end="", soft_wrap=True)
+    return text_of(lambda console: show(report, console))
 
 
 LINES, COLUMNS = 14, 80  # Size of a summary; one line of a screen is for what comes before it
@@ -76,9 +68,8 @@ def show_summary(report: RunReport, console: Console, after: str, figure: str = 
     """
     failed = [*_failures(report)]
     tail = _claims_that_hold(report)
-    notes = [*_without_agent(report), *report.notes]
     if report.folder:
-        more = f" ({counted(len(notes), 'note')})" if notes else ""
+        more = f" ({counted(len(report.notes), 'note')})" if report.notes else ""
         tail += [Text.assemble(f"{'figure':8}", (f"{report.folder}plots/overview.{figure}", "bold"))]
         tail += [Text(f"{'report':8}{report.folder}report.txt{more}"), Text(f"{'next':8}{_next(report, after)}")]
     room = LINES - 4 - len(tail) - min(len(report.checks), 5)
@@ -91,7 +82,7 @@ def show_summary(report: RunReport, console: Console, after: str, figure: str = 
     blank = [Text()] if room >= 2 else []
     table += [
         Text.assemble(("NOTE", "yellow"), _cut(f"  {note}", COLUMNS - 4))
-        for note in notes[: max(room - 2 * len(blank), 0)]
+        for note in report.notes[: max(room - 2 * len(blank), 0)]
     ]
     for line in (*head, *blank, *table, *blank, *tail):
         console.print(line, soft_wrap=True)
@@ -205,15 +196,15 @@ def _cut(text: str, width: int = COLUMNS) -> str:
     return text if len(text) <= width else f"{text[: width - 3].rstrip()}..."
 
 
-def _print(report: RunReport, console: Console) -> None:
+def show(report: RunReport, console: Console) -> None:
+    """Print a report, with colours on a terminal."""
     blocks: list[list[Text]] = [
         [Text(f"FAILED  case {case}: {first_of(of)}", "bold red") for case, of in report.failures.items() if of],
         *_tables(report),
         [*_claims(report)],
         [_checks(case, verdicts) for case, verdicts in report.checks.items()],
     ]
-    notes = [*_without_agent(report), *report.notes]
-    blocks += [[Text.assemble(("NOTE", "yellow"), f"  {note}")] for note in notes]
+    blocks += [[Text.assemble(("NOTE", "yellow"), f"  {note}")] for note in report.notes]
     blocks += [[Text.assemble("Results: ", (report.folder, "bold"))]] if report.folder else []
     for number, block in enumerate(filter(None, blocks)):
         if number:
@@ -222,18 +213,12 @@ def _print(report: RunReport, console: Console) -> None:
             console.print(line, soft_wrap=True)
 
 
-def _without_agent(report: RunReport) -> Iterator[str]:
-    for case, names in report.findings.without_agent.items():
-        them = "it" if len(names) == 1 else "them"
-        yield f"case {case}: {', '.join(names)} without an agent: MPSI, MQSI and the time to restore leave {them} out"
-
-
 def _claims(report: RunReport) -> Iterator[Text]:
     """Yield a line for each claim, how many of them hold, and the distance from the publication."""
     width = max((len(verdict.claim.text) for verdict in report.verdicts), default=0)
     for verdict in report.verdicts:
         status = (f"{verdict.status:7}", _COLOURS[verdict.status])
-        yield Text.assemble(status, f"  {verdict.claim.text:{width}}  ", (verdict.found, "dim"))
+        yield Text.assemble(status, f"  {verdict.claim.text:{width}}", (f"  {verdict.found}".rstrip(), "dim"))
         if verdict.status == "MISS":
             yield Text(f"{'':7}  {verdict.claim.known_miss}", style="dim")
     yield from _claims_that_hold(report)
