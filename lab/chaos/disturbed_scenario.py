@@ -131,7 +131,8 @@ class ChaosBase:
     def __post_init__(self) -> None:
         assert len(self.scenario.cases) == 1, "a base has one case"
         name = f"{self.scenario.name[:_LONGEST_NAME]}-chaos"
-        plain = replace(self.scenario, name=name, paper="", claims=(), metrics=())
+        cases = {case: replace(of, expected_failures=()) for case, of in self.scenario.cases.items()}
+        plain = replace(self.scenario, name=name, paper="", claims=(), metrics=(), cases=cases)
         object.__setattr__(self, "tree", tomllib.loads(to_toml(plain, {}, terse=True)))
         object.__setattr__(self, "supply", FeasibleSupply(self.feeder))
 

@@ -44,9 +44,11 @@ class RunReport:
     folder: str
     """Folder of the results; "" for one that goes with them."""
 
-    def fails(self, check: str = "") -> bool:
-        verdicts = (verdict for of in self.checks.values() for verdict in of)
-        return any(verdict.status == "failed" and check in ("", verdict.check) for verdict in verdicts)
+    def fails(self, *, checks: bool) -> bool:
+        """Return True if a claim or a law failed, or, with `checks`, a check that its case is not built to fail."""
+        failed = {verdict.check for of in self.checks.values() for verdict in of if verdict.status == "failed"}
+        claims = any(verdict.status == "FAIL" for verdict in self.verdicts)
+        return claims or LAW_FAILED in failed or (checks and any(map(self.broken, self.checks)))
 
     def broken(self, case: str) -> list[CheckVerdict]:
         """Return the checks that a case fails though it is not built to."""

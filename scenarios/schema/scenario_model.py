@@ -180,8 +180,8 @@ class Case(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     title: str = ""
     """A few words for tables and plots."""
     expected_failures: Annotated[tuple[str, ...], Example('["frequency"]')] = ()
-    """Checks that this case is built to fail, e.g. ["frequency", "var_sharing"] without secondary control: the summary
-    of a run does not list them as failures."""
+    """Checks that this case is built to fail, e.g. ["frequency", "var_sharing"] without secondary control. The
+    summary of a run and `--require-checks` do not count them as failures."""
     secondary: Annotated[Secondary, Example('["inv1", "inv4"]')]
     """Inverters that run the secondary law (12)-(15): "none", "GFM", "all", or a list, e.g. ["inv1", "inv4"]. The
     others keep their first set-points, and still send them to their neighbours."""

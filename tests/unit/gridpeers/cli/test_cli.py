@@ -134,16 +134,18 @@ def test_a_failed_claim_is_exit_code_1(elsewhere: Path) -> None:
     assert "never" in text
 
 
-@pytest.mark.parametrize(("check", "exit_code"), [("fails", 1), ("cannot_judge", 0)])
-def test_a_required_check_that_fails_is_exit_code_1_and_one_that_is_not_judged_is_0(
-    check: str, exit_code: int, elsewhere: Path
+@pytest.mark.parametrize(("check", "expected", "exit_code"), [
+    ("fails", "", 1), ("fails", 'expected_failures = ["fails"]\n', 0), ("cannot_judge", "", 0),
+])  # fmt: skip
+def test_a_required_check_that_fails_unexpectedly_is_exit_code_1_and_one_that_is_not_judged_is_0(
+    check: str, expected: str, exit_code: int, elsewhere: Path
 ) -> None:
     """A check that the run gives no occasion for has not failed; the line says that it was not judged."""
     judges = "def fails(case):\n    return [gp.Violation(text='late')]\n"
     judges += "def cannot_judge(case):\n    raise gp.NotJudgedError('no cut')\n"
     (elsewhere / "mine.py").write_text(f"import gridpeers as gp\n{judges}")
     off = ", ".join(f'{{ use = "{name}", off = true }}' for name in ALWAYS)
-    (elsewhere / "short.toml").write_text(f'checks = ["mine:{check}", {off}]\n{SHORT}')
+    (elsewhere / "short.toml").write_text(f'checks = ["mine:{check}", {off}]\n{SHORT}{expected}')
 
     code, text = invoke("run", "short.toml", "--driver", "inprocess", "--require-checks", "--details", "--out", "here")
 
