@@ -133,8 +133,7 @@ def replay(
     ] = None,
     law: Annotated[str, option("KEY", "Another law: a name, or module:Class.")] = "",
     values: Annotated[
-        list[str] | None,
-        option("KEY=VALUE", "A key of agents or links, e.g. gains.k_p=0.001; repeatable.", "--set"),
+        list[str] | None, option("KEY=VALUE", "A key of agents or links, e.g. gains.k_p=0.001; repeatable.", "--set")
     ] = None,
     since: Annotated[float, option("T", "Run time (s) from which links change; 0: the start.", "--from")] = 0.0,
     out: Annotated[Path | None, option("DIR", "New folder for the changed run; in runs/ if left out.", "--out")] = None,
@@ -156,10 +155,7 @@ def replay(
     with ended_by_signals("nothing was written"), files_written(out or Path("runs")):
         record = RunRecord.open(run, case)
         changes = Changes(
-            without=tuple(without or ()),
-            law=law,
-            keys=dict(map(_key_and_value, values or ())),
-            since=since,
+            without=tuple(without or ()), law=law, keys=dict(map(_key_and_value, values or ())), since=since
         )
         differs = _counterfactual(record, changes, out) if changes else _replay(record, since, out)
     _tell_notes(record.damage)

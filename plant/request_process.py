@@ -47,10 +47,7 @@ class RequestProcess:
     """
 
     def __init__(
-        self,
-        command: Sequence[str],
-        folder: Path | None = None,
-        environment: Mapping[str, str] = MappingProxyType({}),
+        self, command: Sequence[str], folder: Path | None = None, environment: Mapping[str, str] = MappingProxyType({})
     ) -> None:
         self._unread = b""
         self._log = tempfile.TemporaryFile()  # noqa: SIM115  closed with the process

@@ -115,11 +115,7 @@ def _notes(case: CheckedCase, recorded: Recorded, *, realtime: bool) -> Iterator
         yield f"states not sent to neighbours: {text}"
 
 
-def metrics_json(
-    run: Request,
-    findings: Findings,
-    facts: Mapping[str, Mapping[str, Any]],
-) -> str:
+def metrics_json(run: Request, findings: Findings, facts: Mapping[str, Mapping[str, Any]]) -> str:
     """Return the text of metrics.json; a measure that is no number or not steady is null."""
     cases: dict[str, dict[str, Any]] = {}
     for case, steady in findings.results.items():

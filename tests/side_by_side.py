@@ -18,11 +18,7 @@ IN_PROCESS = ("tests/unit", "tests/golden", "tests/papers", "tests/fuzz")
 
 PAGES = ("tests/pages/test_pages.py",)
 
-ONE_RUN = (
-    "tests/golden/catalogue",
-    "tests/papers/singhal2022",
-    "tests/conformance/test_islands.py",
-)
+ONE_RUN = ("tests/golden/catalogue", "tests/papers/singhal2022", "tests/conformance/test_islands.py")
 """Tests that look at the same runs of the catalogue: one worker has them all, and runs each case once."""
 
 

@@ -112,7 +112,7 @@ class PageServer:
                 Route("/token", self._take_token, methods=["POST"]),
                 Route("/static/{name}", self._static),
                 WebSocketRoute("/frames", self._page),
-            ],
+            ]
         )
 
     def _admits(self, connection: HTTPConnection) -> bool:

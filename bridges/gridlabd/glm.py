@@ -90,12 +90,7 @@ START = "2000-01-01 00:00:00"  # GridLAB-D's clock at the start; delta mode begi
 
 
 def write_glm(
-    folder: Path,
-    load_set: str,
-    start: Mapping[str, complex],
-    parameters: Mapping[str, Any],
-    h: float,
-    seconds: int,
+    folder: Path, load_set: str, start: Mapping[str, complex], parameters: Mapping[str, Any], h: float, seconds: int
 ) -> str:
     """Write a feeder with its inverters, spares left out, from its tables in `folder` (plant/data/README.md).
 

@@ -19,16 +19,7 @@ import numpy as np
 from gridpeers.bridges.engine_process import EngineError, EngineProcess
 from gridpeers.bridges.feeder_import import FeederImport, file_of
 from gridpeers.bridges.gridlabd.glm_elements import SPLIT, GlmBranches, letters_of, load_parts, shunt, voltages_of
-from gridpeers.bridges.gridlabd.glm_text import (
-    CHILD_OF_BUS,
-    DATA,
-    LINEAR,
-    LINES,
-    SWITCHES,
-    WATCHING,
-    GlmText,
-    messages,
-)
+from gridpeers.bridges.gridlabd.glm_text import CHILD_OF_BUS, DATA, LINEAR, LINES, SWITCHES, WATCHING, GlmText, messages
 from gridpeers.bridges.gridlabd.gridlabd_power_flow import PV, SWING
 from gridpeers.plant.equipment import Source, Tables
 from gridpeers.plant.tables.read import FeederError

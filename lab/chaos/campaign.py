@@ -18,14 +18,7 @@ from typing import NamedTuple
 
 import msgspec
 
-from gridpeers.lab.chaos.chaos_run import (
-    ASKED,
-    REPEATS,
-    SAME_IN_PROCESSES,
-    ChaosRow,
-    compared,
-    run_schedule,
-)
+from gridpeers.lab.chaos.chaos_run import ASKED, REPEATS, SAME_IN_PROCESSES, ChaosRow, compared, run_schedule
 from gridpeers.lab.chaos.disturbed_scenario import KINDS, ChaosBase, Schedule, base_of, in_order
 from gridpeers.lab.chaos.schedules import BATCH, drawn, shrunk
 from gridpeers.scenarios.checks.check_registry import RETURNS, chosen_checks

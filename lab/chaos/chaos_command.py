@@ -67,23 +67,12 @@ def chaos(
     from gridpeers.cli.progress import remaining
     from gridpeers.lab.chaos.campaign import Campaign
     from gridpeers.lab.chaos.disturbed_scenario import ChaosBase
-    from gridpeers.scenarios.results.run_files import (
-        broken_if_ended,
-        new_folder,
-        set_status,
-        shown,
-    )
+    from gridpeers.scenarios.results.run_files import broken_if_ended, new_folder, set_status, shown
     from gridpeers.scenarios.sweep.workers import cores
     from gridpeers.wire.driver.command_line import command_line
 
     name, console = f"{spec.name}-chaos", terminal()
-    campaign = Campaign(
-        base=ChaosBase(spec, feeder),
-        seed=seed,
-        runs=runs,
-        driver=driver,
-        jobs=jobs or cores(),
-    )
+    campaign = Campaign(base=ChaosBase(spec, feeder), seed=seed, runs=runs, driver=driver, jobs=jobs or cores())
     words = ["--case", campaign.base.case, "--runs", str(runs), "--seed", str(seed), "--driver", driver]
     campaign.command = command_line("chaos", scenario, *words)
     with _told_if_ended(campaign):

@@ -246,13 +246,5 @@ def _lagged(inverters: InverterGroup) -> Response:
     D_p[forming, forming] += 1.0
     C_p[following, powers] = 1.0
     return Response(
-        A=held[:, :size],
-        B=held[:, size:-1],
-        E=held[:, -1],
-        C=C,
-        D=D,
-        F=0.0,
-        C_p=C_p,
-        D_p=D_p,
-        F_p=np.zeros(n),
+        A=held[:, :size], B=held[:, size:-1], E=held[:, -1], C=C, D=D, F=0.0, C_p=C_p, D_p=D_p, F_p=np.zeros(n)
     )

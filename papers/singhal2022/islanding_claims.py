@@ -108,8 +108,7 @@ def _add_5_times_better_than_I(quantity: Quantity, known_miss: str = "") -> None
 
 _add_5_times_better_than_I("MQSI")
 _add_5_times_better_than_I(
-    "V_error",
-    "with equal vars, voltage drops on our feeder leave 0.003 pu (docs/understand/evidence.md)",
+    "V_error", "with equal vars, voltage drops on our feeder leave 0.003 pu (docs/understand/evidence.md)"
 )
 
 

@@ -114,10 +114,7 @@ plug_n_play = ExperimentClaims(
 )
 
 
-@plug_n_play.add(
-    f"IV: the others carry the load of the one that left within {AT_ONCE:g} s",
-    events=(LEAVE,),
-)
+@plug_n_play.add(f"IV: the others carry the load of the one that left within {AT_ONCE:g} s", events=(LEAVE,))
 def others_carry_its_load(found: Findings) -> tuple[bool, str]:
     t = found.results["IV"][LEAVE].t_load_s
     return t is not None and t <= AT_ONCE, f"{LEAVE} {seconds(t)}"
@@ -136,20 +133,14 @@ _add_restored(LEAVE)
 _add_restored(RETURN)
 
 
-@plug_n_play.add(
-    f"IV: after the return all powers are equal within {EQUAL:g} pu",
-    events=(RETURN,),
-    measures=("p",),
-)
+@plug_n_play.add(f"IV: after the return all powers are equal within {EQUAL:g} pu", events=(RETURN,), measures=("p",))
 def shares_again(found: Findings) -> tuple[bool, str]:
     p = found.results["IV"][RETURN].p.values()  # the returned inverter's too
     return max(p) - min(p) < EQUAL, f"p from {min(p):.3f} to {max(p):.3f} pu"
 
 
 @plug_n_play.add(
-    f"IV: V_error below {V_FIGURE:g} pu after leave and return",
-    events=(LEAVE, RETURN),
-    measures=("V_error",),
+    f"IV: V_error below {V_FIGURE:g} pu after leave and return", events=(LEAVE, RETURN), measures=("V_error",)
 )
 def voltage_likewise(found: Findings) -> tuple[bool, str]:
     errors = {event: found.results["IV"][event].V_error for event in (LEAVE, RETURN)}
@@ -172,8 +163,7 @@ switching.column("V", "MQSI")
 
 
 @switching.add(
-    "three islands of one grid-forming and two grid-following inverters",
-    source="section 4, microgrid switching",
+    "three islands of one grid-forming and two grid-following inverters", source="section 4, microgrid switching"
 )
 def three_islands(found: Findings) -> tuple[bool, str]:
     members = [tuple(p) for p in _island_powers(found)]

@@ -142,13 +142,7 @@ def _part(net: Reduced, islands: Integers, of_part: Flags, node_island: Integers
         theta_lin=net.theta_lin[islands],
         sparse=sparse,
     )
-    return Part(
-        net=own,
-        branches=branches,
-        nodes=nodes.size,
-        size=inverters.size,
-        inverters=_which(inverters),
-    )
+    return Part(net=own, branches=branches, nodes=nodes.size, size=inverters.size, inverters=_which(inverters))
 
 
 def _which(at: Integers) -> Which:

@@ -95,10 +95,7 @@ class Connectivity:
         return frozenset(switch.name for switch in self._feeder.switches if switch.closed)
 
     def parts(
-        self,
-        closed: Collection[str] | None = None,
-        whole: Iterable[str] = (),
-        tied: Iterable[tuple[Node, Node]] = (),
+        self, closed: Collection[str] | None = None, whole: Iterable[str] = (), tied: Iterable[tuple[Node, Node]] = ()
     ) -> tuple[frozenset[Node], ...]:
         """Return the sets of connected nodes, in the order of their first buses.
 

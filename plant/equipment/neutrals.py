@@ -35,10 +35,7 @@ def neutral_for(text: str, bus: Bus, phases: str, neutral: str) -> str:
 
 
 def neutrals_by_bus(
-    buses: Iterable[Bus],
-    load_parts: Iterable[LoadPart],
-    elements: Iterable[LinearElement],
-    switches: Iterable[Switch],
+    buses: Iterable[Bus], load_parts: Iterable[LoadPart], elements: Iterable[LinearElement], switches: Iterable[Switch]
 ) -> dict[str, str]:
     """Return the neutral of each bus that has one: the letter of a node, that of most load where there are several.
 

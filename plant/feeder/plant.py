@@ -91,13 +91,7 @@ class Plant(RecordedPlant):
         self._current_limits = CurrentLimits(self.inverters, tuple(unit.parameters.current_limit for unit in units))
         self._closings = Closings(self._switches, network, self._dynamics, settings.sync_check, settings.h)
         self._in_service = InService(
-            settings.protection,
-            self.inverters,
-            self._V_nom,
-            self._dynamics,
-            connected,
-            self._tell,
-            self._settle,
+            settings.protection, self.inverters, self._V_nom, self._dynamics, connected, self._tell, self._settle
         )
         n = len(self.inverters)
         try:

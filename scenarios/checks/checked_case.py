@@ -13,15 +13,7 @@ import numpy as np
 from gridpeers.plant.equipment import Tables
 from gridpeers.scenarios.checks.check_registry import READERS
 from gridpeers.scenarios.checks.check_verdict import NotJudgedError, Violation
-from gridpeers.scenarios.results.history import (
-    Flags,
-    History,
-    Nameplates,
-    Window,
-    messages_saved,
-    read_only,
-    windows,
-)
+from gridpeers.scenarios.results.history import Flags, History, Nameplates, Window, messages_saved, read_only, windows
 from gridpeers.scenarios.results.island_membership import (
     IslandInterval,
     island_intervals,
@@ -86,12 +78,7 @@ class CheckedCase:
 
     @classmethod
     def of(
-        cls,
-        scenario: ScenarioModel,
-        feeder: Tables,
-        case: str,
-        recorded: Recorded,
-        folder: Path | None = None,
+        cls, scenario: ScenarioModel, feeder: Tables, case: str, recorded: Recorded, folder: Path | None = None
     ) -> CheckedCase:
         """Return a case as recorded, with the windows that can be measured."""
         came = _measurable(scenario, recorded)

@@ -84,12 +84,7 @@ class LiveRecorder:
     """
 
     def __init__(
-        self,
-        config: PlantConfig,
-        folder: Path | None,
-        record: RecordInfo,
-        *,
-        silent: Collection[str] = (),
+        self, config: PlantConfig, folder: Path | None, record: RecordInfo, *, silent: Collection[str] = ()
     ) -> None:
         self._config, self._silent = config, silent
         self._recorder = None if folder is None else Recorder(folder, gaps=True, record=record)
@@ -205,11 +200,7 @@ def plant_here(config: PlantConfig, folder: Path | None, record: RecordInfo) -> 
 
 
 def all_here(
-    config: PlantConfig,
-    agents: tuple[AgentConfig, ...],
-    logs: Path,
-    folder: Path | None,
-    record: RecordInfo,
+    config: PlantConfig, agents: tuple[AgentConfig, ...], logs: Path, folder: Path | None, record: RecordInfo
 ) -> ProcessOutcome:
     """Run the plant and its agents, without spare ones, each in a process, until the run ends."""
     stop_at_signals(StoppedError)

@@ -114,8 +114,7 @@ def check_events(scenario: ScenarioModel, problems: Problems) -> None:
     for i, event in enumerate(scenario.events):
         if not any(getattr(event, key) for key in keys) and not problems.touch(*(f"event[{i}].{key}" for key in keys)):
             problems.add(
-                f"event[{i}]",
-                f'event "{event.label}" does nothing; give it {", ".join(keys)}, e.g. open = ["13-152"]',
+                f"event[{i}]", f'event "{event.label}" does nothing; give it {", ".join(keys)}, e.g. open = ["13-152"]'
             )
         if event.synchronised and not event.close and not problems.touch(f"event[{i}].close"):
             problems.add(

@@ -51,19 +51,13 @@ class Time(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """Table `[time]`: how long, and in which steps."""
 
     end_s: Annotated[
-        float,
-        Unit("s"),
-        MultipleOf("T_c_s"),
-        Plausible("the duration of a run", 0.001, LONGEST_RUN, above_zero=True),
+        float, Unit("s"), MultipleOf("T_c_s"), Plausible("the duration of a run", 0.001, LONGEST_RUN, above_zero=True)
     ]
     """Duration of the run (s), a multiple of T_c_s."""
     T_c_s: Annotated[float, Unit("s"), Plausible("a control period", 0.0005, 2.0, above_zero=True)] = 0.02
     """Control period (s): each agent decides once in it."""
     h_s: Annotated[
-        float,
-        Unit("s"),
-        Divides("T_c_s"),
-        Plausible("an integration step", 1e-5, 0.02, above_zero=True),
+        float, Unit("s"), Divides("T_c_s"), Plausible("an integration step", 1e-5, 0.02, above_zero=True)
     ] = 0.002
     """Integration step of the plant (s); divides T_c_s."""
     method: Method = "first-order"

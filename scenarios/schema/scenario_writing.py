@@ -14,11 +14,7 @@ from gridpeers.wire.schema.table_schema import INHERITED, INLINE, NO_KEY, NamedT
 
 
 def to_toml(
-    scenario: ScenarioModel,
-    as_run: Mapping[str, Any],
-    remarks: Iterable[str] = (),
-    *,
-    terse: bool = False,
+    scenario: ScenarioModel, as_run: Mapping[str, Any], remarks: Iterable[str] = (), *, terse: bool = False
 ) -> str:
     """Return every key of a scenario, defaults included, and the table `[as_run]`; if `terse`, what is no default.
 

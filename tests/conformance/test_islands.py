@@ -33,9 +33,7 @@ def test_a_blackout_does_not_end_the_run(blackout: tuple[History, Outcome]) -> N
     assert any(event.text.startswith("black start by inv1") for event in outcome.events)
 
 
-def test_a_de_energised_island_reads_zero_and_the_history_is_finite(
-    blackout: tuple[History, Outcome],
-) -> None:
+def test_a_de_energised_island_reads_zero_and_the_history_is_finite(blackout: tuple[History, Outcome]) -> None:
     """While nothing feeds the island, power, voltage and frequency are 0: not 60 Hz, not a number that is none."""
     history, _ = blackout
     dead = (history.t > 3.02) & (history.t < 9.0)

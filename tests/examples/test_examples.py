@@ -23,10 +23,7 @@ nbformat.write(book, "executed.ipynb")
 
 @pytest.mark.parametrize(
     ("script", "says", "figure"),
-    [
-        ("own_feeder.py", "consensus islanding", "own_feeder.png"),
-        ("latency_study.py", "event2.swing_pu", ""),
-    ],
+    [("own_feeder.py", "consensus islanding", "own_feeder.png"), ("latency_study.py", "event2.swing_pu", "")],
 )
 def test_an_example_runs_to_its_end(
     elsewhere: Path, capsys: pytest.CaptureFixture[str], script: str, says: str, figure: str

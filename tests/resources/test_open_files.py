@@ -8,14 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from gridpeers.wire.driver.machine import (
-    BESIDE_LINKS,
-    MOST_FILES,
-    limit,
-    links_objection,
-    raise_limit,
-    too_few_files,
-)
+from gridpeers.wire.driver.machine import BESIDE_LINKS, MOST_FILES, limit, links_objection, raise_limit, too_few_files
 from tests.toy import toy_plant
 from tests.toy.toy_configs import toy_configs
 from tests.toy.toy_runs import ProcessRun

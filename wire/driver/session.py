@@ -20,12 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from gridpeers.wire.driver.inbox import Inbox, Stamped
 from gridpeers.wire.driver.machine import limit
-from gridpeers.wire.driver.zenoh_settings import (
-    ONE_THREAD,
-    RUNTIME,
-    Clock,
-    zenoh_settings,
-)
+from gridpeers.wire.driver.zenoh_settings import ONE_THREAD, RUNTIME, Clock, zenoh_settings
 from gridpeers.wire.keys import LATEST_ONLY, is_token
 from gridpeers.wire.trust.credentials import Credentials, LinkCertificates
 from gridpeers.wire.wording import InputError, not_importable

@@ -100,13 +100,7 @@ def access_control(own: SiteMember, members: Iterable[SiteMember], *, star: bool
         rules += allowed
         subjects.append({"id": subject, "cert_common_names": list(member.accepted)})
         policies.append({"id": subject, "rules": [rule["id"] for rule in allowed], "subjects": [subject]})
-    return {
-        "enabled": True,
-        "default_permission": "deny",
-        "rules": rules,
-        "subjects": subjects,
-        "policies": policies,
-    }
+    return {"enabled": True, "default_permission": "deny", "rules": rules, "subjects": subjects, "policies": policies}
 
 
 def rules_between(own: SiteMember, other: SiteMember, *, star: bool = False) -> list[Rule]:

@@ -13,16 +13,7 @@ import msgspec
 from gridpeers.wire.keys import Role
 from gridpeers.wire.messages import is_name
 from gridpeers.wire.trust.credentials import DATE_AND_TIME, LONGEST_COMMON_NAME, SiteMember
-from gridpeers.wire.trust.key_folder import (
-    CA,
-    CA_KEY,
-    LIST,
-    KeysError,
-    MemberList,
-    SignedList,
-    load_pair,
-    read_list,
-)
+from gridpeers.wire.trust.key_folder import CA, CA_KEY, LIST, KeysError, MemberList, SignedList, load_pair, read_list
 from gridpeers.wire.wording import printable
 
 if TYPE_CHECKING:

@@ -98,10 +98,7 @@ def watch(
 
 
 @of_live_run
-def stop(
-    inverter: Annotated[str, argument("INVERTER", "Name of its inverter, e.g. inv2.")],
-    live: LiveRun,
-) -> None:
+def stop(inverter: Annotated[str, argument("INVERTER", "Name of its inverter, e.g. inv2.")], live: LiveRun) -> None:
     """Make an agent leave: its inverter is switched off.
 
     The others take its load.

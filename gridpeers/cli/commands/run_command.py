@@ -56,9 +56,7 @@ def run(
     keys: Keys = None,
     case: Annotated[str | None, option("NAMES", "Cases to run, e.g. I,IV; all if left out.")] = None,
     seed: Annotated[int | None, option("N", "Seed instead of the one in the scenario.", min=0)] = None,
-    require_checks: Annotated[
-        bool, flag("End with code 1 if a check fails unexpectedly.", "--require-checks")
-    ] = False,
+    require_checks: Annotated[bool, flag("End with code 1 if a check fails unexpectedly.", "--require-checks")] = False,
     details: Annotated[
         bool, flag("Print the whole report, as report.txt has it: tables, claims, checks, notes.", "--details")
     ] = False,

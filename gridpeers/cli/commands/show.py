@@ -28,9 +28,7 @@ def list_() -> None:
         typer.echo(f"{name:{width}}  {title}. Cases: {', '.join(cases)}")
 
 
-def check(
-    file: Annotated[str, argument("FILE", "Path of a scenario file, or a name from the catalogue.")],
-) -> None:
+def check(file: Annotated[str, argument("FILE", "Path of a scenario file, or a name from the catalogue.")]) -> None:
     """Check a scenario file and its feeder for problems.
 
     It lists all problems at once. If there is none, it solves the operating point of the feeder at the start. Notes
@@ -49,9 +47,7 @@ def check(
     typer.echo(f"{file}: can be run: {scenario.extent}")
 
 
-def doc(
-    topic: Annotated[Topic, argument("TOPIC", "Topic of the page.")],
-) -> None:
+def doc(topic: Annotated[Topic, argument("TOPIC", "Topic of the page.")]) -> None:
     """Print a reference page that is made from the code.
 
     keys and messages are those of the protocol; scenario has the keys of a scenario file, with units and defaults;

@@ -12,15 +12,7 @@ from typing import Annotated
 
 import typer
 
-from gridpeers.cli.commands.options import (
-    Insecure,
-    Keys,
-    Run,
-    check_open,
-    finish,
-    of_live_run,
-    opened,
-)
+from gridpeers.cli.commands.options import Insecure, Keys, Run, check_open, finish, of_live_run, opened
 from gridpeers.cli.usage import FigureFormat, ScenarioName, chosen, flag, load, option, require_posix
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
 from gridpeers.scenarios.live.run_address import (

@@ -86,10 +86,7 @@ def finish(file: str, plan: Plan, path: Path, jobs: int | None, again: Sequence[
         try:
             with remaining(console, size := len(plan.runs)) as tell:
                 return study(
-                    plan,
-                    folder,
-                    lambda done: tell(f"{plan.name}, {done} of {size} runs", done),
-                    jobs=jobs or cores(),
+                    plan, folder, lambda done: tell(f"{plan.name}, {done} of {size} runs", done), jobs=jobs or cores()
                 )
         except (KeyboardInterrupt, OSError, WorkersError) as error:
             kept = f"{folder.kept} of {size} runs are kept in {shown(path)}/; continue with: {command_line(*again)}"

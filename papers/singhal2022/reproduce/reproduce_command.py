@@ -30,8 +30,7 @@ def reproduce(
         typer.Option(help="processes: one process per agent, over Zenoh; inprocess: all in one."),
     ] = "processes",
     only: Annotated[
-        str | None,
-        option("WHAT", "Part of the report: tables (without figures), figures, or the name of a scenario."),
+        str | None, option("WHAT", "Part of the report: tables (without figures), figures, or the name of a scenario.")
     ] = None,
     seed: Annotated[
         int | None, option("N", "Seed instead of those of the scenarios, also for random graphs.", min=0)

@@ -111,11 +111,7 @@ def advance_inverters(units: Any, h: float, second: bool, readings: Real) -> Non
         read_terminal(i, units.y_f[i], J, V, I, readings)
         at = units.terminal[i]
         at.P_set, at.V_set, at.Q_set = set_points[i, 0], set_points[i, 1], set_points[i, 2]
-        at.P, at.Q, at.V = (
-            readings[i, 1] / units.S_3[i],
-            readings[i, 2] / units.S_3[i],
-            readings[i, 3] / units.V_b[i],
-        )
+        at.P, at.Q, at.V = (readings[i, 1] / units.S_3[i], readings[i, 2] / units.S_3[i], readings[i, 3] / units.V_b[i])
         at.V_A, at.V_B, at.V_C = V[i, 0], V[i, 1], V[i, 2]
         at.I_A, at.I_B, at.I_C = I[i, 0], I[i, 1], I[i, 2]
         at.J_A, at.J_B, at.J_C = J[i, 0], J[i, 1], J[i, 2]

@@ -48,14 +48,7 @@ def take_round(units: Any, forward: Any, used: Complex, change: Complex, reading
 
 @compiled
 def solve_together(
-    net: Any,
-    units: Any,
-    forward: Any,
-    rotation: Complex,
-    x: Real,
-    I_b: Complex,
-    tolerance: float,
-    readings: Real,
+    net: Any, units: Any, forward: Any, rotation: Complex, x: Real, I_b: Complex, tolerance: float, readings: Real
 ) -> int:
     """Solve network and inverters at the present states; returns the iterations, or -1.
 

@@ -30,13 +30,7 @@ def main() -> None:
             {"label": "leave", "t_s": 0.4, "leave": ["inv2"]},
             {"label": "return", "t_s": 0.8, "join": ["inv2"]},
         ],
-        case={
-            "ring": {
-                "secondary": "all",
-                "graph": "ring",
-                "link": [{"on": "* -> inv4", "loss": 0.3, "delay": 0.03}],
-            }
-        },
+        case={"ring": {"secondary": "all", "graph": "ring", "link": [{"on": "* -> inv4", "loss": 0.3, "delay": 0.03}]}},
     )
     with tempfile.TemporaryDirectory() as folder:
         scenario.run("ring", driver="processes", clock="realtime", folder=Path(folder) / "run")

@@ -45,15 +45,7 @@ def test_a_result_is_a_figure_and_the_same_table_twice(tmp_path: Path) -> None:
     """A time that is never reached is written as never and drawn at the edge."""
     x = np.array([0.0, 0.1, 1.0])
     curves = [Curve(x=x, y=np.array([1.0, 2.0, np.inf]), style=0), Curve(x=x, y=x + 1.0, style=1, look="predicted")]
-    panel = PlotPanel(
-        title="a",
-        x_label="x (s)",
-        y_label="y (s)",
-        curves=curves,
-        lines=[(0.5, 0)],
-        log="xy",
-        zero=0.02,
-    )
+    panel = PlotPanel(title="a", x_label="x (s)", y_label="y (s)", curves=curves, lines=[(0.5, 0)], log="xy", zero=0.02)
     rows = [{"x (s)": 0.0, "y (s)": 1.0}, {"x (s)": 1.0, "y (s)": np.inf}]
 
     ExperimentResult(PlotPage(title="t", panels=[panel], columns=1, names={0: "one"}), rows).write(tmp_path)

@@ -88,10 +88,7 @@ FULL = Path("/dev/full")
 @pytest.mark.skipif(not FULL.exists(), reason="this system has no /dev/full")
 @pytest.mark.parametrize(
     "words",
-    [
-        command("--help"),
-        command("run", "calm.toml", "--driver", "inprocess", "--out", "here"),
-    ],
+    [command("--help"), command("run", "calm.toml", "--driver", "inprocess", "--out", "here")],
     ids=["help", "run"],
 )
 def test_output_that_cannot_be_written_is_told_in_one_line(words: list[str], tmp_path: Path) -> None:

@@ -13,13 +13,7 @@ import pytest
 
 import gridpeers
 from gridpeers import Scenario
-from gridpeers.bridges.helics.federate import (
-    HELD,
-    HelicsError,
-    HelicsFederate,
-    events,
-    topics,
-)
+from gridpeers.bridges.helics.federate import HELD, HelicsError, HelicsFederate, events, topics
 from gridpeers.bridges.helics.helics_simulator import HelicsSettings
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
 from gridpeers.scenarios.run_request import BrokenRunError

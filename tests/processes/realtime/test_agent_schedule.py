@@ -44,8 +44,7 @@ def lives(run: ProcessRun, name: str) -> tuple[Child, ...]:
 
 
 @pytest.mark.parametrize(
-    ("clock", "schedule"),
-    [("simulated", AWAY), ("realtime", ((0.4, "inv2", "leave"), (0.8, "inv2", "join")))],
+    ("clock", "schedule"), [("simulated", AWAY), ("realtime", ((0.4, "inv2", "leave"), (0.8, "inv2", "join")))]
 )
 def test_the_process_ends_and_a_new_one_is_started(tmp_path: Path, clock: str, schedule: Schedule) -> None:
     """The leaver's process ends well before the new one starts, both end with status 0, and each has its own log."""

@@ -57,10 +57,7 @@ def test_a_foreign_agent_takes_its_share_in_real_time(tmp_path: Path) -> None:
 def test_a_foreign_leader_and_follower_give_the_same_history(tmp_path: Path) -> None:
     """Case IV on the paper's feeder in simulated time: the same rows to the last bit, and nobody drops a message."""
     plant, agents = configs(*load_scenario("islanding"), "IV")
-    events = (
-        SwitchEvent(t=0.1, switch="13-152", action="open"),
-        SwitchEvent(t=0.24, switch="60-160", action="open"),
-    )
+    events = (SwitchEvent(t=0.1, switch="13-152", action="open"), SwitchEvent(t=0.24, switch="60-160", action="open"))
     plant = replace(plant, end=0.4, settings=replace(plant.settings, events=events))
     expected: Rows = []
     run_inprocess(plant, agents, lambda telemetry: expected.extend(telemetry.rows))

@@ -12,14 +12,7 @@ from msgspec.structs import replace
 
 from gridpeers.agents.agent import Agent
 from gridpeers.agents.agent_config import Control, GraphRule
-from gridpeers.agents.graphs import (
-    GRAPHS,
-    GraphError,
-    check_graph,
-    in_neighbours,
-    is_pairwise,
-    make_graph,
-)
+from gridpeers.agents.graphs import GRAPHS, GraphError, check_graph, in_neighbours, is_pairwise, make_graph
 from gridpeers.wire.plugins.plugin import Plugin, plugin_of, plugin_problems
 from tests.toy.toy_configs import agent_config
 from tests.toy.toy_messages import measurement
@@ -156,10 +149,7 @@ def test_an_impossible_rule_is_refused_in_one_line(folder: str, use: str, said: 
         (lambda members: {"inv9": []}, "graph mine names inv9, which is no agent of the run"),
         (lambda members: {"inv1": ["inv1"]}, "graph mine lets inv1 listen to itself; leave it out"),
         (lambda members: {"inv1": 3}, "of inv1, inv2 failed: TypeError: 'int' object is not iterable"),
-        (
-            lambda members: 1 / 0,
-            "of inv1, inv2 failed: ZeroDivisionError: division by zero",
-        ),
+        (lambda members: 1 / 0, "of inv1, inv2 failed: ZeroDivisionError: division by zero"),
     ],
 )
 def test_a_result_that_is_no_graph_is_reported_in_one_line(rule: object, said: str) -> None:

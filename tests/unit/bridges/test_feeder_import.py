@@ -15,7 +15,7 @@ def test_each_bus_keeps_a_name_of_its_own() -> None:
     assert found.places == {"bus a_b_2": "x.dss:3", "line.l 1": "x.dss:4"}
     assert found.notes == [
         'buses are renamed, as a name has no blanks: "a b" is a_b_2, "a\u00a0b" is a_b_3, "x~y" is x_y, '
-        '"plain.1 (c)" is plain.1_(c)',
+        '"plain.1 (c)" is plain.1_(c)'
     ]
 
 

@@ -14,16 +14,7 @@ from gridpeers.plant.plant_interface import Reading
 from gridpeers.plant.plant_node import PHASES
 from gridpeers.plant.plant_stepper import measurement_of
 from gridpeers.wire.codec import decode, encode
-from gridpeers.wire.messages import (
-    Answer,
-    Command,
-    Measurement,
-    Prepare,
-    Ready,
-    Stop,
-    Telemetry,
-    Waiting,
-)
+from gridpeers.wire.messages import Answer, Command, Measurement, Prepare, Ready, Stop, Telemetry, Waiting
 from gridpeers.wire.phases import diagram
 from tests.toy.toy_configs import toy_configs
 from tests.unit.plant.plant_lab import KEYS, PlantLab
@@ -273,8 +264,7 @@ def test_what_a_recorder_needs_once_more_is_published_again() -> None:
     again = [message for _, message in lab.sent if isinstance(message, Telemetry) and message.seq == 3]
     assert again[0] == again[1]
     lab.hear(
-        KEYS.request,
-        Command(sender="other", epoch=1, seq=1, t=0.0, verb="telemetry", argument="9", reply_to="other"),
+        KEYS.request, Command(sender="other", epoch=1, seq=1, t=0.0, verb="telemetry", argument="9", reply_to="other")
     )
     assert lab.node.rejects.counts == {"unexpected": 1}
 

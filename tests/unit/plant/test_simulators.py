@@ -51,9 +51,7 @@ def made_up(monkeypatch: pytest.MonkeyPatch) -> None:
 def scenario(**plant: Any) -> gp.Scenario:
     """Return a scenario on it."""
     return gp.Scenario(
-        time={"end_s": 0.2},
-        plant={"simulator": "made_up", **plant},
-        case={"I": {"secondary": "none", "graph": "none"}},
+        time={"end_s": 0.2}, plant={"simulator": "made_up", **plant}, case={"I": {"secondary": "none", "graph": "none"}}
     )
 
 

@@ -37,10 +37,7 @@ def problems(path: Path, **options: list[str]) -> tuple[str, ...]:
 ONE_LINE = {
     "no module": ("object node { name a; }\n", "feeder.glm:1: class 'node' is not known"),
     "nothing of a feeder": ("module tape;\n", "feeder.glm: does not load GridLAB-D's module powerflow"),
-    "an include that is not there": (
-        HEAD + '#include "gone.glm"\n',
-        "feeder.glm:9: #include failed",
-    ),
+    "an include that is not there": (HEAD + '#include "gone.glm"\n', "feeder.glm:9: #include failed"),
     "a program": (HEAD + "#system rm -rf nothing\n", "feeder.glm:9: #system would run or load a program"),
     "no substation": (HEAD.replace("bustype SWING;", ""), "NR: no swing bus found"),
     "two substations": (

@@ -11,14 +11,7 @@ from gridpeers.plant.network import Network, solve_power_flow
 from gridpeers.plant.tables import read_feeder
 from gridpeers.plant.tables.write import write_feeder
 from tests.unit.bridges.opendss.opendss_scripts import GENERATION, UNEVEN
-from tests.unit.bridges.opendss.opendss_solutions import (
-    LETTERS,
-    LINE,
-    STEP_DOWN,
-    TOLERANCE,
-    engine_voltages,
-    write,
-)
+from tests.unit.bridges.opendss.opendss_solutions import LETTERS, LINE, STEP_DOWN, TOLERANCE, engine_voltages, write
 
 pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")
 

@@ -38,10 +38,7 @@ ONE_LINE = {
         "New Line.z phases=1 bus1=c.1 bus2=d.1 r1=.1 x1=.1 r0=.1 x0=.1\nNew Load.d bus1=d.2 phases=1 kv=0.277 kw=9",
         "load.d: only loads are connected to node 2 of bus d: its phase is missing there",
     ),
-    "an open neutral": (
-        "New Load.d bus1=c.1.2.3.4 phases=3 kv=0.48 kw=10",
-        "node 4 of bus c",
-    ),
+    "an open neutral": ("New Load.d bus1=c.1.2.3.4 phases=3 kv=0.48 kw=10", "node 4 of bus c"),
     "a floating section": (
         "New Line.z bus1=e bus2=d r1=.1 x1=.1 r0=.1 x0=.1\nNew Load.d bus1=d kv=0.48 kw=10",
         "buses e, d (first e.1, e.2, e.3): no path to the source, even with all switches closed",

@@ -97,7 +97,7 @@ def test_a_run_fills_its_folder_from_which_it_can_be_repeated(elsewhere: Path) -
     assert "figure  here/plots/overview.svg\nreport  here/report.txt\n" in text
     here = elsewhere / "here"
     assert {path.name for path in here.iterdir()} == {
-        *("I", "log", "plots", "metrics.json", "checks.json", "report.txt", "scenario.toml", "status.txt"),
+        *("I", "log", "plots", "metrics.json", "checks.json", "report.txt", "scenario.toml", "status.txt")
     }
     assert (here / "status.txt").read_text() == "complete\n"
     assert sorted(path.name for path in (here / "I").iterdir()) == ["events.csv", "history.csv", "run.mcap"]

@@ -97,16 +97,10 @@ OPEN = (
     ("words", "text"),
     [
         (["plant", "islanding", "--listen", FAR], f"--listen: {FAR} {OPEN}"),
-        (
-            ["up", "islanding", "--listen", "tcp/0.0.0.0:7447"],
-            "--listen: tcp/0.0.0.0:7447 is not on this host",
-        ),
+        (["up", "islanding", "--listen", "tcp/0.0.0.0:7447"], "--listen: tcp/0.0.0.0:7447 is not on this host"),
         (["agent", "inv1", "--connect", FAR], f"--connect: {FAR} {OPEN}"),
         (["down", "--connect", "tls/127.0.0.1:1"], "--connect: tls/127.0.0.1:1 needs certificates: use --keys DIR"),
-        (
-            ["status", "--connect", NEAR, "--keys", "lab"],
-            f"--connect: {NEAR} is open, and --keys needs TLS",
-        ),
+        (["status", "--connect", NEAR, "--keys", "lab"], f"--connect: {NEAR} is open, and --keys needs TLS"),
         (["status", "--as", "eve"], "--as: needs --keys DIR, the folder of the certificates"),
         (["status", "--keys", "nowhere"], "nowhere: does not exist"),
         (["agent", "inv7", "--keys", "lab"], 'no certificate was issued to "inv7"; those of role agent: none'),

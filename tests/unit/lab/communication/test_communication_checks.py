@@ -54,8 +54,7 @@ def test_the_pass_over_a_record_agrees_with_its_reader() -> None:
 
 
 @pytest.mark.parametrize(
-    ("check", "changes"),
-    [("message_account", LOSSY), ("heal", CUT), ("stale_values", QUIET), ("last_words", QUIET)],
+    ("check", "changes"), [("message_account", LOSSY), ("heal", CUT), ("stale_values", QUIET), ("last_words", QUIET)]
 )
 def test_journals_that_come_late_change_no_verdict(check: str, changes: Changes) -> None:
     """Decisions and verdicts of links come into a record a while after the states that they are about."""

@@ -73,12 +73,7 @@ class Run:
 
 
 def on_the_plant(
-    graph: str,
-    *,
-    link: int = 0,
-    setpoint: int = 0,
-    still_voltage: bool = False,
-    end_s: float = 7.0,
+    graph: str, *, link: int = 0, setpoint: int = 0, still_voltage: bool = False, end_s: float = 7.0
 ) -> Run:
     """The real agents on the real plant, with delays in ticks: `gridpeers.lab.predict.linear_model.Ticks`."""
     scenario, feeder = scenario_of(graph, still_voltage=still_voltage, end_s=end_s)

@@ -55,10 +55,7 @@ def drawn(seed: int) -> tuple[InverterGroup, Ticks]:
     case = inverters(list(GRAPHS)[seed % len(GRAPHS)])
     gains = Gains(k_p=case.gains.k_p, P_set_min=-1e9, P_set_max=1e9)
     case = dataclasses.replace(case, gains=gains, m_p=rng.uniform(0.005, 0.02, 9), s=rng.uniform(1.0, 3.0, 9))
-    ticks = Ticks(
-        link={(a, b): int(rng.integers(0, 6)) for a in case.names for b in case.names},
-        measurement=seed,
-    )
+    ticks = Ticks(link={(a, b): int(rng.integers(0, 6)) for a in case.names for b in case.names}, measurement=seed)
     return case, ticks
 
 

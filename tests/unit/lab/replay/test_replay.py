@@ -9,13 +9,7 @@ import pytest
 from msgspec.structs import replace
 
 from gridpeers.lab.replay.changes import spliced
-from gridpeers.lab.replay.recorded_process import (
-    JournalParts,
-    RecordedProcess,
-    RecordedStep,
-    agent_again,
-    processes_of,
-)
+from gridpeers.lab.replay.recorded_process import JournalParts, RecordedProcess, RecordedStep, agent_again, processes_of
 from gridpeers.lab.replay.replay import ComparedRows, ReplayedPart, message_difference, replay
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem

@@ -134,12 +134,7 @@ def test_the_default_filter_is_critically_damped() -> None:
     ids=["by their set-points", "the overload limiter hands over", "the same of REGFM_A1"],
 )
 def test_two_gfm_share_a_load(
-    first: GfmDroop,
-    second: GfmDroop,
-    load: float,
-    P_set: tuple[float, float],
-    p: tuple[float, float],
-    x_over: float,
+    first: GfmDroop, second: GfmDroop, load: float, P_set: tuple[float, float], p: tuple[float, float], x_over: float
 ) -> None:
     """Equal droops split what set-points leave; a unit at its P_max leaves the rest, and f, to the other."""
     plant = pair(first, second, load)

@@ -129,11 +129,7 @@ def test_branches_keep_their_shares() -> None:
     assert other is tables.loads[2]
 
     resistive = feeder(buses=BUSES, loads=(load("2", 1e3, 3e3, 0),))
-    assert (
-        pytest.approx(0.125e3j),
-        pytest.approx(0.375e3j),
-        0,
-    ) == with_powers(resistive, {"2": 0.5e3j}).loads[0].S
+    assert (pytest.approx(0.125e3j), pytest.approx(0.375e3j), 0) == with_powers(resistive, {"2": 0.5e3j}).loads[0].S
 
 
 def scenario_of(tmp_path: Path, tables: str = "", feeder: str = "microgrid123") -> Path:

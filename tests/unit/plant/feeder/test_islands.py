@@ -97,12 +97,7 @@ def schedule(draw: random.Random) -> tuple[SwitchEvent, ...]:
 
 
 @pytest.mark.parametrize(
-    ("category", "seed", "method"),
-    [
-        ("off", 0, "first-order"),
-        ("III", 0, "first-order"),
-        ("III", 1, "second-order"),
-    ],
+    ("category", "seed", "method"), [("off", 0, "first-order"), ("III", 0, "first-order"), ("III", 1, "second-order")]
 )
 def test_no_schedule_of_switching_ends_the_plant(category: Literal["off", "III"], seed: int, method: Method) -> None:
     """Every row is finite; a connected inverter has a bounded frequency, another has no power; trips are events."""

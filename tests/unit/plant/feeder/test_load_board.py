@@ -102,8 +102,7 @@ def test_a_scheduled_change_equals_a_live_one() -> None:
     """The same rows to the last bit, and the same event."""
     changes = {"48": LoadSetting(factor=1.5), "65": LoadSetting(P=0.0, Q=0.0)}
     scheduled = plant(
-        ISLANDED,
-        loads=tuple(LoadEvent(t=0.1, load=name, setting=setting) for name, setting in changes.items()),
+        ISLANDED, loads=tuple(LoadEvent(t=0.1, load=name, setting=setting) for name, setting in changes.items())
     )
     by_hand = plant(ISLANDED)
     run(scheduled, 0.3)

@@ -133,12 +133,7 @@ def test_merged_loads_are_the_same_loads() -> None:
 
 def two_buses(load: complex) -> Network:
     """A source, a line of 1 + 1j ohm per phase, a constant-power load, and a switch to a third bus."""
-    config = LineConfig(
-        name="c",
-        phases="ABC",
-        Z=diagonal(1 + 1j),
-        B=diagonal(0.0),
-    )
+    config = LineConfig(name="c", phases="ABC", Z=diagonal(1 + 1j), B=diagonal(0.0))
     return Network(
         feeder(
             buses=tuple(three_phase_bus(name) for name in "123"),

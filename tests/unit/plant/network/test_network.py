@@ -73,12 +73,7 @@ def test_islands_are_ordered_by_their_first_bus(network: Network) -> None:
 
 def test_lines_without_charging_carry_no_current_at_equal_voltages() -> None:
     """A line's series admittance sees only voltage differences; with charging, half its capacitance is at each end."""
-    config = LineConfig(
-        name="c",
-        phases="ABC",
-        Z=diagonal(0.3 + 0.9j),
-        B=diagonal(4e-6),
-    )
+    config = LineConfig(name="c", phases="ABC", Z=diagonal(0.3 + 0.9j), B=diagonal(4e-6))
     line = Line(name="l", from_bus="1", to_bus="2", phases="AC", config="c", length=2.0)
     table = feeder(buses=(three_phase_bus("1"), three_phase_bus("2")), lines=(line,), line_configs=(config,))
     V = np.full(6, 2400.0 + 0j)

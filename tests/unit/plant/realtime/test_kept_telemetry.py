@@ -41,13 +41,7 @@ class Link:
             self._questions += 1
             if self.up:
                 command = Command(
-                    sender="me",
-                    epoch=1,
-                    seq=self._questions,
-                    t=0.0,
-                    verb="telemetry",
-                    argument=question,
-                    reply_to="me",
+                    sender="me", epoch=1, seq=self._questions, t=0.0, verb="telemetry", argument=question, reply_to="me"
                 )
                 self.lab.hear(KEYS.command, command)
 

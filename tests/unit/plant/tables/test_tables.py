@@ -65,12 +65,7 @@ def test_loads_are_the_published_ones_and_those_of_the_microgrids() -> None:
 
     assert sum(sum(load.S) for load in feeder.loads) == 3490e3 + 1920e3j
     assert (len(feeder.buses), len(feeder.lines), len(feeder.loads), len(feeder.inverters)) == (130, 118, 85, 0)
-    assert main == {
-        "rest": 760e3 + 380e3j,
-        "passive": 1252e3 + 660e3j,
-        "MG2": 985e3 + 550e3j,
-        "MG3": 1195e3 + 690e3j,
-    }
+    assert main == {"rest": 760e3 + 380e3j, "passive": 1252e3 + 660e3j, "MG2": 985e3 + 550e3j, "MG3": 1195e3 + 690e3j}
     assert event2["passive"].real == 1360e3
     assert [event2[zone] / main[zone] for zone in ("MG2", "MG3")] == pytest.approx([0.95, 0.95])
 
@@ -176,11 +171,7 @@ CHANGED: list[tuple[str, Callable[[str], str | bytes], str]] = [
         'lines.csv: column "length_m" appears twice',
     ),
     ("lines.csv", without("L67_72,"), "buses.csv: 23 buses not connected with the substation at bus 150"),
-    (
-        "lines.csv",
-        lambda text: text.replace(",29,30,ABC,2,", ",29,30,A,9,"),
-        "buses.csv: 2 buses not connected with",
-    ),
+    ("lines.csv", lambda text: text.replace(",29,30,ABC,2,", ",29,30,A,9,"), "buses.csv: 2 buses not connected with"),
     (
         "transformers.csv",
         lambda text: f"{text}T,61,610,D-D,150,1.27,2.72,no, or little\n",

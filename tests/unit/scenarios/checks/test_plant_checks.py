@@ -164,11 +164,7 @@ def test_a_time_of_overload_longer_than_the_run_is_not_judged(sound: CheckedCase
 
 @pytest.mark.parametrize(
     ("check", "limits"),
-    [
-        ("frequency", {"within_s": 0.5}),
-        ("voltage", {"within_s": 0.5}),
-        ("rating", {"longest_s": 0.1}),
-    ],
+    [("frequency", {"within_s": 0.5}), ("voltage", {"within_s": 0.5}), ("rating", {"longest_s": 0.1})],
 )
 def test_what_is_out_before_the_time_of_a_check_is_not_judged(
     sound: CheckedCase, check: str, limits: dict[str, float]

@@ -27,8 +27,7 @@ def test_a_port_in_use_is_told_before_anything_starts() -> None:
         text = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
 
         with pytest.raises(
-            ListenError,
-            match=f"--listen: {text} cannot be used: address already in use; end its user .*kill -CONT",
+            ListenError, match=f"--listen: {text} cannot be used: address already in use; end its user .*kill -CONT"
         ):
             free_endpoint(text, option="--listen")
 

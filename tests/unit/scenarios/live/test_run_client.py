@@ -9,13 +9,7 @@ from pathlib import Path
 import pytest
 
 from gridpeers.scenarios.live import run_client as client
-from gridpeers.scenarios.live.run_address import (
-    Access,
-    RunAddress,
-    UsageError,
-    address_of,
-    return_path,
-)
+from gridpeers.scenarios.live.run_address import Access, RunAddress, UsageError, address_of, return_path
 from gridpeers.scenarios.live.run_client import NobodyError, RunClient
 from gridpeers.wire.driver.inbox import Inbox
 from gridpeers.wire.keys import Keys

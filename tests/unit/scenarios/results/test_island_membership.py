@@ -12,11 +12,7 @@ from msgspec.structs import replace as with_fields
 import gridpeers as gp
 from gridpeers.plant.equipment.connectivity import islands_after
 from gridpeers.scenarios.results.history import Window
-from gridpeers.scenarios.results.island_membership import (
-    island_intervals,
-    islands_at_end,
-    switch_events,
-)
+from gridpeers.scenarios.results.island_membership import island_intervals, islands_at_end, switch_events
 from gridpeers.scenarios.results.plots.run_figures import figures_of, measured
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.wire.messages import PlantEvent

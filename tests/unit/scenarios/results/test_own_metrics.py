@@ -179,9 +179,7 @@ OTHER = 3
 """
 
 FOUND = Findings(
-    results={
-        "IV": {"event1": Steady(f_error_Hz=0.0, MPSI=0.09, V_error=0.0, MQSI=0.0, t_restore_s=None, p={})},
-    }
+    results={"IV": {"event1": Steady(f_error_Hz=0.0, MPSI=0.09, V_error=0.0, MQSI=0.0, t_restore_s=None, p={})}}
 )
 
 

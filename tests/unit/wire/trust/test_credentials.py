@@ -105,10 +105,7 @@ def test_nobody_holds_a_token_or_answers_a_query_for_another(role: Role) -> None
     assert held == {
         "plant": {DEMO.alive_plant(7), recorder}, "agent": {own}, "operator": {recorder}, "viewer": set(),
     }[role]  # fmt: skip
-    assert answered == {
-        "plant": {DEMO.config("inv2")},
-        "agent": {DEMO.nameplate("inv1", "a1")},
-    }.get(role, set())
+    assert answered == {"plant": {DEMO.config("inv2")}, "agent": {DEMO.nameplate("inv1", "a1")}}.get(role, set())
 
 
 @pytest.mark.parametrize("star", [False, True])

@@ -105,14 +105,8 @@ WRONG: dict[str, tuple[Callable[[Path], object], str]] = {
     "another site": (lambda lab: of_another_site(lab, "inv1.pem"), r"inv1.pem: is not signed by .*: it is of another"),
     "no authority of ours": (lambda lab: of_another_site(lab, "ca.pem"), r"members.json: is not signed by ca.pem"),
     "a key of another": (lambda lab: shutil.copy2(lab / "inv2.key", lab / "inv1.key"), r"is not the key of inv1.pem"),
-    "another name": (
-        lambda lab: shutil.copy2(lab / "inv2.pem", lab / "inv1.pem"),
-        r'"agent:inv2", not of "agent:in',
-    ),
-    "no PEM": (
-        lambda lab: (lab / "inv1.pem").write_text("x"),
-        r"inv1.pem: is not a certificate in PEM; copy it",
-    ),
+    "another name": (lambda lab: shutil.copy2(lab / "inv2.pem", lab / "inv1.pem"), r'"agent:inv2", not of "agent:in'),
+    "no PEM": (lambda lab: (lab / "inv1.pem").write_text("x"), r"inv1.pem: is not a certificate in PEM; copy it"),
     "no private key": (lambda lab: (lab / "inv1.key").write_text("x"), r"inv1.key: is no private key: .*; copy it"),
     "no JSON": (lambda lab: (lab / "members.json").write_text("x"), r"members.json: cannot be read: .*; copy it"),
     "revoked": (lambda lab: revoke(lab, "inv1"), r"inv1.pem: was revoked; gridpeers keys issue inv1 gives inv1 a new"),
