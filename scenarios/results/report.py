@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -95,7 +96,8 @@ def _failures(report: RunReport) -> Iterator[str]:
     for case in report.checks:
         for verdict in report.broken(case):
             if verdict.check != LAW_FAILED or not report.failures.get(case):
-                yield f"FAILED  case {case}: {verdict.sentence.replace(' failed: ', ': ', 1)}"
+                said = re.sub(r" at t = [\d.]+ s", "", verdict.sentence.replace(" failed: ", ": ", 1), count=1)
+                yield f"FAILED  case {case}: {said}"  # the time is in the next command
     yield from (f"FAILED  {it.claim.text}: {it.found}" for it in report.verdicts if it.status == "FAIL")
 
 
@@ -142,7 +144,7 @@ _IN_SHORT = {"f_error_Hz": "f error", "MPSI": "uneven P", "MQSI": "uneven Q", "t
 
 
 def _cases(report: RunReport, room: int) -> list[Text]:
-    """Return a row for each case with its largest values after any event, as far as there is room."""
+    """Return a row for each case with its worst settled values of all events, as far as there is room."""
     found, cases = report.findings, [*report.checks]
     columns = _IN_SHORT if any(found.results.values()) else {}  # without an event there is no window to measure in
     room -= 1 + bool(columns)
@@ -154,7 +156,7 @@ def _cases(report: RunReport, room: int) -> list[Text]:
         row[0] = _cut(_case(report, case), max(COLUMNS - rest, len(case)))
     lines = _aligned(rows, left=(0, len(rows[0]) - 1))
     lines += [Text(f"and {len(cases) - len(shown)} more cases: see the report")] * (len(shown) < len(cases))
-    words = "largest values after any event; uneven P, Q: MPSI, MQSI, 0 if shared equally"
+    words = "worst settled values of all events; uneven P, Q: MPSI, MQSI, 0 if shared equally"
     return lines + [Text(words, "dim")] * bool(columns)
 
 
