@@ -13,8 +13,7 @@ from gridpeers.wire.plugins.plugin import Plugin
 from gridpeers.wire.schema.table_schema import NO_KEY, Below, Example, Plausible, Range, Unit
 from gridpeers.wire.trust.credentials import Credentials
 
-MAX_AGE = 0.25
-"""Age (s of run time) of a state or a measurement beyond which it is not used in real time."""
+MAX_AGE = 0.25  # Age (s of run time) of a state or a measurement beyond which it is not used in real time
 
 
 class Gains(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

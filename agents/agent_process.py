@@ -22,8 +22,7 @@ from gridpeers.wire.keys import check_name
 from gridpeers.wire.node_group import NodeGroup
 from gridpeers.wire.trust.credentials import Credentials
 
-AgentProcess = AgentConfig | tuple[AgentConfig, ...]
-"""Configuration of a process: one agent, or several."""
+AgentProcess = AgentConfig | tuple[AgentConfig, ...]  # Configuration of a process: one agent, or several
 
 OPENED_AGAIN, OPENED_WITHIN = 1.0, 60.0
 """Time (s) between two tries to open a session in place of a broken one, and time (s) for all of them."""

@@ -27,8 +27,7 @@ from gridpeers.agents.agent_config import Control, DegradedCommunication, Gains
 from gridpeers.agents.laws.consensus import Consensus
 from gridpeers.wire.messages import Angle
 
-REMEMBERED = 51
-"""Number of arrivals over which the usual age on a link is a median: one second at 20 ms."""
+REMEMBERED = 51  # Number of arrivals over which the usual age on a link is a median: one second at 20 ms
 
 OFF = 0.05
 """Distance (pu of own rating) beyond which an inverter is off its droop characteristic, and up to which it may wind up.
@@ -133,17 +132,13 @@ T_LEAK = 10.0
 """Time constant (s) with which slip decays: sensors that disagree by less than slip_max / T_LEAK (Hz) count as in
 step."""
 
-T_GAP = 0.2
-"""Longest time (s) between two own measurements over which the frequency is integrated."""
+T_GAP = 0.2  # Longest time (s) between two own measurements over which the frequency is integrated
 
 RETRY, LONGEST_RETRY = 10.0, 600.0
 """First and longest time (s) until a retry of a neighbour out of step; it doubles each time."""
 
-TRUSTED = 10.0
-"""Time (s) in step after a retry, after which the next loss of step counts as the first."""
-
-KEPT = 512
-"""Number of own measurements to keep for the comparison with late states: 10 s at 20 ms."""
+TRUSTED = 10.0  # Time (s) in step after a retry, after which the next loss of step counts as the first
+KEPT = 512  # Number of own measurements to keep for the comparison with late states: 10 s at 20 ms
 
 
 @dataclass

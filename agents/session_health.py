@@ -18,8 +18,7 @@ from math import inf
 from gridpeers.wire.messages import PLANT
 from gridpeers.wire.timing import SessionDeadline
 
-SILENT = 1.0
-"""Time (s) without a message after which the plant, or a neighbour that the plant hears, counts as silent."""
+SILENT = 1.0  # Time (s) without a message after which the plant, or a neighbour that the plant hears, counts as silent
 
 STAGGER = 0.5
 """Time (s) between the agents that may open the new session, so that the first spares the others: one is heard after

@@ -28,11 +28,8 @@ from gridpeers.wire.post import Post
 from gridpeers.wire.tick_policy import WAIT, TickVerdict
 from gridpeers.wire.timing import Awaited, TickBarrier, time_of
 
-CLOSING = 2.0
-"""Longest wait (s) for the last states of neighbours, and for the acknowledgement of the report on links."""
-
-DEADLINES = 2.0
-"""An agent waits this many deadlines, so that the plant reports the error first."""
+CLOSING = 2.0  # Longest wait (s) for the last states of neighbours, and for the acknowledgement of the report on links
+DEADLINES = 2.0  # An agent waits this many deadlines, so that the plant reports the error first
 
 
 class AgentBarrier:

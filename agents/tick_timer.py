@@ -40,8 +40,7 @@ from gridpeers.wire.timing import Awaited, Timer
 
 EARLIEST, LATEST = 0.25, 0.75
 
-CONVINCED = 5
-"""Number of badly timed measurements in a row before the ticks are moved: a single one may be late."""
+CONVINCED = 5  # Number of badly timed measurements in a row before the ticks are moved: a single one may be late
 
 
 class TickTimer(Timer):

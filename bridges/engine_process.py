@@ -24,8 +24,7 @@ from typing import Any, NoReturn
 from gridpeers.plant.request_process import ProcessEndedError, RequestProcess, program
 from gridpeers.plant.tables.read import FeederError
 
-RESULT, PLACE = "result.pickle", "place"
-"""Files in the folder of the process: its result, and what it is about to do."""
+RESULT, PLACE = "result.pickle", "place"  # Files in the folder of the process: its result, and what it is about to do
 
 LONGEST = 600.0  # time (s) after which a file that is not read is given up
 

@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-Names = Sequence[str]
-"""Several names; a text counts as one name."""
+Names = Sequence[str]  # Several names; a text counts as one name
 
 
 class Feeder(Tables, frozen=True, kw_only=True):

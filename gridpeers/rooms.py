@@ -13,8 +13,7 @@ from gridpeers.wire.plugins.registry import Registry
 if TYPE_CHECKING:
     from gridpeers.plant.equipment import Tables
 
-ROOMS: Registry[Any] = Registry("part of a room", "rooms", lambda it: "")
-"""Functions, classes and modules by name."""
+ROOMS: Registry[Any] = Registry("part of a room", "rooms", lambda it: "")  # Functions, classes and modules by name
 
 READERS: Registry[Callable[..., Tables]] = Registry(
     "reader of feeders", "feeder readers", lambda it: "" if callable(it) else "it cannot be called"

@@ -112,8 +112,7 @@ def _noted(record: RunRecord, since: float, until: float) -> Iterator[Flow]:
 # -------------------------------------------------------------------- Perfetto trace
 
 
-CUTS = ("cut", "partition", "flap")
-"""Fates that are drawn as a slice too: nothing passes for a time."""
+CUTS = ("cut", "partition", "flap")  # Fates that are drawn as a slice too: nothing passes for a time
 
 
 class PerfettoTrace:

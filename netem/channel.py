@@ -21,8 +21,7 @@ from gridpeers.wire.plugins.plugin import Plugin
 
 NEVER = -math.inf
 
-FOREVER = math.inf
-"""The delay of a message that nothing will ever let go."""
+FOREVER = math.inf  # The delay of a message that nothing will ever let go
 
 
 class Fate(NamedTuple):

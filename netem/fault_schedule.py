@@ -14,8 +14,7 @@ from gridpeers.netem.schema.fault import Fault, Span
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.netem.schema.pattern import Link, links_among, parse
 
-CUTS = ("cut", "partition")
-"""Kinds that let nothing pass as long as they hold."""
+CUTS = ("cut", "partition")  # Kinds that let nothing pass as long as they hold
 
 GATES = (*CUTS, "flap")
 """Kinds that let nothing pass: all of them count at once, where of another kind only one entry can hold."""

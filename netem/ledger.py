@@ -135,8 +135,7 @@ def combined(digests: Mapping[str, str] | Iterable[tuple[str, str]]) -> str:
     return sha256(_encode(sorted(dict(digests).items()))).hexdigest()
 
 
-BATCH = 512
-"""Verdicts that are hashed at once."""
+BATCH = 512  # Verdicts that are hashed at once
 
 _NOTHING = sha256().digest()
 _encode = msgspec.msgpack.Encoder().encode

@@ -22,15 +22,13 @@ from gridpeers.netem.schema.pattern import Link
 from gridpeers.wire.links import Arrival
 from gridpeers.wire.messages import AnyMessage
 
-MOST_FAILURES = 8
-"""User-defined faults that failed and are named in one report, which must not become too long."""
+MOST_FAILURES = 8  # User-defined faults that failed and are named in one report, which must not become too long
 
 NANO = 1e9
 """Arrivals are ordered by whole nanoseconds: so t_k + d and t_j meet where their decimals do, whatever binary does."""
 
 
-AT_ONCE: tuple[tuple[float, int | None], ...] = ((0.0, None),)
-"""Deliveries of a link without faults."""
+AT_ONCE: tuple[tuple[float, int | None], ...] = ((0.0, None),)  # Deliveries of a link without faults
 
 
 class _Special(NamedTuple):

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rich.console import Console
 
-_WIDE = 10_000
-"""Characters of a line that nobody's sentence reaches: text in a file is not wrapped."""
+_WIDE = 10_000  # Characters of a line that nobody's sentence reaches: text in a file is not wrapped
 
 
 def terminal(**options: Any) -> Console:

@@ -29,8 +29,7 @@ class Outcome:
     pacing: Pacing | None = None
 
 
-SPEEDS = (0.1, 50.0)
-"""Least and greatest useful speed (s of run time per s), of a live run or of a scenario."""
+SPEEDS = (0.1, 50.0)  # Least and greatest useful speed (s of run time per s), of a live run or of a scenario
 
 
 Other = LinkReport | Journal | LinkRequest
@@ -41,8 +40,7 @@ Driver = Literal["processes", "inprocess"]
 
 Clock = Literal["simulated", "realtime"]  # Lock-step of plant and agents, or real time
 
-Progress = Callable[[str, float, float], None]
-"""Takes the case, the time it has reached (s) and its end (s)."""
+Progress = Callable[[str, float, float], None]  # Takes the case, the time it has reached (s) and its end (s)
 
 
 class BrokenRunError(RuntimeError):

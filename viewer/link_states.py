@@ -17,8 +17,7 @@ AGEING = 0.1
 """Age (s) beyond which the last state of a sender is shown as ageing, though it is still used: five control periods of
 20 ms."""
 
-AGE_STEP = 0.05
-"""Step of the ages of a live run (s): what hardly changes is not sent again."""
+AGE_STEP = 0.05  # Step of the ages of a live run (s): what hardly changes is not sent again
 
 
 class LinkView(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):

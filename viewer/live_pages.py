@@ -102,8 +102,7 @@ class LivePages:
             return {"ok": False, "command": command, "text": str(error)}
 
 
-LEAVING = 5.0
-"""Time (s) that an agent has to leave by itself."""
+LEAVING = 5.0  # Time (s) that an agent has to leave by itself
 
 
 class OwnAgents:

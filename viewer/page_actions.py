@@ -20,8 +20,7 @@ ActionKind = Literal[
     "open", "close", "synchronise", "stop", "start", "cut", "delay", "loss", "heal", "heal all", "load"
 ]
 
-FIND = 1.5
-"""Longest wait (s) for the plant of a run that the page follows already."""
+FIND = 1.5  # Longest wait (s) for the plant of a run that the page follows already
 
 
 class PageAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

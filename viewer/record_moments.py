@@ -32,8 +32,7 @@ from gridpeers.wire.messages import LinkReport, LinkRequest, Measurement, State,
 LENGTHS = (LENGTH / 4.0, LENGTH / 2.0, LENGTH)
 """Lengths of strips (s): a record that is shorter than the last has more points a second."""
 
-KEPT = 400
-"""Parts whose points are kept: two strips of a run in real time."""
+KEPT = 400  # Parts whose points are kept: two strips of a run in real time
 
 
 class PlantRows:

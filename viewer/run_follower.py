@@ -18,18 +18,14 @@ from gridpeers.viewer.run_view import Cursor, Frame, RunView
 from gridpeers.wire.codec import encode
 from gridpeers.wire.messages import Answer, Command, LinkAcknowledgement
 
-PAUSE = 0.1
-"""Longest wait (s) for a message; then the page is looked after."""
-
-ACCOUNTS = 0.5
-"""Time (s) between two questions for the accounts of emulated links, while any has a fault."""
+PAUSE = 0.1  # Longest wait (s) for a message; then the page is looked after
+ACCOUNTS = 0.5  # Time (s) between two questions for the accounts of emulated links, while any has a fault
 
 STATUS = 5.0
 """Time (s) between two questions for the plant's status, which are also asked when a switch has moved, and for the
 one-line diagram until it has come."""
 
-AGAIN = 0.1
-"""Least time (s) between two questions for it."""
+AGAIN = 0.1  # Least time (s) between two questions for it
 
 
 class RunFollower:

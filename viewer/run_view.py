@@ -21,8 +21,7 @@ from gridpeers.viewer.link_states import AGE_STEP, LinkStates, LinkView
 from gridpeers.viewer.strips import Point, Strips
 from gridpeers.wire.messages import AgentStatus, PlantEvent, Telemetry
 
-KEPT = 200
-"""Most events that are kept for a page that comes later."""
+KEPT = 200  # Most events that are kept for a page that comes later
 
 
 class EventView(msgspec.Struct, frozen=True):

@@ -15,11 +15,9 @@ from gridpeers.wire.messages import VALUES
 
 LENGTH = 30.0
 
-STEP = 0.05
-"""Run time (s) between two points at the least: more than a strip of 600 pixels can show."""
+STEP = 0.05  # Run time (s) between two points at the least: more than a strip of 600 pixels can show
 
-MANY, WIDE_STEP = 30, 0.1
-"""Inverters beyond which there are half as many points."""
+MANY, WIDE_STEP = 30, 0.1  # Inverters beyond which there are half as many points
 
 Point = tuple[float, tuple[float | None, ...], dict[int, tuple[float, float]]]
 """Run time (s); then f (Hz), P (pu of the rating), Q (pu of the rating) and V (pu) of each inverter, all f first; then

@@ -18,11 +18,9 @@ from gridpeers.wire.driver.ending import watch_readers
 if TYPE_CHECKING:
     from gridpeers.viewer.page_server import Pages
 
-HERE, PORT = "127.0.0.1", 8123
-"""Address and port of a page by default: on this host alone."""
+HERE, PORT = "127.0.0.1", 8123  # Address and port of a page by default: on this host alone
 
-Line = Callable[[str], str]
-"""Makes the line that a command prints, from the address of its page."""
+Line = Callable[[str], str]  # Makes the line that a command prints, from the address of its page
 
 
 @of_live_run

@@ -20,11 +20,8 @@ import msgspec
 from gridpeers.wire.messages import LONGEST_MESSAGE, AnyMessage, Message
 from gridpeers.wire.wording import printable
 
-CRC = 4
-"""Bytes of the checksum at the end: CRC-32 as in zlib and Ethernet, least significant byte first."""
-
-_SOUND = 0x2144DF1C
-"""CRC-32 of any bytes that end in their own CRC-32: so one call checks a whole payload."""
+CRC = 4  # Bytes of the checksum at the end: CRC-32 as in zlib and Ethernet, least significant byte first
+_SOUND = 0x2144DF1C  # CRC-32 of any bytes that end in their own CRC-32: so one call checks a whole payload
 
 KINDS = {
     "oversized": "longer than a message may be",

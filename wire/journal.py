@@ -29,17 +29,13 @@ RecordLevel = Literal["all", "decisions", "physics"]
 """What nodes note: everything; decisions with their inputs, but no arrivals and no fates on links; or nothing, as the
 plant's telemetry has the physics."""
 
-LOT = 32_000
-"""Bytes of entries from which on a part of a journal is sent: Zenoh sends so many in one piece."""
-
-ROOM = 1_000_000
-"""Bytes that a journal holds at most: what comes beyond, as in a flood of messages, is counted only."""
+LOT = 32_000  # Bytes of entries from which on a part of a journal is sent: Zenoh sends so many in one piece
+ROOM = 1_000_000  # Bytes that a journal holds at most: what comes beyond, as in a flood of messages, is counted only
 
 NOTED_REJECTED = 200
 """Rejected messages that are noted between two times at which a journal is taken; the others are counted only."""
 
-AT_ONCE = 64
-"""Most messages in one entry: of the longest there are, they fit into a part."""
+AT_ONCE = 64  # Most messages in one entry: of the longest there are, they fit into a part
 
 
 class Entry(msgspec.Struct, frozen=True, array_like=True):
@@ -222,11 +218,8 @@ class JournalBuffer:
         return parts
 
 
-EACH_TICK = ("measurement", "state", "set_points")
-"""Kinds of keys with a message a tick."""
-
-TO_LINKS = ("link_request", "command")
-"""Kinds of keys on which commands to emulated links come, among others."""
+EACH_TICK = ("measurement", "state", "set_points")  # Kinds of keys with a message a tick
+TO_LINKS = ("link_request", "command")  # Kinds of keys on which commands to emulated links come, among others
 
 
 def kind_of(key: str) -> str:
@@ -247,8 +240,7 @@ def stream_of(key: str) -> str:
     return f"{'measurement' if kind == 'measurement' else 'state'}/{name}"
 
 
-SHOWN_PAYLOAD = 1_000
-"""Most bytes that are noted of a message that was rejected."""
+SHOWN_PAYLOAD = 1_000  # Most bytes that are noted of a message that was rejected
 
 _IN_TELEMETRY = ("telemetry", "journal", "report")
 """Kinds of keys whose messages the record has anyway: the plant publishes them for recorders."""

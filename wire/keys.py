@@ -30,8 +30,7 @@ LATEST_ONLY = ("measurement", "state", "set_points", "status")
 ANY_ALIVE_PLANT = "gridpeers/*/alive/plant/*"
 """Tokens of the plants of all runs, for an error message that lists the running ones."""
 
-ANY_TOKEN = "gridpeers/*/alive/**"
-"""All tokens of all runs."""
+ANY_TOKEN = "gridpeers/*/alive/**"  # All tokens of all runs
 
 
 class KeySpec(msgspec.Struct, frozen=True):
@@ -125,8 +124,7 @@ def _parts(prefix: str, key: str) -> tuple[str, ...]:
     return parts if all(map(is_name, parts)) else ()
 
 
-MOST_PARTS = 6
-"""Parts of the longest token: that of an agent."""
+MOST_PARTS = 6  # Parts of the longest token: that of an agent
 
 
 def epoch_of(part: str) -> int | None:

@@ -7,8 +7,7 @@ from typing import Any, NamedTuple, Protocol
 
 from gridpeers.wire.messages import AnyMessage, Measurement, State
 
-REPORT_TICKS = 100
-"""Ticks between two reports of a receiver on the links into it."""
+REPORT_TICKS = 100  # Ticks between two reports of a receiver on the links into it
 
 
 class Arrival(NamedTuple):

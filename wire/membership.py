@@ -107,8 +107,7 @@ class Admission:
                 yield message
 
 
-MOST_PROCESSES = 8
-"""Most processes that may claim one name: two while one replaces the other, and some by mistake."""
+MOST_PROCESSES = 8  # Most processes that may claim one name: two while one replaces the other, and some by mistake
 
 ASKED_AT_ONCE = 20
 """Most processes that are asked for their nameplates again in one go: a question costs as much as ten messages."""

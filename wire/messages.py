@@ -55,17 +55,13 @@ Tree = Annotated[dict[str, Any], msgspec.Meta(max_length=16)]
 """Maps, lists, texts, numbers, booleans and nil, such as a table of a scenario file; no core reads it, and `check_tree`
 bounds it."""
 
-TREE_DEPTH = 8
-"""Most levels of a tree."""
-
-MOST_COUNT = 2**53 - 1
-"""Largest `Count`."""
+TREE_DEPTH = 8  # Most levels of a tree
+MOST_COUNT = 2**53 - 1  # Largest `Count`
 
 Count = Annotated[int, msgspec.Meta(ge=0, le=MOST_COUNT)]
 """A tick, a sequence number, an epoch: never negative, and exact as a float too."""
 
-LATEST = 1e9
-"""Largest `Time` (s)."""
+LATEST = 1e9  # Largest `Time` (s)
 
 Time = Annotated[float, msgspec.Meta(ge=0.0, le=LATEST)]
 """Run time or waiting time (s): up to 30 years."""
@@ -100,11 +96,8 @@ Droop = Annotated[float, msgspec.Meta(gt=0.0, le=1.0)]
 Cycles = Annotated[float, msgspec.Meta(ge=-2e12, le=2e12)]
 """Angle (cycles): the largest frequency error over the longest time."""
 
-MOST_SHARED = 16
-"""Most values that a law may share beside its set-points."""
-
-SHARED_LIMIT = 1e12
-"""Largest absolute value of a shared number."""
+MOST_SHARED = 16  # Most values that a law may share beside its set-points
+SHARED_LIMIT = 1e12  # Largest absolute value of a shared number
 
 Shared = Annotated[
     dict[
@@ -115,8 +108,7 @@ Shared = Annotated[
 ]
 """Values that a law shares, by names of its own choice."""
 
-MOST_INVERTERS = 1000
-"""Most inverters in a run: one row of telemetry on more would not fit into a message."""
+MOST_INVERTERS = 1000  # Most inverters in a run: one row of telemetry on more would not fit into a message
 
 Names = Annotated[tuple[Name, ...], msgspec.Meta(max_length=MOST_INVERTERS)]
 """Names of inverters or processes."""
@@ -160,11 +152,8 @@ def check_tree(tree: Any, levels: int = TREE_DEPTH) -> None:
             raise ValueError(f"a value in it is no finite number, printable text, list or map: {ascii(tree)[:100]}")
 
 
-PLANT = "plant"
-"""Name under which the plant process sends."""
-
-OFF = "off"
-"""In place of an island's name: the inverter is off the network, or in a de-energised island."""
+PLANT = "plant"  # Name under which the plant process sends
+OFF = "off"  # In place of an island's name: the inverter is off the network, or in a de-energised island
 
 
 def _once(what: str, names: tuple[str, ...]) -> None:
@@ -495,8 +484,7 @@ class Pacing(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """Total time (s) by which the schedule was postponed, because it could not be caught up with."""
 
 
-VALUES = 6
-"""Number of values of each inverter in a row of telemetry."""
+VALUES = 6  # Number of values of each inverter in a row of telemetry
 
 
 class Telemetry(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):

@@ -22,8 +22,7 @@ from gridpeers.wire.node import Action, Fetch, Listen, Log, Loss, Publish
 Handler = Callable[[Any, bytes, float], None]
 """Takes a message of its route, its bytes, and the time; raises RejectedError if the message is unexpected."""
 
-ANYBODY = ""
-"""Sender of a route that every participant may use."""
+ANYBODY = ""  # Sender of a route that every participant may use
 
 
 class Route(NamedTuple):

@@ -109,8 +109,7 @@ PATIENCE = 3.5
 """Silence (s) after which a new session opens. It exceeds Zenoh's lease, so the others have forgotten the old session.
 It doubles, up to `LONGEST`, after a session that never worked."""
 
-LONGEST = 60.0
-"""Longest patience (s): a path that stays cut must not keep a process busy with sessions."""
+LONGEST = 60.0  # Longest patience (s): a path that stays cut must not keep a process busy with sessions
 
 
 class SessionDeadline:
@@ -134,8 +133,7 @@ class SessionDeadline:
         return next((name for name, since in self._since.items() if now - since >= self._patience + silent[name]), "")
 
 
-MOST_KINDS = 200
-"""Kinds of lines that a limit tells apart."""
+MOST_KINDS = 200  # Kinds of lines that a limit tells apart
 
 _NUMBER = re.compile(r"[0-9]+(?:\.[0-9]+)?")
 

@@ -15,8 +15,7 @@ from gridpeers.wire.plugins.plugin import class_objection
 from gridpeers.wire.plugins.registry import PluginError, Registry
 from gridpeers.wire.schema.table_schema import Plausible, Range, shared_fields
 
-CARRIERS = ("use", "command", "fmu")
-"""Keys of a scenario's table `law`; one of them names the law."""
+CARRIERS = ("use", "command", "fmu")  # Keys of a scenario's table `law`; one of them names the law
 
 KEYS = (*CARRIERS, "shared", "folder", "time_limit_s")
 

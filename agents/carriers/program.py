@@ -25,8 +25,7 @@ from gridpeers.agents.laws.law import NOTHING_SHARED, Law, Neighbour, Own, SetPo
 from gridpeers.wire.codec import decode_foreign
 from gridpeers.wire.wording import printable
 
-LEAVING = 1.0
-"""Time (s) for a program to end after its input has ended."""
+LEAVING = 1.0  # Time (s) for a program to end after its input has ended
 
 _GUARD = 'read -r _; sleep "$1"; test -z "$2" || rm -rf -- "$2"; kill -KILL 0'
 """Leader of the group. Its input ends with the process that started it, even by SIGKILL; then it ends the group."""
@@ -84,8 +83,7 @@ class ProcessGroup:
         self._guard.stdin.close()
 
 
-LONGEST_LINE = 100_000
-"""Most bytes of an answer."""
+LONGEST_LINE = 100_000  # Most bytes of an answer
 
 EXAMPLE = '{"P_set": 0.5, "V_set": 1.0}'
 

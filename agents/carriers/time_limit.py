@@ -16,11 +16,8 @@ from gridpeers.agents.laws.law import LIMITS, Law, Neighbour, Own, SetPoints, Te
 from gridpeers.wire.driver.machine import POSIX
 from gridpeers.wire.plugins.registry import ANYTHING, named
 
-FIRST = 10.0
-"""Factor on the time limit for the making of a law, or for its first answer, because code is loaded then."""
-
-BLOCKED = 10.0
-"""Factor on the time limit for a call in real time, while it waits and does not compute."""
+FIRST = 10.0  # Factor on the time limit for the making of a law, or for its first answer, because code is loaded then
+BLOCKED = 10.0  # Factor on the time limit for a call in real time, while it waits and does not compute
 
 
 class _OverError(BaseException):

@@ -16,8 +16,7 @@ from gridpeers.wire.wording import printable, suggestion
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,31}")
 
-_ADDRESS = re.compile(r" at 0x[0-9a-f]+")
-"""Address of an object in memory, which differs in every run."""
+_ADDRESS = re.compile(r" at 0x[0-9a-f]+")  # Address of an object in memory, which differs in every run
 
 
 class LawError(RuntimeError):

@@ -14,8 +14,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 from gridpeers.wire.schema.table_reading import parameter_values
 from gridpeers.wire.schema.table_schema import Below, Range, Unit
 
-NOTHING_SHARED: Mapping[str, float] = MappingProxyType({})
-"""Default of `shared`: no value."""
+NOTHING_SHARED: Mapping[str, float] = MappingProxyType({})  # Default of `shared`: no value
 
 
 class Own(NamedTuple):

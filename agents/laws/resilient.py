@@ -23,8 +23,7 @@ from gridpeers.agents.laws.consensus import Consensus
 from gridpeers.agents.laws.law import Neighbour, Own, SetPoints, Term, Terms
 from gridpeers.wire.schema.table_schema import Range, Unit
 
-SLOWER = 10.0
-"""Ratio of the times in which trust returns and in which it falls."""
+SLOWER = 10.0  # Ratio of the times in which trust returns and in which it falls
 
 
 class _Memory(NamedTuple):

@@ -17,17 +17,13 @@ if TYPE_CHECKING:
 TellPart = Callable[[str, float], None]
 """Takes the present work, with its part behind a comma, and the amount of all that is done."""
 
-PATIENCE = 4.0
-"""A start that takes longer than this (s) is explained; usually it takes about 1 s."""
+PATIENCE = 4.0  # A start that takes longer than this (s) is explained; usually it takes about 1 s
 
 COMPILING = "starting ... (only the very first run compiles the plant, which takes about 20 s)"
 TRYING = "checking the start of the plant ... (only the very first use compiles it, which takes about 20 s)"
 
-LONG = 30.0
-"""A case that takes longer than this (s) has a line in a log; so the output of most runs fits one screen."""
-
-MEMORY = 300.0
-"""Window of a bar's estimate of the time left (s); runs differ in how long they take."""
+LONG = 30.0  # A case that takes longer than this (s) has a line in a log; so the output of most runs fits one screen
+MEMORY = 300.0  # Window of a bar's estimate of the time left (s); runs differ in how long they take
 
 
 @contextmanager

@@ -21,8 +21,7 @@ from gridpeers.wire.wording import counted
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-RunSource = Result | Results | str | Path
-"""A result, results of several cases, or the folder of either."""
+RunSource = Result | Results | str | Path  # A result, results of several cases, or the folder of either
 
 
 def compare(a: RunSource, b: RunSource, *, names: tuple[str, str] = ("a", "b")) -> Comparison:

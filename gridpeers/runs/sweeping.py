@@ -22,8 +22,7 @@ from gridpeers.scenarios.sweep.sweep_reading import BaseScenario, Plan, plan_of
 from gridpeers.scenarios.sweep.workers import cores, on_workers
 from gridpeers.wire.wording import suggestion
 
-Values = Mapping[str, Iterable[Any]]
-"""Values by the dotted path of a key."""
+Values = Mapping[str, Iterable[Any]]  # Values by the dotted path of a key
 
 
 def sweep(

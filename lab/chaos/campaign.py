@@ -37,11 +37,8 @@ from gridpeers.scenarios.sweep.workers import on_workers
 from gridpeers.wire.driver.command_line import command_line
 from gridpeers.wire.wording import counted
 
-REPEATED = 20
-"""Interval of runs that are repeated, by any free worker."""
-
-SEEDS = 1_000_000
-"""Number of seeds for the fates of messages per seed of a campaign: each run has its own."""
+REPEATED = 20  # Interval of runs that are repeated, by any free worker
+SEEDS = 1_000_000  # Number of seeds for the fates of messages per seed of a campaign: each run has its own
 
 COLUMNS = (
     *("run", "seed", "status", "violated", "why", "disturbances", "schedule"),

@@ -46,8 +46,7 @@ REJOINED_S = 1.0
 """Longest time (s) after a cut until a value from the other side is used: simulated time needs no new connection, and
 no delay is longer."""
 
-LATEST_S = 0.5
-"""Time (s) after the last change from which no decision may use a stale value: the longest delay."""
+LATEST_S = 0.5  # Time (s) after the last change from which no decision may use a stale value: the longest delay
 
 _AFTER: Mapping[str, Mapping[str, Any]] = {
     "frequency": {"within_s": WITHIN_S},
@@ -113,8 +112,7 @@ class Disturbance(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
         return f"{self.begins_s:g}{until} s: {self.table} {', '.join(what)}"
 
 
-Schedule = tuple[Disturbance, ...]
-"""Disturbances of one run, as they were drawn: not in the order of time."""
+Schedule = tuple[Disturbance, ...]  # Disturbances of one run, as they were drawn: not in the order of time
 
 
 def in_order(schedule: Schedule) -> list[Disturbance]:
@@ -282,8 +280,7 @@ MOST_LOAD, LEAST_LOAD = 0.97, 0.05
 """Bounds of the load of an island, as parts of the ratings of its controlled inverters. Above, losses and vars take the
 rest. Below, inverters are at their lower limit, which the law does not move."""
 
-KILLED = 0.5
-"""Part of its rating that counts for an inverter with a killed agent, which keeps its last set-points."""
+KILLED = 0.5  # Part of its rating that counts for an inverter with a killed agent, which keeps its last set-points
 
 
 class _Part(NamedTuple):

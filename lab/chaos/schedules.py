@@ -25,16 +25,14 @@ BATCH = 25
 """Schedules that are drawn together, from one seed. So the first runs of a seed do not depend on the number of runs,
 and shrinking one draws few of them again."""
 
-TRIES = 150
-"""Most runs to shrink a schedule. A fifth is reserved for leaving out single disturbances after hypothesis."""
+TRIES = 150  # Most runs to shrink a schedule. A fifth is reserved for leaving out single disturbances after hypothesis.
 
 MOST_DISTURBANCES = 10
 
 BEGIN_S, AFTER_S, LONGEST_S = 0.2, 0.5, 2.0
 """Times (s): the earliest beginning, the latest one after the scenario's own last change, the longest disturbance."""
 
-MOST_LOADS = 20
-"""Most loads that a step changes: a quarter of those of the standard feeder."""
+MOST_LOADS = 20  # Most loads that a step changes: a quarter of those of the standard feeder
 
 _FAR = 7_203_117_000_000_061
 """A number that no program is likely to contain. hypothesis prefers integers from the source code of loaded modules, so

@@ -17,8 +17,7 @@ from gridpeers.scenarios.record.record_info import RecordInfo
 MOST_WAITING = 6000
 """Numbers of one link that are kept while they wait for their counterpart, or for the end of their process."""
 
-WAIT = 1000
-"""Number of ticks for which it is kept which agents sent their neighbours a state."""
+WAIT = 1000  # Number of ticks for which it is kept which agents sent their neighbours a state
 
 
 @dataclass

@@ -14,8 +14,7 @@ from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.record.recorded_decision import RecordedDecision
 from gridpeers.wire.plugins.registry import ANYTHING, named
 
-TOLERANCE = 1e-12
-"""Largest difference (pu) between the step taken and the sum of its parts that rounding explains."""
+TOLERANCE = 1e-12  # Largest difference (pu) between the step taken and the sum of its parts that rounding explains
 
 
 @dataclass(frozen=True, kw_only=True)

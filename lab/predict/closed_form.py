@@ -26,11 +26,8 @@ from gridpeers.scenarios.results.history import Floats
 from gridpeers.scenarios.schema.plugin_keys import law_of
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 
-SETTLING = 4.0
-"""Time constants after which a mode counts as settled to 2 %, as control texts have it (exactly: 1.8 %)."""
-
-ZERO = 1e-9
-"""Rates and eigenvalues below this are zeros with rounding (1/s)."""
+SETTLING = 4.0  # Time constants after which a mode counts as settled to 2 %, as control texts have it (exactly: 1.8 %)
+ZERO = 1e-9  # Rates and eigenvalues below this are zeros with rounding (1/s)
 
 DelayKind = Literal["neighbours", "disagreement", "local loop"]
 """Which values come late: the neighbours' alone; own and neighbours' values alike; measurement or set-point."""
@@ -142,8 +139,7 @@ def equivalent_delay(T: float, loss: float) -> float:
 # -------------------------------------------------------------------- robustness
 
 
-EXACT = 16
-"""Most agents for which all pairs of sets are tried: 3^16 pairs, by a recursion over 2^16 sets."""
+EXACT = 16  # Most agents for which all pairs of sets are tried: 3^16 pairs, by a recursion over 2^16 sets
 
 
 class Robustness(NamedTuple):

@@ -45,14 +45,9 @@ from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.scenarios.schema.configs import configs
 from gridpeers.scenarios.schema.participants import inverters_of
 
-STEP = 0.002
-"""By how much a V_set is moved (pu): far above rounding, far below where loads and droops bend."""
-
-LENGTH = 2.0
-"""Length of a response (s). After it a tenth of the slowest inverter's change is left, and slow."""
-
-FOLLOWED = 20.0
-"""Time for which the law is followed (s); its rate is that of the last half."""
+STEP = 0.002  # By how much a V_set is moved (pu): far above rounding, far below where loads and droops bend
+LENGTH = 2.0  # Length of a response (s). After it a tenth of the slowest inverter's change is left, and slow.
+FOLLOWED = 20.0  # Time for which the law is followed (s); its rate is that of the last half
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -33,8 +33,7 @@ from gridpeers.scenarios.results.history import Floats
 
 LinkEnds = tuple[str, str]
 
-AT_REST = 1e-9
-"""Singular values of 1 - M below this belong to set-points that the law never moves."""
+AT_REST = 1e-9  # Singular values of 1 - M below this belong to set-points that the law never moves
 
 
 @dataclass(frozen=True, kw_only=True)

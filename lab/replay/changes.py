@@ -29,8 +29,7 @@ from gridpeers.scenarios.schema.scenario_writing import to_toml
 from gridpeers.scenarios.sweep.paths import PathError, Tree, put, steps
 from gridpeers.wire.wording import suggestion
 
-OF_CASE = ("secondary", "graph", "links", "without")
-"""Keys of a case that agents have."""
+OF_CASE = ("secondary", "graph", "links", "without")  # Keys of a case that agents have
 
 OF_BOTH = ("law", "gains", "degraded_communication", "link", "partition")
 """Keys of agents and links that a case may have, and the whole scenario."""

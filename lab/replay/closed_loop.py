@@ -68,8 +68,7 @@ KEPT_DELAYS, KEPT_STATUSES = 1000, 16
 CUT_OFF = 1.0
 """Time (s of real time) before the end of a record that is cut off within which a process belongs to its end."""
 
-_CALL, _ARRIVAL = 0, 1
-"""Order of calls at the same time: processes that share a session send before they hear."""
+_CALL, _ARRIVAL = 0, 1  # Order of calls at the same time: processes that share a session send before they hear
 
 _NOT_YET = KeyedMessage("", b"not yet")
 

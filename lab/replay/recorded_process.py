@@ -43,8 +43,7 @@ from gridpeers.wire.messages import PLANT, Journal, Measurement, State
 from gridpeers.wire.node import Loss
 from gridpeers.wire.wording import InputError
 
-CALLS = ("start", "session", "leave")
-"""Kinds of process events that are calls of the node; the others say what it did."""
+CALLS = ("start", "session", "leave")  # Kinds of process events that are calls of the node; the others say what it did
 
 Input = Token | MessageReference | ReceivedMessage | RejectedCount | WakeUp | ProcessEvent
 

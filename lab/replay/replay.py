@@ -50,8 +50,7 @@ from gridpeers.wire.messages import PLANT, AnyMessage, Measurement, Telemetry
 if TYPE_CHECKING:
     from gridpeers.runs.result import Result
 
-TOLERANCE = 1e-9
-"""Largest difference of two numbers that count as the same, in their units: set-points in W and V."""
+TOLERANCE = 1e-9  # Largest difference of two numbers that count as the same, in their units: set-points in W and V
 
 UNITS = {"P": "W", "Q": "var", "V": "V", "f": "Hz", "P_set": "W", "V_set": "V", "t": "s"}
 

@@ -25,8 +25,7 @@ import msgspec
 from gridpeers.netem.draws import Chain, Stream
 from gridpeers.wire.schema.table_schema import Below, Plausible, Problem, Unit, in_percent
 
-LONGEST_DELAY = 10.0
-"""Longest plausible delay (s); a larger number is probably in milliseconds."""
+LONGEST_DELAY = 10.0  # Longest plausible delay (s); a larger number is probably in milliseconds
 
 DELAY = Plausible("a delay", 0.0, LONGEST_DELAY)
 
@@ -170,5 +169,4 @@ class Trace(DelayModel, frozen=True, kw_only=True, tag="trace"):
         return []
 
 
-AnyDelay = Constant | Uniform | Normal | Lognormal | Pareto | Trace
-"""Every delay a scenario may name."""
+AnyDelay = Constant | Uniform | Normal | Lognormal | Pareto | Trace  # Every delay a scenario may name

@@ -17,12 +17,10 @@ from gridpeers.netem.models import INSTANT
 from gridpeers.wire.messages import Power, State, Voltage
 from gridpeers.wire.schema.table_schema import Example, Plausible, Problem, Unit
 
-LONGEST_REPLAY = 60.0
-"""Longest time (s) by which a replay is old; each receiver keeps the states of that time."""
+LONGEST_REPLAY = 60.0  # Longest time (s) by which a replay is old; each receiver keeps the states of that time
 
 Quantity = Literal["P_set", "V_set", "Q"]
-QUANTITIES: tuple[Quantity, ...] = ("P_set", "V_set", "Q")
-"""Quantities of a state that a lie can change."""
+QUANTITIES: tuple[Quantity, ...] = ("P_set", "V_set", "Q")  # Quantities of a state that a lie can change
 
 _BOUNDS: dict[str, tuple[float, float]] = {
     name: (get_args(kind)[1].ge, get_args(kind)[1].le)
@@ -164,8 +162,7 @@ class Extreme(_OfQuantities, frozen=True, kw_only=True, tag="extreme"):
         return replace(state, **{name: _BOUNDS[name][high] for name in self.of})
 
 
-AnyLie = Offset | Scale | Freeze | Replay | Random | Extreme
-"""Every lie a scenario may name."""
+AnyLie = Offset | Scale | Freeze | Replay | Random | Extreme  # Every lie a scenario may name
 
 
 def lie_in_words(lie: Lie) -> str:

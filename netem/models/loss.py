@@ -183,5 +183,4 @@ class Markov(LossModel, frozen=True, kw_only=True, tag="markov"):
         return problems
 
 
-AnyLoss = Bernoulli | GilbertElliott | Markov
-"""Every loss a scenario may name."""
+AnyLoss = Bernoulli | GilbertElliott | Markov  # Every loss a scenario may name

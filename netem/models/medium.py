@@ -14,8 +14,7 @@ from gridpeers.netem.models import INSTANT
 from gridpeers.netem.models.delay import DELAY
 from gridpeers.wire.schema.table_schema import Below, Plausible, Unit, probability
 
-LONGEST_FLAP = 600.0
-"""Longest plausible up or down time (s)."""
+LONGEST_FLAP = 600.0  # Longest plausible up or down time (s)
 
 
 class Cut(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -18,11 +18,8 @@ from gridpeers.wire.plugins.registry import ANYTHING, Registry, named
 from gridpeers.wire.schema.table_reading import parameter_values
 from gridpeers.wire.wording import printable
 
-LONGEST = 3600.0
-"""Longest delay (s) that a fault may add."""
-
-DROPPED_BY_OWN = "fault"
-"""Reason, in links.csv, of a message that a user-defined fault dropped."""
+LONGEST = 3600.0  # Longest delay (s) that a fault may add
+DROPPED_BY_OWN = "fault"  # Reason, in links.csv, of a message that a user-defined fault dropped
 
 
 class LinkMessage(NamedTuple):

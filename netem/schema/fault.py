@@ -104,8 +104,7 @@ PROFILES: dict[str, LinkProfile] = {
 }
 
 
-LONGEST_RUN = 86_400.0
-"""A day (s): no schedule is longer."""
+LONGEST_RUN = 86_400.0  # A day (s): no schedule is longer
 
 RunTime = Annotated[float, Unit("s"), Plausible("a time of the run", 0.0, LONGEST_RUN)]
 EndTime = Annotated[float | None, Unit("s"), After("from_s"), Plausible("a time of the run", 0.0, LONGEST_RUN)]

@@ -10,8 +10,7 @@ from typing import NamedTuple
 from gridpeers.wire.messages import PLANT
 from gridpeers.wire.wording import suggestion
 
-ANY = "*"
-"""All agents; the plant only where it is named."""
+ANY = "*"  # All agents; the plant only where it is named
 
 _ARROW = re.compile(r"(.*?)\s*(<->|->)\s*(.*)")
 

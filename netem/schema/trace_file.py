@@ -13,11 +13,8 @@ from gridpeers.wire.schema.table_schema import Problem
 from gridpeers.wire.text_file import TextFileError, read_table_text
 from gridpeers.wire.wording import suggestion
 
-COLUMN = "delay_s"
-"""Column that is read; others are free."""
-
-MOST_ROWS = 20
-"""So many bad rows of a file are named; the others are counted."""
+COLUMN = "delay_s"  # Column that is read; others are free
+MOST_ROWS = 20  # So many bad rows of a file are named; the others are counted
 
 
 def read_delays(path: Path) -> tuple[tuple[float, ...], list[str]]:

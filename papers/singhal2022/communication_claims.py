@@ -18,11 +18,9 @@ from gridpeers.papers.singhal2022.tables import (
     STEEPER,
 )
 
-EVENT, RETURN = "event1", "return"
-"""Labels of the events in the scenario; the paper has only the first."""
+EVENT, RETURN = "event1", "return"  # Labels of the events in the scenario; the paper has only the first
 
-ROWS = ("full", "reduced", "link-failure")
-"""Rows of Table IV."""
+ROWS = ("full", "reduced", "link-failure")  # Rows of Table IV
 
 UNTUNED, ADAPTIVE = "untuned", "adaptive"
 """The reduced graph with the gains of the full one, and with an adaptive alpha; the paper has neither."""

@@ -13,8 +13,7 @@ from matplotlib.figure import Figure
 import gridpeers as gp
 from gridpeers.papers.singhal2022.communication_claims import TREE, GraphRun, medians
 
-LEAST = 1e-6
-"""MPSI below this is drawn as this: on an axis of logarithms there is no 0."""
+LEAST = 1e-6  # MPSI below this is drawn as this: on an axis of logarithms there is no 0
 
 _CONNECTED: dict[str, Any] = {"marker": "o", "ms": 4, "color": "#56b4e9", "alpha": 0.8, "lw": 0}
 _IN_PARTS: dict[str, Any] = {"marker": "x", "ms": 5, "mew": 1.4, "color": "#d55e00", "lw": 0}

@@ -8,8 +8,7 @@ from gridpeers.papers.singhal2022.experiment_claims import ExperimentClaims, lis
 from gridpeers.papers.singhal2022.tables import F_NONE, FIVE_TIMES, IDLE, IV_MQSI, WITHIN
 
 CASES = ("I", "II", "III", "IV")
-EVENTS = ("event1", "event2")
-"""Cases and events of the experiment."""
+EVENTS = ("event1", "event2")  # Cases and events of the experiment
 
 claims = ExperimentClaims("islanding", events=EVENTS)
 claims.column("I", "f_error_Hz")

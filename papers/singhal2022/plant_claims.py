@@ -16,17 +16,10 @@ from gridpeers.papers.singhal2022.tables import (
     WITHIN,
 )
 
-CLOUDS = "clouds"
-"""Label of the event in the scenario."""
-
-FEASIBLE = ("350kW", "275kW", "250kW", "225kW", "200kW")
-"""Cases of Table III."""
-
-CUT = FEASIBLE[1:]
-"""Those of them that lose power."""
-
-INFEASIBLE = "175kW"
-"""Below the table's last column: the power of the others does not suffice."""
+CLOUDS = "clouds"  # Label of the event in the scenario
+FEASIBLE = ("350kW", "275kW", "250kW", "225kW", "200kW")  # Cases of Table III
+CUT = FEASIBLE[1:]  # Those of them that lose power
+INFEASIBLE = "175kW"  # Below the table's last column: the power of the others does not suffice
 
 intermittency = ExperimentClaims(
     "intermittency", source="section 4, Table III and figure", figure="intermittency", events=(CLOUDS,)
@@ -84,8 +77,7 @@ def _others(found: Findings, case: str) -> list[float]:
 
 
 WIND_UP_CASES = ("none", "clamp", "conditional")
-SUN = "sun"
-"""Label of the event that ends the lack of power; `CLOUDS` begins it."""
+SUN = "sun"  # Label of the event that ends the lack of power; `CLOUDS` begins it
 
 wind_up = ExperimentClaims("wind-up", source="ours, on Remark 2", figure="wind-up", cases=WIND_UP_CASES)
 
@@ -106,8 +98,7 @@ def limits_restore_sooner(found: Findings) -> tuple[bool, str]:
     return holds, listed((case, seconds(t)) for case, t in times.items())
 
 
-LEAVE, RETURN = "leave", "return"
-"""Labels of the events in the scenario."""
+LEAVE, RETURN = "leave", "return"  # Labels of the events in the scenario
 
 plug_n_play = ExperimentClaims(
     "plug-n-play", source="section 4, figures of plug-n-play", figure="plug-n-play", cases=("IV",)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
-BEHIND = "~"
-"""Part of the name of a bus that an import adds, after the name of the bus with its voltage and place."""
+BEHIND = "~"  # Part of the name of a bus that an import adds, after the name of the bus with its voltage and place
 
 
 OVERVOLTAGE = 1.2  # voltage (pu) above which generation disconnects: OV2 of IEEE 1547-2018

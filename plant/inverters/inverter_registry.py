@@ -157,8 +157,7 @@ def optional(*models: type[InverterModel]) -> type[msgspec.Struct]:
     )
 
 
-OwnParameters: Any = optional(*OURS["GFM"], *OURS["GFL"])
-"""Some parameters of an inverter of any of our models."""
+OwnParameters: Any = optional(*OURS["GFM"], *OURS["GFL"])  # Some parameters of an inverter of any of our models
 
 
 def chosen_own(table: Mapping[str, Any]) -> Any:
@@ -177,8 +176,7 @@ def given(own: msgspec.Struct) -> dict[str, Any]:
 BOUNDS_OF_SET_POINTS = frozenset({"P_set_lim", "V_set_min", "V_set_max"})  # of ours alone, not of a published model
 
 
-ParameterSet = dict[str, Any]
-"""Parameters by name."""
+ParameterSet = dict[str, Any]  # Parameters by name
 
 PUBLISHED_SETS: dict[str, ParameterSet] = {
     name: {key: value for key, value in given(own).items() if key not in BOUNDS_OF_SET_POINTS}

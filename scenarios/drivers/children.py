@@ -23,8 +23,7 @@ from gridpeers.wire.messages import PLANT
 
 LAST_LINES = 12
 
-GRACE = 2.0
-"""Time (s) for processes to leave after SIGTERM, the plant first."""
+GRACE = 2.0  # Time (s) for processes to leave after SIGTERM, the plant first
 
 _FAULTS = {-signal.SIGSEGV, -signal.SIGBUS, -signal.SIGABRT, -signal.SIGFPE, -signal.SIGILL}
 """Exit statuses of faults in the code of the process itself; other signals come from outside."""

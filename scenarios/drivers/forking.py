@@ -16,11 +16,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import IO, Any
 
-_SET_CHILD_SUBREAPER = 36
-"""Option of `prctl(2)`: orphans below this process become its children."""
-
-AVAILABLE = sys.platform == "linux"
-"""True where forking works; elsewhere every process is started anew."""
+_SET_CHILD_SUBREAPER = 36  # Option of `prctl(2)`: orphans below this process become its children
+AVAILABLE = sys.platform == "linux"  # True where forking works; elsewhere every process is started anew
 
 PATIENCE = 15.0
 """Longest wait (s) for a new process. The plant's server imports for 1 s; if its step is cached for another processor,
@@ -138,11 +135,9 @@ _OF_PLANTS = (
 )
 """Agents have another server, because they do not load numpy."""
 
-_SET_BY_US = {"ZENOH_RUNTIME"}
-"""Variables that loading Zenoh sets in this process and in the server."""
+_SET_BY_US = {"ZENOH_RUNTIME"}  # Variables that loading Zenoh sets in this process and in the server
 
-_kept: dict[tuple[str, ...], ForkServer] = {}
-"""Servers by the modules that they have imported."""
+_kept: dict[tuple[str, ...], ForkServer] = {}  # Servers by the modules that they have imported
 
 _inherited: tuple[int, str, dict[str, str]] | None = None
 """Owner, folder and variables that these servers inherited; if they change, new servers start."""

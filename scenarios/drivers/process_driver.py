@@ -24,20 +24,11 @@ from gridpeers.scenarios.drivers.telemetry_stream import Recordable
 from gridpeers.scenarios.run_request import Other, Outcome
 from gridpeers.wire.messages import PLANT, PlantEvent, Telemetry
 
-BUILD_DEADLINE = 600.0
-"""Longest time (s) until the plant is ready; the very first start may compile for a minute."""
-
-LEAVING = 10.0
-"""Time (s) for processes to close at the end by themselves; most take 0.1 s, on a busy machine up to 3 s."""
-
-AFTERMATH = 0.3
-"""The same after the run broke: processes that fail with it end in this time, the others are then ended."""
-
-LAST_TELEMETRY = 2.0
-"""Longest wait (s) for the last telemetry of a plant after its process ended in order."""
-
-STOOD_STILL = 1.0
-"""Excess (s) of a wait over its limit, after which this process counts as stopped itself."""
+BUILD_DEADLINE = 600.0  # Longest time (s) until the plant is ready; the very first start may compile for a minute
+LEAVING = 10.0  # Time (s) for processes to close at the end by themselves; most take 0.1 s, on a busy machine up to 3 s
+AFTERMATH = 0.3  # The same after the run broke: processes that fail with it end in this time, the others are then ended
+LAST_TELEMETRY = 2.0  # Longest wait (s) for the last telemetry of a plant after its process ended in order
+STOOD_STILL = 1.0  # Excess (s) of a wait over its limit, after which this process counts as stopped itself
 
 
 def run_processes(

@@ -15,14 +15,12 @@ from gridpeers.wire.driver.zenoh_settings import Clock
 from gridpeers.wire.messages import Pacing, PlantEvent, Telemetry
 from gridpeers.wire.trust.credentials import Credentials
 
-RECORDER = "history"
-"""Name of a driver's recorder in its run."""
+RECORDER = "history"  # Name of a driver's recorder in its run
 
 RECORDER_WAIT = 1.0
 """Least wait (s) of the plant of a recorded live run; without its recorder the first row would be lost."""
 
-LOOK = 0.5
-"""Longest wait (s) between two checks for missing messages."""
+LOOK = 0.5  # Longest wait (s) between two checks for missing messages
 
 
 def with_recorder(config: PlantConfig, *, waits: bool = False) -> PlantConfig:

@@ -12,13 +12,11 @@ from gridpeers.wire.keys import epoch_of
 from gridpeers.wire.messages import PLANT, Answer, Command, Journal, LinkReport, LinkRequest, Telemetry
 from gridpeers.wire.post import FollowedPlant, Post, Route
 
-QUIET = 1.5
-"""Time (s) without a message from a running plant, after which the recorder asks; it sends five per second."""
+QUIET = 1.5  # Time (s) without a message from a running plant, after which the recorder asks; it sends five per second
 
 AGAIN = 1.0
 
-ASTRAY = 3.0
-"""Time (s) without an answer, after which a new session opens; it doubles after each session without one."""
+ASTRAY = 3.0  # Time (s) without an answer, after which a new session opens; it doubles after each session without one
 
 ASTRAY_SIMULATED = 10.0
 """The same in simulated time, where a plant answers between two steps, or after it closed a full link."""

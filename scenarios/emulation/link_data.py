@@ -78,8 +78,7 @@ def data_of(report: LinkReport) -> LinkReportData:
     return data
 
 
-AT_ONCE = 100
-"""Verdicts in one report: a process keeps the memory that it once needed for the largest one."""
+AT_ONCE = 100  # Verdicts in one report: a process keeps the memory that it once needed for the largest one
 
 
 def report_data(
@@ -123,8 +122,7 @@ def _shown(value: Any) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-EVERYTHING = "{*, plant} <-> {*, plant}"
-"""Pattern of all links there are."""
+EVERYTHING = "{*, plant} <-> {*, plant}"  # Pattern of all links there are
 
 
 class LinkCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):

@@ -42,16 +42,12 @@ from gridpeers.wire.messages import PLANT, Pacing, PlantEvent, Telemetry
 from gridpeers.wire.timing import RateLimit
 from gridpeers.wire.wording import printable
 
-LOGGED = ("roster", "warning")
-"""Kinds of events that a plant in this process also writes to its log."""
-
-CHECK = 0.25
-"""Time (s) between two checks for process faults that are due."""
+LOGGED = ("roster", "warning")  # Kinds of events that a plant in this process also writes to its log
+CHECK = 0.25  # Time (s) between two checks for process faults that are due
 
 UNHEARD = "the plant has ended, and this command never had a link to it"
 
-LEAVING = 5.0
-"""Time (s) for processes to close by themselves after the plant."""
+LEAVING = 5.0  # Time (s) for processes to close by themselves after the plant
 
 GOES_ON = "; the run continues without it"
 

@@ -19,8 +19,7 @@ RUN = "gridpeers"
 ENDPOINT = "tcp/127.0.0.1:7447"
 """Default endpoint where the plant listens and the others connect; 7447 is Zenoh's own port."""
 
-LONGEST_TIME = 1e9
-"""Longest time (s) of any option, some 30 years."""
+LONGEST_TIME = 1e9  # Longest time (s) of any option, some 30 years
 
 _PROTOCOLS = ("tcp", "tls", "quic", "udp")
 

@@ -16,11 +16,8 @@ from gridpeers.wire.messages import PLANT, AgentStatus, Answer, AnyMessage, Link
 from gridpeers.wire.trust.key_folder import tls_refusal
 from gridpeers.wire.wording import InputError
 
-REMINDER = 1.0
-"""Time (s) after which a wait is reported; it doubles with each report."""
-
-PROBE = 1.0
-"""Longest wait (s) for each step of a TLS handshake."""
+REMINDER = 1.0  # Time (s) after which a wait is reported; it doubles with each report
+PROBE = 1.0  # Longest wait (s) for each step of a TLS handshake
 
 FIRST_LOOK, RENEWAL = 1.0, 2.0  # Time (s) until the session is checked first, and between two checks
 

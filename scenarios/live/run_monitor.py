@@ -87,17 +87,12 @@ class PlantStatus(msgspec.Struct, frozen=True, kw_only=True):
         return self.agents + self.absent
 
 
-OLD = 0.2
-"""Age (s) from which it is coloured: ten control periods of 20 ms, half of the oldest used age."""
+OLD = 0.2  # Age (s) from which it is coloured: ten control periods of 20 ms, half of the oldest used age
 
-V_LOW, V_HIGH = 0.95, 1.05
-"""Range of normal terminal voltages (pu): range A of ANSI C84.1."""
+V_LOW, V_HIGH = 0.95, 1.05  # Range of normal terminal voltages (pu): range A of ANSI C84.1
 
-SILENT = 1.5
-"""An agent whose status is older than this (s of real time) is silent: it sends three in this time."""
-
-_PER_INVERTER = 6
-"""Values of one inverter in a row of telemetry."""
+SILENT = 1.5  # An agent whose status is older than this (s of real time) is silent: it sends three in this time
+_PER_INVERTER = 6  # Values of one inverter in a row of telemetry
 
 
 @dataclass(frozen=True, kw_only=True)

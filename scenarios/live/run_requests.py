@@ -28,8 +28,7 @@ T = TypeVar("T")
 
 Verb = Literal["open", "close", "synchronise", "load", "stop", "down", "status", "link"]
 
-ANSWER = 10.0
-"""Longest wait (s) for the answer of a plant that is there; on a busy machine it may take a second."""
+ANSWER = 10.0  # Longest wait (s) for the answer of a plant that is there; on a busy machine it may take a second
 
 ASKED_AGAIN = 1.0
 """Time (s) after which a question without an answer is asked again: it may have been lost with its link."""
@@ -37,8 +36,7 @@ ASKED_AGAIN = 1.0
 ACKNOWLEDGED = 4.0
 """Longest wait (s) for the receivers of a link command; one control period, or a second more if a message was lost."""
 
-LEAVING = 10.0
-"""Longest wait (s) for processes that were asked to leave."""
+LEAVING = 10.0  # Longest wait (s) for processes that were asked to leave
 
 
 class RefusedError(InputError):
@@ -209,8 +207,7 @@ def own_code(config: AgentConfig) -> Iterator[str]:
             yield from (f"the link fault {plugin.use}" for plugin in fault.own if ":" in plugin.use)
 
 
-POWER = Range(-1e8, 1e8)
-"""Powers (kW or kvar) that are sent; the plant refuses implausible ones."""
+POWER = Range(-1e8, 1e8)  # Powers (kW or kvar) that are sent; the plant refuses implausible ones
 
 
 def load_setting(factor: float | None, P_kW: float | None, Q_kvar: float | None) -> LoadSetting:

@@ -22,20 +22,11 @@ from gridpeers.wire.timing import SessionDeadline
 
 EVENTS = 6
 
-LOOK = 1.2
-"""Longest wait (s) for one snapshot: just over two periods of an agent's status."""
-
-SILENT = 1.0
-"""Time (s) without a message after which a sender counts as silent: two periods of an agent's status."""
-
-CONFIGS_AGAIN = 2.0
-"""Time (s) after which missing configurations are asked for again."""
-
-REFRESH = 0.25
-"""Time (s) between two tables on a terminal: the plant publishes five times a second."""
-
-PERIOD = 1.0
-"""Time (s) between two texts where the output is no terminal."""
+LOOK = 1.2  # Longest wait (s) for one snapshot: just over two periods of an agent's status
+SILENT = 1.0  # Time (s) without a message after which a sender counts as silent: two periods of an agent's status
+CONFIGS_AGAIN = 2.0  # Time (s) after which missing configurations are asked for again
+REFRESH = 0.25  # Time (s) between two tables on a terminal: the plant publishes five times a second
+PERIOD = 1.0  # Time (s) between two texts where the output is no terminal
 
 
 class _Column(NamedTuple):

@@ -26,8 +26,7 @@ from gridpeers.wire.journal import Decision
 from gridpeers.wire.messages import OFF, Journal, Measurement, Nameplate, State
 from gridpeers.wire.timing import time_of
 
-_REACH = 2.0
-"""Time (s) before the moment of a lie in which the true state is sought first."""
+_REACH = 2.0  # Time (s) before the moment of a lie in which the true state is sought first
 
 _NOTHING = Decision(0, 0, [], [], [], [])
 

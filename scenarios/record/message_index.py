@@ -29,9 +29,7 @@ from gridpeers.wire.messages import AnyMessage, Journal, Measurement, Message, S
 
 M = TypeVar("M", bound=Message)
 
-LATE = 2.0
-"""Longest time (s; of real time in real time) after which an entry of a journal may come into the record."""
-
+LATE = 2.0  # Longest time (s; of real time in real time) after which an entry of a journal may come into the record
 MOST_KNOWN = 100_000  # States that are known as noted: by their sender, and by a plant while it knows no journal
 
 

@@ -30,8 +30,7 @@ CHUNK = 150_000
 processor's cache holds, and a reader takes one at a time."""
 
 
-SYNC = 0.9
-"""Time (s) from which on the thread has the disk keep what is written, against a loss of power."""
+SYNC = 0.9  # Time (s) from which on the thread has the disk keep what is written, against a loss of power
 
 
 class RecordWriter:

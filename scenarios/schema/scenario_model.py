@@ -33,8 +33,7 @@ from gridpeers.wire.schema.table_schema import (
     Unit,
 )
 
-AS_RUN = "as_run"
-"""Table that a run adds to its copy of the scenario; it is skipped when the copy is read."""
+AS_RUN = "as_run"  # Table that a run adds to its copy of the scenario; it is skipped when the copy is read
 
 PluginKey = str | dict[str, Any]
 """What is plugged in: a registered name or `module:Name`, or a table with it as `use`, and parameters."""
@@ -43,8 +42,7 @@ LawKey = str | dict[str, Any]
 """A control law: a registered name, `module:Class`, or a table with one of use, command, fmu, and parameters."""
 
 
-LONGEST_RUN = 3600.0
-"""Longest run of a scenario (s)."""
+LONGEST_RUN = 3600.0  # Longest run of a scenario (s)
 
 
 class Time(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

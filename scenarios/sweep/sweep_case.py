@@ -29,8 +29,7 @@ from gridpeers.wire.wording import utf8
 
 KEPT_PLANTS = 4  # Plants at t = 0 that a worker keeps; one is about 1 MB
 
-_plants: dict[bytes, Plant] = {}
-"""Plants at t = 0 of this process, by their configuration."""
+_plants: dict[bytes, Plant] = {}  # Plants at t = 0 of this process, by their configuration
 
 _feeder = lru_cache(maxsize=8)(read_feeder)
 

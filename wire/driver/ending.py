@@ -57,11 +57,8 @@ def stop_at_signals(error: Callable[[str], BaseException]) -> None:
         signal.signal(signal.SIGINT, stop)
 
 
-READER_GONE = 128 + 13
-"""Exit status of a command whose reader has gone, as a shell counts SIGPIPE."""
-
-UNWRITABLE = 2
-"""Exit status of a command whose output cannot be written, the same as for bad arguments."""
+READER_GONE = 128 + 13  # Exit status of a command whose reader has gone, as a shell counts SIGPIPE
+UNWRITABLE = 2  # Exit status of a command whose output cannot be written, the same as for bad arguments
 
 
 class OutputLostError(SystemExit):

@@ -24,8 +24,7 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
-LONGEST = 65_536
-"""Longest request (bytes)."""
+LONGEST = 65_536  # Longest request (bytes)
 
 
 def main() -> None:

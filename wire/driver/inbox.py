@@ -22,26 +22,15 @@ from gridpeers.wire.node import Loss
 Kind = Literal["message", "appeared", "vanished", "word"]
 """A message or answer; a token that appeared or vanished; or a word from another thread of the own process."""
 
-Event = tuple[Kind, str, bytes]
-"""Kind, key and payload."""
+Event = tuple[Kind, str, bytes]  # Kind, key and payload
 
-Stamped = tuple[Kind, str, bytes, float]
-"""The same, and its time of arrival (s, monotonic): it may wait for its owner."""
+Stamped = tuple[Kind, str, bytes, float]  # The same, and its time of arrival (s, monotonic): it may wait for its owner
 
-ROOM = 4_000
-"""Messages that may wait, on any keys: four for each of the most inverters in a run."""
-
-SMALL = 4_096
-"""Bytes of a short message; the longer ones are reports, journals and telemetry."""
-
-MOST_OF_ONE = 64
-"""Messages that may wait beyond `ROOM` on one key: more than a second of a sender's states."""
-
-BYTES = 64_000_000
-"""Bytes of long messages that may wait."""
-
-LOSSLESS = 8
-"""Factor on these limits in simulated time: honest senders send less before they have an answer."""
+ROOM = 4_000  # Messages that may wait, on any keys: four for each of the most inverters in a run
+SMALL = 4_096  # Bytes of a short message; the longer ones are reports, journals and telemetry
+MOST_OF_ONE = 64  # Messages that may wait beyond `ROOM` on one key: more than a second of a sender's states
+BYTES = 64_000_000  # Bytes of long messages that may wait
+LOSSLESS = 8  # Factor on these limits in simulated time: honest senders send less before they have an answer
 
 
 class Inbox:

@@ -7,8 +7,7 @@ import errno
 import os
 from contextlib import suppress
 
-POSIX = hasattr(os, "fork")
-"""False on Windows, where gridpeers runs in one process alone."""
+POSIX = hasattr(os, "fork")  # False on Windows, where gridpeers runs in one process alone
 
 if POSIX:
     import resource
@@ -29,11 +28,8 @@ def schedule_as_batch() -> None:
         os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 
 
-BESIDE_LINKS = 12
-"""Files that a process has open beside its links: standard streams, Zenoh's own, its listener."""
-
-MOST_FILES = 65_536
-"""Limit that suffices for any run; a much greater one makes other programs slow to start."""
+BESIDE_LINKS = 12  # Files that a process has open beside its links: standard streams, Zenoh's own, its listener
+MOST_FILES = 65_536  # Limit that suffices for any run; a much greater one makes other programs slow to start
 
 
 def limit() -> int:

@@ -29,11 +29,8 @@ from gridpeers.wire.wording import InputError
 
 OK, BAD_CONFIG, BROKE = 0, 2, 3
 
-IN_ORDER = 96
-"""Added to the exit status of a process on a leash that ends in order."""
-
-_GRACE = 5.0
-"""Time (s) to end in order after the parent is gone."""
+IN_ORDER = 96  # Added to the exit status of a process on a leash that ends in order
+_GRACE = 5.0  # Time (s) to end in order after the parent is gone
 
 LEASH = "--leash"
 """Option: the configuration is one line, and the process ends when standard input does, as its parent is gone. A name

@@ -34,8 +34,7 @@ FIRST_LINK = 0.5
 _REFUSED_LINKS = "zenoh_link_tls::unicast=warn"
 """Part of Zenoh's log: failed TLS handshakes with their reasons, at most ten a second."""
 
-_QUERY_TIMEOUT = 600.0
-"""Time (s) after which Zenoh forgets a query; the asking node keeps its own deadline."""
+_QUERY_TIMEOUT = 600.0  # Time (s) after which Zenoh forgets a query; the asking node keeps its own deadline
 
 _stateful: set[int] = set()
 """Threads of Zenoh that keep their Python state between calls; to make it anew at each took a quarter of a tick."""

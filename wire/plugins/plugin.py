@@ -14,8 +14,7 @@ from gridpeers.wire.schema.table_reading import in_words, parameter_values, read
 from gridpeers.wire.schema.table_schema import Problem, fields_of
 from gridpeers.wire.wording import printable
 
-KEYS = ("use", "folder")
-"""Keys of a plug-in's table that are no parameters of it."""
+KEYS = ("use", "folder")  # Keys of a plug-in's table that are no parameters of it
 
 
 def scalar_objection(value: Any) -> str:

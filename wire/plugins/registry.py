@@ -21,8 +21,7 @@ from gridpeers.wire.wording import InputError, is_no_path, printable, suggestion
 
 T = TypeVar("T")
 
-_changed: dict[str, float] = {}
-"""When the file of each module in a scenario's folder was last changed, at its import."""
+_changed: dict[str, float] = {}  # When the file of each module in a scenario's folder was last changed, at its import
 
 NOTEBOOK = "__main__"
 """Module of what is defined in a notebook or in the script that runs: no other process can import it."""
@@ -30,8 +29,7 @@ NOTEBOOK = "__main__"
 ANYTHING = (Exception, SystemExit, GeneratorExit)
 """Exceptions of foreign code; only Ctrl+C and a request to stop end the run."""
 
-LONGEST_NAME = 100
-"""Characters of the name of a file that a message shows."""
+LONGEST_NAME = 100  # Characters of the name of a file that a message shows
 
 
 def named(error: BaseException) -> str:

@@ -219,14 +219,9 @@ class Flag:
     name: str
 
 
-INLINE = Flag("inline")
-"""Annotation of a field whose struct has its keys in the table around it."""
-
-NO_KEY = Flag("no key")
-"""Annotation of a field that no file gives."""
-
-SHARED = Flag("shared")
-"""Annotation of a shared variable of a law, which is no parameter (`shared_fields`)."""
+INLINE = Flag("inline")  # Annotation of a field whose struct has its keys in the table around it
+NO_KEY = Flag("no key")  # Annotation of a field that no file gives
+SHARED = Flag("shared")  # Annotation of a shared variable of a law, which is no parameter (`shared_fields`)
 
 INHERITED = Flag("inherited")
 """Annotation of a table that takes what it leaves out from the table of the same name at the top of the file."""

@@ -22,11 +22,8 @@ from gridpeers.wire.keys import ANY_TOKEN, KEY_SPECS, KeySpec, Role
 from gridpeers.wire.messages import PLANT
 from gridpeers.wire.wording import printable
 
-DATE_AND_TIME = "%Y-%m-%d %H:%M UTC"
-"""Form of the time at which a certificate ends: it may live for hours."""
-
-LONGEST_COMMON_NAME = 64
-"""Characters of a common name (X.520, ub-common-name)."""
+DATE_AND_TIME = "%Y-%m-%d %H:%M UTC"  # Form of the time at which a certificate ends: it may live for hours
+LONGEST_COMMON_NAME = 64  # Characters of a common name (X.520, ub-common-name)
 
 
 class SiteMember(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

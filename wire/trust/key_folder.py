@@ -30,14 +30,10 @@ from gridpeers.wire.wording import InputError, printable
 if TYPE_CHECKING:
     from cryptography import x509
 
-CA, CA_KEY, LIST = "ca.pem", "ca.key", "members.json"
-"""Names of the site's own files."""
+CA, CA_KEY, LIST = "ca.pem", "ca.key", "members.json"  # Names of the site's own files
 
-COMMANDING: tuple[Role, ...] = ("operator",)
-"""Roles that may command a run."""
-
-SOON = timedelta(days=30)
-"""A certificate ends soon if it ends within this time."""
+COMMANDING: tuple[Role, ...] = ("operator",)  # Roles that may command a run
+SOON = timedelta(days=30)  # A certificate ends soon if it ends within this time
 
 
 class KeysError(InputError):

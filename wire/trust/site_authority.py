@@ -20,14 +20,9 @@ if TYPE_CHECKING:
     from cryptography import x509
     from cryptography.hazmat.primitives.asymmetric.ec import EllipticCurvePrivateKey
 
-LIFE_OF_CA = timedelta(days=3650)
-"""Life of an authority: ten years, as no process can renew it."""
-
-LIFE_DAYS = 365
-"""Life (days) of a member's certificate."""
-
-SKEW = timedelta(minutes=5)
-"""Time by which a certificate is valid before its issue, because clocks of hosts differ."""
+LIFE_OF_CA = timedelta(days=3650)  # Life of an authority: ten years, as no process can renew it
+LIFE_DAYS = 365  # Life (days) of a member's certificate
+SKEW = timedelta(minutes=5)  # Time by which a certificate is valid before its issue, because clocks of hosts differ
 
 RESERVED = {text for file in (CA, CA_KEY, LIST) for text in (file, Path(file).stem)}
 """Names that no member may have, because files of the site have them."""

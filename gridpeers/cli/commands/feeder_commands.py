@@ -23,8 +23,7 @@ FeederName = Annotated[
     str, argument("FEEDER", "A feeder that comes with gridpeers, a folder of tables, or a .dss or .glm file.")
 ]
 LoadSet = Annotated[str | None, option("NAME", "Load table of a folder of tables; main if left out.", "--load-set")]
-SHOWN = 12
-"""Notes that are shown."""
+SHOWN = 12  # Notes that are shown
 
 
 @app.command("import")

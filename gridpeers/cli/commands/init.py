@@ -14,8 +14,7 @@ from gridpeers.output_folders import shown, whole_folder
 from gridpeers.rooms import ROOMS
 from gridpeers.wire.driver.command_line import command_line
 
-TEMPLATE = Path(__file__).parents[1] / "template"
-"""Folder that is copied."""
+TEMPLATE = Path(__file__).parents[1] / "template"  # Folder that is copied
 
 
 def init(

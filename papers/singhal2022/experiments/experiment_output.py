@@ -146,11 +146,8 @@ MARKERS = "osD^vPX*"
 DASHES: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (3, 1)), (0, (1, 1)), "-")
 """Of traces over time, which have no markers."""
 
-SLANTED = 12
-"""Most names at an axis that are drawn slanted; more are drawn upright."""
-
-DPI = 130
-"""Points per inch: readable in print, and small enough for a repository."""
+SLANTED = 12  # Most names at an axis that are drawn slanted; more are drawn upright
+DPI = 130  # Points per inch: readable in print, and small enough for a repository
 
 
 def draw(page: PlotPage) -> Figure:

@@ -13,8 +13,7 @@ import numpy as np
 from gridpeers.papers.singhal2022.experiments.experiment_data import SweepData
 from gridpeers.papers.singhal2022.experiments.experiment_output import Curve, ExperimentResult, PlotPage, PlotPanel
 
-EVENT = "event2"
-"""The event at which the lies begin."""
+EVENT = "event2"  # The event at which the lies begin
 
 GRAPHS = ("full", "robust", "reduced")
 
@@ -28,8 +27,7 @@ MEASURES: tuple[tuple[str, str, float, tuple[float, float], float], ...] = (
 
 LIMITS = {index: limit for index, _, limit, _, _ in MEASURES}
 
-RUN = ("case", "node", "link", "law")
-"""Columns that name a run."""
+RUN = ("case", "node", "link", "law")  # Columns that name a run
 
 
 def hostile(sweep: SweepData) -> ExperimentResult:

@@ -24,8 +24,7 @@ from gridpeers.papers.singhal2022.experiments.experiment_output import (
 )
 
 DELAY, LOSS, K_Q, ON = "link[0].delay", "link[0].loss", "gains.k_q", "link[0].on"
-WHOLE, ALONE = 0.25, 1e5
-"""k_q of the whole law, and of one that leaves V_set alone."""
+WHOLE, ALONE = 0.25, 1e5  # k_q of the whole law, and of one that leaves V_set alone
 
 X = "delay of every agent-agent link (s)"
 
@@ -110,8 +109,7 @@ SWINGS = (
 """Rows of the figure: a swing, the least that counts (an oscillation that stays is ten times as large), title, label of
 the axis, and k_q of the runs. The voltage is left alone in the first, and controlled in the second."""
 
-LEAST = 1e-5
-"""Swings below this (Hz, pu) are drawn as this: the rest of a transient, or rounding."""
+LEAST = 1e-5  # Swings below this (Hz, pu) are drawn as this: the rest of a transient, or rounding
 
 
 def places(sweep: SweepData) -> ExperimentResult:

@@ -18,11 +18,9 @@ COLUMNS = (
 )
 """Panels side by side: cases with the last state held, then with states that expire."""
 
-HELD, EXPIRED, WHOLE = 0, 1, 6
-"""Styles."""
+HELD, EXPIRED, WHOLE = 0, 1, 6  # Styles
 
-LOST = 1.0 - 1e-12
-"""Probability of losing a message in a partition, below 1 for the model."""
+LOST = 1.0 - 1e-12  # Probability of losing a message in a partition, below 1 for the model
 
 
 def partition(runs: CaseData) -> ExperimentResult:

@@ -17,14 +17,12 @@ LINKS, PER_COUNT = (8, 9, 10, 12, 16, 24, 36), 12
 BELOW, PER_COUNT_BELOW = (4, 5, 6, 7), 2
 """Links of graphs that cannot be connected, which are trees less some links; graphs for each number of links."""
 
-NOT_CONNECTED = 1e-9
-"""Algebraic connectivity of a graph in parts: 0 but for rounding. That of nine in a path is 0.12."""
+NOT_CONNECTED = 1e-9  # Algebraic connectivity of a graph in parts: 0 but for rounding. That of nine in a path is 0.12.
 
 END_S = 6.0
 """End of the runs (s): after the event at 1 s a path of nine inverters shares within 2 s, the slowest tree in 3 s."""
 
-Tell = Callable[[str, float], None]
-"""Takes the present run in words, and the share of all runs that is done."""
+Tell = Callable[[str, float], None]  # Takes the present run in words, and the share of all runs that is done
 
 
 def graphs(inverters: int, seed: int) -> Iterator[gp.random_graphs.Edges]:

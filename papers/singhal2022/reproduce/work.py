@@ -65,8 +65,7 @@ class _Parts(msgspec.Struct, forbid_unknown_fields=True):
 _READ = msgspec.toml.decode(Path(__file__).with_name("parts.toml").read_bytes(), type=_Parts)
 PARTS, SETTINGS = _READ.part, _READ.setting
 
-CHOICES = ("tables", "figures", *(part.name for part in PARTS))
-"""Values of `--only`."""
+CHOICES = ("tables", "figures", *(part.name for part in PARTS))  # Values of `--only`
 
 
 def chosen(only: str | None) -> tuple[ReportPart, ...]:
@@ -76,8 +75,7 @@ def chosen(only: str | None) -> tuple[ReportPart, ...]:
     return tuple(part for part in PARTS if (part.tables if only == "tables" else part.name == only))
 
 
-TOPOLOGY = "topology"
-"""The part that is many short runs of the islanding, without a folder for each."""
+TOPOLOGY = "topology"  # The part that is many short runs of the islanding, without a folder for each
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -39,8 +39,7 @@ class Units(NamedTuple):
     limiting: Flags  # inverters whose phase currents were limited in the last network solution
 
 
-ADVANCED = ("state", "J", "V", "I", "limiting")
-"""Tables that a step advances."""
+ADVANCED = ("state", "J", "V", "I", "limiting")  # Tables that a step advances
 
 
 @compiled

@@ -77,8 +77,7 @@ def _run_pass(_: Any, address: Any, g: Any, t: Any, x0: Any, x: Any, d: Any, h: 
 run_pass: Any = intrinsic(_run_pass)
 
 
-_known: set[Any] = set()
-"""Functions that compiled code may call."""
+_known: set[Any] = set()  # Functions that compiled code may call
 
 
 @cache
@@ -123,5 +122,4 @@ def _called(function: Any) -> Iterator[Any]:
             yield from _called(other)
 
 
-_kept: list[Any] = []
-"""Compiled passes: their machine code must outlive their addresses."""
+_kept: list[Any] = []  # Compiled passes: their machine code must outlive their addresses

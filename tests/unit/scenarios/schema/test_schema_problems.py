@@ -134,7 +134,7 @@ def test_a_feeders_problems_are_passed_on(tmp_path: Path) -> None:
     ("text", "said"),
     [
         ("seed = 1\nseed 2\n", r"mine.toml:2: not valid TOML: .*: seed 2"),
-        ("", r"mine.toml: time: is missing"),
+        ("", r"mine.toml: is empty; gridpeers init my-study makes a project"),
         ("time = 3\ncase = 4\nevent = 5\n", r"mine.toml:1: time: must be a table"),
         ("[time]\nend_s = 1.0\n", r"case: is missing; write at least one table \[case.NAME\]"),
         ("[time]\nend_s = 1.0\n[case]\n", r"case: there is no case; write at least one table"),
