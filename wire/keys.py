@@ -155,7 +155,7 @@ _PEOPLE: tuple[Role, ...] = ("plant", "operator", "viewer")  # the recorder on t
 KEY_SPECS = (
     KeySpec(
         "alive/plant/<epoch>", "token", "-", _PLANT, ROLES,
-        "as long as the plant's session lives; declared after its subscribers; says the epoch of its messages",
+        "while the plant's session lives; declared after its subscribers; contains the plant's epoch",
     ),
     KeySpec(
         "alive/agent/<inverter>/<instance>", "token", "-", _AGENT, ROLES,
@@ -163,7 +163,7 @@ KEY_SPECS = (
     ),
     KeySpec(
         "alive/recorder/<recorder>", "token", "-", ("plant", "operator"), ROLES,
-        "until the final telemetry is in; declared after its subscriber",
+        "until the final telemetry has arrived; declared after its subscriber",
     ),
     KeySpec(
         "nameplate/<inverter>/<instance>", "queryable", "Nameplate", _AGENT, ("plant", "agent"),
@@ -175,11 +175,11 @@ KEY_SPECS = (
     ),
     KeySpec(
         "stop_request/<inverter>/<instance>", "publication", "Stop", _PLANT, _AGENT,
-        "when its name is taken or is no inverter of the feeder; real time: on `gridpeers stop`",
+        "when another agent holds its name, or no inverter has it; real time: on `gridpeers stop`",
     ),
     KeySpec(
         "ready/<inverter>", "publication", "Ready", _AGENT, _PLANT,
-        "when it has proof to hear every in-neighbour on the roster",
+        "when every in-neighbour on the roster has answered",
     ),
     KeySpec("measurement/<inverter>", "publication", "Measurement", _PLANT, _AGENT, "at every tick: it is the grant"),
     KeySpec(
@@ -188,7 +188,7 @@ KEY_SPECS = (
     ),
     KeySpec(
         "set_points/<inverter>", "publication", "State", _AGENT, _PLANT,
-        "real time: instead of state, at a tick at which the law sends nothing to the neighbours",
+        "real time: in place of state, when the law sends nothing to the neighbours",
     ),
     KeySpec(
         "telemetry", "publication", "Telemetry, LinkReport, Journal, LinkRequest", _PLANT, _PEOPLE,
@@ -214,7 +214,7 @@ KEY_SPECS = (
     ),
     KeySpec(
         "leave/<inverter>", "publication", "Leave", _AGENT, _PLANT,
-        "real time: at a proper leave; the plant then takes its inverter off the network",
+        "real time: when the agent leaves; the plant then takes its inverter off the network",
     ),
     KeySpec(
         "status/<inverter>", "publication", "AgentStatus", _AGENT, _PEOPLE,

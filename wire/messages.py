@@ -250,7 +250,7 @@ class State(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=
     """Island of the inverter at that measurement: agents in another island leave this state out of their sums.
     Empty if it is not known."""
     angle: Angle | None = None
-    """Angle of the inverter at that measurement; only where agents tell islands apart by it."""
+    """Angle of the inverter at that measurement; only if agents detect islands by frequency."""
     idle: bool = False
     """Whether the agent is idle: paused, or without a measurement. In real time it then sends nothing; in
     simulated time the tick waits for this state, which no neighbour uses."""
@@ -261,7 +261,7 @@ class State(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=
     real time such a state goes to the plant alone, under a key of its own; in simulated time it only grants the
     next tick."""
     skipped: Count = 0
-    """Quiet states since the last other one: no neighbour has missed those numbers. In real time only."""
+    """Number of quiet states just before this one, which neighbours do not count as lost. In real time only."""
     fault: Text = ""
     """Failure of the agent's law; from then on the agent is idle."""
 

@@ -1,4 +1,4 @@
-"""A sweep file as types, and its axes: each is a list of settings, and every combination of them is a sample."""
+"""Axes of a sweep, each a list of settings whose combinations are the samples; among them random graphs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From a name or a path to a checked plan of runs, or to all that is wrong with it, before anything starts."""
+"""Read a sweep by name or path, and return its checked plan of runs or all its errors."""
 
 from __future__ import annotations
 

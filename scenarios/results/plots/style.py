@@ -1,7 +1,7 @@
 """Style of all figures: line styles, the page, axes, marks of events, legends, reproducible files.
 
 Colours are those of Okabe and Ito's palette, which stays apart for colour-blind readers; with the dash patterns the
-curves can be told in a black-and-white print too.
+curves differ in a black-and-white print too.
 """
 
 from __future__ import annotations
