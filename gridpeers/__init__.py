@@ -57,5 +57,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """Return the public names, for completion in a notebook."""
     return sorted([*_homes(), "__version__"])

@@ -164,20 +164,13 @@ class Feeder(Tables, frozen=True, kw_only=True):
         network = Network(self)
         closed = network.closed0 - {network.switch_name(name) for name in _listed(open_switches)}
         V = solve_power_flow(network, closed)
-        of = [network.neutrals.get(bus, "") for bus, _ in network.nodes]
-        to = [n if p in PHASES and p != n else "" for n, (_, p) in zip(of, network.nodes, strict=True)]
-        back = np.array([network.index(bus, n) if n else -1 for n, (bus, _) in zip(to, network.nodes, strict=True)])
+        buses, phases = zip(*network.nodes, strict=True)
+        of = [network.neutrals.get(bus, "") for bus in buses]
+        to = [n if p in PHASES and p != n else "" for n, p in zip(of, phases, strict=True)]
+        back = np.array([network.index(bus, n) if n else -1 for n, bus in zip(to, buses, strict=True)])
         V = np.where((back >= 0) & (V != 0.0), V - V[back], V)
-        return pd.DataFrame(
-            {
-                "bus": [bus for bus, _ in network.nodes],
-                "phase": [phase for _, phase in network.nodes],
-                "V": np.abs(V),
-                "V_pu": np.abs(V) / network.V_nom,
-                "angle_deg": np.degrees(np.angle(V)),
-                "to": to,
-            }
-        )
+        values = {"V": np.abs(V), "V_pu": np.abs(V) / network.V_nom, "angle_deg": np.degrees(np.angle(V))}
+        return pd.DataFrame({"bus": buses, "phase": phases, **values, "to": to})
 
     def plot(self, *, voltages: bool = False) -> Figure:
         """Return a one-line diagram, coloured by microgrid, or by the voltage of each bus's lowest energised phase."""

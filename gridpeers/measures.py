@@ -5,29 +5,18 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from gridpeers.scenarios.results import metrics
-from gridpeers.scenarios.results.history import Flags as Flags
-from gridpeers.scenarios.results.history import Floats as Floats
-from gridpeers.scenarios.results.history import History as History
-from gridpeers.scenarios.results.history import Nameplates as Nameplates
-from gridpeers.scenarios.results.history import Window as Window
-from gridpeers.scenarios.results.metric import DIGITS as DIGITS
-from gridpeers.scenarios.results.metric import HEADINGS as HEADINGS
-from gridpeers.scenarios.results.metric import UNITS as UNITS
-from gridpeers.scenarios.results.metric import Quantity as Quantity
-from gridpeers.scenarios.results.metric import label as label
-from gridpeers.scenarios.results.metrics import F_BAND as F_BAND
-from gridpeers.scenarios.results.metrics import MPSI as MPSI
-from gridpeers.scenarios.results.metrics import MPSI_BAND as MPSI_BAND
-from gridpeers.scenarios.results.metrics import MQSI as MQSI
-from gridpeers.scenarios.results.metrics import STEADY as STEADY
+from gridpeers.scenarios.results.history import Flags, Floats, History, Nameplates, Window
+from gridpeers.scenarios.results.metric import DIGITS, HEADINGS, UNITS, Quantity, label
+from gridpeers.scenarios.results.metrics import F_BAND, MPSI, MPSI_BAND, MQSI, STEADY, V_error, mean_frequency
 from gridpeers.scenarios.results.metrics import Settling as Settling
 from gridpeers.scenarios.results.metrics import Steady as Steady
-from gridpeers.scenarios.results.metrics import V_error as V_error
-from gridpeers.scenarios.results.metrics import mean_frequency as mean_frequency
 
 if TYPE_CHECKING:
     from gridpeers.plant.equipment import Tables
     from gridpeers.scenarios.schema import ScenarioModel
+
+__all__ = ["DIGITS", "F_BAND", "HEADINGS", "MPSI", "MPSI_BAND", "MQSI", "STEADY", "UNITS", "Flags", "Floats", "History"]
+__all__ += ["Nameplates", "Quantity", "V_error", "Window", "label", "mean_frequency", "nameplates_of", "settling"]
 
 
 def settling(history: History, nameplates: Nameplates, window: Window, f_nom: float) -> Settling:

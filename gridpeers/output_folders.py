@@ -7,17 +7,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from gridpeers.scenarios.results.run_files import RUNS as RUNS
-from gridpeers.scenarios.results.run_files import FolderError as FolderError
-from gridpeers.scenarios.results.run_files import empty_folder
-from gridpeers.scenarios.results.run_files import new_folder as new_folder
-from gridpeers.scenarios.results.run_files import refusal as refusal
-from gridpeers.scenarios.results.run_files import set_broken as set_broken
+from gridpeers.scenarios.results.run_files import RUNS, FolderError, empty_folder, new_folder, refusal, set_broken
 from gridpeers.scenarios.results.run_files import set_status as set_status
 from gridpeers.scenarios.results.run_files import shown as shown
 from gridpeers.scenarios.results.run_files import write_whole as write_whole
 from gridpeers.scenarios.versions import versions as versions
 from gridpeers.wire.driver.ending import OutputLostError as OutputLostError
+
+__all__ = ["RUNS", "FolderError", "files_written", "new_folder", "refusal", "set_broken", "whole_folder"]
 
 
 @contextmanager

@@ -110,7 +110,6 @@ def _broken(why: str) -> Callable[..., None]:
 
 
 def _as_typer_has_it(name: str, found: Any) -> Any:
-    """Return the command of a function, or of a `typer.Typer` with commands of its own."""
     holder = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
     holder.callback()(lambda: None)  # so that a single command keeps its name
     if isinstance(found, typer.Typer):

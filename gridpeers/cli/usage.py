@@ -57,9 +57,7 @@ def load(name: str, changes: Mapping[str, Any] | None = None) -> tuple[ScenarioM
     """Return a checked scenario, with keys changed by the command line, and its feeder."""
     from gridpeers.scenario import load as load_face
 
-    scenario = load_face(name)
-    if changes:
-        scenario = scenario.replace(changes)
+    scenario = load_face(name).replace(changes) if changes else load_face(name)
     return scenario.spec, scenario.feeder
 
 
@@ -93,13 +91,10 @@ def require(modules: Mapping[str, str], install: str = "") -> None:
 
     Packages of the core need no such check: `gridpeers.cli.app` ends any command with the name of a missing one.
     """
-    lacking = [name for name in modules if util.find_spec(name) is None]
+    lacking = {DISTRIBUTIONS.get(name, name): use for name, use in modules.items() if util.find_spec(name) is None}
     if lacking:
-        lines = [
-            f"{DISTRIBUTIONS.get(name, name)} is not installed; it is needed for {modules[name]}" for name in lacking
-        ]
-        again = f"install what is missing: pip install {' '.join(DISTRIBUTIONS.get(name, name) for name in lacking)}"
-        fail(*lines, install or again)
+        lines = [f"{name} is not installed; it is needed for {use}" for name, use in lacking.items()]
+        fail(*lines, install or f"install what is missing: pip install {' '.join(lacking)}")
 
 
 def require_loadable(module: str, user: str) -> None:

@@ -36,13 +36,10 @@ def compare(a: RunSource, b: RunSource, *, names: tuple[str, str] = ("a", "b")) 
         return Comparison({"": (*first.values(), *second.values())}, names)  # type: ignore[dict-item]
     both = [case for case in first if case in second]
     if not both:
-        raise ScenarioError(
-            [
-                f"the runs share no case: the first has {', '.join(first)}, the second {', '.join(second)}; "
-                f"run one case of each ({command_line('run')} --case), or choose in Python: "
-                f'gridpeers.compare(a["{next(iter(first))}"], b["{next(iter(second))}"])'
-            ]
-        )
+        cases = f"the first has {', '.join(first)}, the second {', '.join(second)}"
+        ways = f"run one case of each ({command_line('run')} --case), or choose in Python: "
+        ways += f'gridpeers.compare(a["{next(iter(first))}"], b["{next(iter(second))}"])'
+        raise ScenarioError([f"the runs share no case: {cases}; {ways}"])
     return Comparison({case: (first[case], second[case]) for case in both}, names)
 
 
@@ -92,12 +89,8 @@ class Comparison:
         from gridpeers.scenarios.results.plots.run_figures import comparison
 
         shown_in_notebooks()
-        return comparison(
-            [
-                (case, {name: run.drawing() for name, run in zip(self.names, pair, strict=True)})
-                for case, pair in self._pairs.items()
-            ]
-        )
+        named = {case: zip(self.names, pair, strict=True) for case, pair in self._pairs.items()}
+        return comparison([(case, {name: run.drawing() for name, run in runs}) for case, runs in named.items()])
 
     def __str__(self) -> str:
         """Return the text that the command `gridpeers compare` prints."""

@@ -45,8 +45,6 @@ if TYPE_CHECKING:
 
 
 class _FromFolder:
-    """The common part of `Result` and `Results`."""
-
     spec: model.ScenarioModel
     """Scenario of the run, as typed values."""
     folder: Path

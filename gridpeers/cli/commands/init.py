@@ -31,16 +31,14 @@ def init(
 
     Example:  gridpeers init my-study --feeder Master.dss
     """
-    if feeder is None:
-        if switch or leave_out:
-            fail("--switch and --leave-out need --feeder")
-        with whole_folder(folder):
+    if feeder is None and (switch or leave_out):
+        fail("--switch and --leave-out need --feeder")
+    with whole_folder(folder):
+        if feeder is None:
             shutil.copytree(TEMPLATE, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
-        following = command_line("run", "mine.toml", "--driver", "inprocess")
-    else:
-        with whole_folder(folder):
+        else:
             ROOMS.resolve("propose_project")(folder, feeder, switch or [], leave_out or [])
-        following = command_line("run", "islanding.toml", "--driver", "inprocess")
+    following = command_line("run", "islanding.toml" if feeder else "mine.toml", "--driver", "inprocess")
     for file in sorted(path.name for path in folder.iterdir()):
         typer.echo(f"{shown(folder / file)}")
     typer.echo(f"Next:  cd {shlex.quote(str(folder))} && {following}")

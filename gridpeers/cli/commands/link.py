@@ -120,11 +120,8 @@ def _give(links: list[str], arrow: str, fault: dict[str, Any] | None, duration: 
     on = _pattern(links, arrow) if links else EVERYTHING
     if wrong := objections(on, None, {}):
         raise UsageError(f"LINKS: {wrong[0]}")
-    command = LinkCommand(
-        fault=None if fault is None else Fault(on=on, **fault),
-        heal=Heal(on=on, from_s=0.0) if fault is None else None,
-        for_s=duration,
-    )
+    heal = Heal(on=on, from_s=0.0) if fault is None else None
+    command = LinkCommand(fault=None if fault is None else Fault(on=on, **fault), heal=heal, for_s=duration)
     check_link_command(command, None)
     with live.client(acts=True) as client:
         setup = links_of_run(client)

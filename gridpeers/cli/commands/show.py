@@ -82,18 +82,14 @@ def compare(
     from gridpeers.output_folders import files_written, shown
     from gridpeers.runs.comparison import compare as compare_runs
 
-    comparison = compare_runs(first, second, names=_names(first, second))
+    # folders of runs are named by the time, their parents by the scenario
+    a, b = (printable(path.resolve().parent.name) for path in (first, second))
+    comparison = compare_runs(first, second, names=(a, b) if a != b else ("first", "second"))
     typer.echo(str(comparison))
     with files_written(out):
         out.parent.mkdir(parents=True, exist_ok=True)
         comparison.plot().savefig(out)
     typer.echo(f"\nFigure: {shown(out)}")
-
-
-def _names(first: Path, second: Path) -> tuple[str, str]:
-    """Return short names of two folders that differ: those of their scenarios, whose runs are called by the time."""
-    a, b = (printable(path.resolve().parent.name) for path in (first, second))
-    return (a, b) if a != b else ("first", "second")
 
 
 def export(

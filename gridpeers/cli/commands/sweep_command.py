@@ -61,9 +61,7 @@ def sweep(
     if len(summary.broke) > 3:
         typer.echo(f"  and {len(summary.broke) - 3} more reasons in the column why")
     typer.echo(f"table: {shown(summary.table)}")
-    if broke == summary.runs:
-        raise typer.Exit(BROKEN)
-    raise typer.Exit(CLAIM_FAILED if summary.law_failed else PASSED)
+    raise typer.Exit(BROKEN if broke == summary.runs else CLAIM_FAILED if summary.law_failed else PASSED)
 
 
 def read(file: str) -> Plan:
