@@ -100,7 +100,6 @@ FILE = "checks.json"  # Name of the file in the run folder
 
 
 def verdicts_json(verdicts: Mapping[str, tuple[CheckVerdict, ...]]) -> str:
-    """Return checks.json: the verdicts of a run by case, in the order of the checks."""
     return msgspec.json.format(msgspec.json.encode(verdicts), indent=1).decode() + "\n"
 
 

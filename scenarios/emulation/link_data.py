@@ -20,8 +20,6 @@ from gridpeers.wire.wording import counted, printable
 
 
 class EmulationConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The run's faults, and the microgrids that their patterns name."""
-
     netem: Netem
     """All entries; a partition by island is resolved already."""
     microgrids: dict[str, str]
@@ -50,8 +48,6 @@ class LinkReportData(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
 
 
 class LinkStatus(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The status of a link while the run goes on."""
-
     holds: tuple[Text, ...] = ()
     counts: LinkCounts | None = None
     """Counts of its messages so far; None if none was judged."""
@@ -174,7 +170,6 @@ class LinkCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         return f"{where}: " + ", ".join(faults + ([] if self.for_s is None else [f"for {self.for_s:g} s"]))
 
     def in_words(self, impaired: Sequence[Link]) -> str:
-        """Return what it does; a heal ends the faults of the `impaired` links."""
         if self.fault is not None:
             return str(self)
         where = "all links" if self.on == EVERYTHING else self.on

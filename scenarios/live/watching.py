@@ -102,8 +102,6 @@ def table(snapshot: Snapshot, before_unit: str = "\n") -> Group:
 
 
 class TakesMessages(Protocol):
-    """The part of a `RunMonitor` that takes messages; the page's view also has it."""
-
     @property
     def inverters(self) -> tuple[str, ...]: ...
     def config(self, config: AgentConfig) -> None: ...

@@ -80,7 +80,6 @@ class DecisionEntries:
         return self._ends.know(state.sender, state.epoch, t)
 
     def _go_through(self) -> None:
-        """Note where the entries of the parts are that are new."""
         for part in range(self._parts, self._index.parts):
             for journal in self._index.journals_in(part):
                 self._ends.take(journal)
@@ -92,8 +91,6 @@ class DecisionEntries:
 
 
 class DecisionReader:
-    """Decisions and heard messages of the agents of a record."""
-
     def __init__(self, index: MessageIndex) -> None:
         self._index, self._info = index, index.info
         self._nameplates = {config.name: nameplate_of(config) for config in index.info.agents}
@@ -155,19 +152,13 @@ class DecisionReader:
                 lie = heard.in_words(state.t)
                 state = heard.told(state, partial(self._last_state_before, state))
             unused = form.unused[i] if i < len(form.unused) else ""
-            weight = form.weights[i] if i < len(form.weights) else 1.0
+            weight = 0.0 if unused else form.weights[i] if i < len(form.weights) else 1.0
+            plate = self._nameplate(name, state)
             yield NeighbourInput(
-                nameplate=self._nameplate(name, state),
-                state=state,
-                number=number,
-                age=age,
-                weight=0.0 if unused else weight,
-                unused=unused,
-                lie=lie,
+                nameplate=plate, state=state, number=number, age=age, weight=weight, unused=unused, lie=lie
             )
 
     def _heard_from(self, agent: str, sender: str) -> HeardFrom | None:
-        """Return how an agent hears a sender; None if nobody lies about it."""
         config = self._info.agent(agent)
         if config is None or not config.links:
             return None
@@ -227,7 +218,6 @@ class DecisionReader:
         return last.P_set, last.V_set
 
     def _all_in_neighbours(self, agent: str) -> tuple[str, ...]:
-        """Return the in-neighbours of an agent if all configured agents were there."""
         config = self._info.agent(agent)
         with suppress(GraphError, ValueError):  # a rule of others that fails, or is not here
             if config is not None:

@@ -35,8 +35,6 @@ MOST_KNOWN = 100_000  # States that are known as noted: by their sender, and by 
 
 @dataclass
 class RecordPart:
-    """Entries and messages of the journals in one part of the file."""
-
     entries: list[tuple[Journal, Entry]] = field(default_factory=list)
     """All entries, each with the part of the journal that it came in."""
     messages: list[AnyMessage] = field(default_factory=list)
@@ -50,8 +48,6 @@ class RecordPart:
 
 
 class MessageIndex:
-    """Find messages and entries in the file of a record."""
-
     def __init__(self, file: RecordFile) -> None:
         self.file, self.info = file, file.info
         self.damage: list[str] = []
@@ -74,7 +70,6 @@ class MessageIndex:
             self.damage.append(text)
 
     def of_type(self, topic: Topic, kind: type[M], parts: Iterable[int] | None = None) -> Iterator[M]:
-        """Yield the messages of a topic that can be read, of some parts or of all."""
         for index in range(self.parts) if parts is None else parts:
             for record in self.file.part(index):
                 if record.topic != topic:
@@ -95,7 +90,6 @@ class MessageIndex:
         return self.of_type("journal", Journal, (part,))
 
     def entries_in(self, journal: Journal) -> Iterator[Entry]:
-        """Yield the entries of one part of a journal, as far as they can be read."""
         where = f"the journal of {journal.sender} at t = {journal.t:.2f} s cannot be read"
         return entries_of(journal.data, lambda error: self.note_damage(f"{where}: {error}"))
 
@@ -124,7 +118,6 @@ class MessageIndex:
         return self.near(t - 1.0 - self._reach, t + self._reach)
 
     def messages(self, kind: type[M], sender: str | None, since: float, until: float) -> Iterator[M]:
-        """Yield messages as they were sent; see `RunRecord.messages`."""
         known: dict[tuple[str, int, int], None] = {}
         for index in self.near(since, until):
             for each in self.part(index).messages:

@@ -114,7 +114,6 @@ class RecordFile:
         return tuple(messages)
 
     def refresh(self) -> None:
-        """Note what was written since, of a run that is still recorded."""
         if self.damaged:
             return
         try:

@@ -27,8 +27,6 @@ LIVE: Literal["live"] = "live"  # The driver of a live run, as files name it
 
 
 class RecordInfo(msgspec.Struct, frozen=True, kw_only=True):
-    """The run of a record, as it was configured."""
-
     format: int = FORMAT
     level: RecordLevel
     scenario: str

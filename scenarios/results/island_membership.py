@@ -56,8 +56,6 @@ def closed_switches(
 
 
 class RecordedIsland(NamedTuple):
-    """An island with inverters in it."""
-
     inverters: tuple[str, ...]
     """Inverters at its buses, in the order of the history's columns; one that has left is still counted."""
     fed: bool

@@ -113,7 +113,6 @@ def V_error(history: History, nameplates: Nameplates) -> Floats:
 
 
 def measure(history: History, nameplates: Nameplates, window: Window, f_nom: float) -> Steady:
-    """Measure one event of one case."""
     assert nameplates.names == history.inverters
     assert window.rows(history.t).all()
     t, total = history.t, history.P.sum(axis=1)
@@ -170,7 +169,6 @@ def for_good(t: Floats, holds: Flags, start: float) -> float | None:
 
 
 def settling(history: History, nameplates: Nameplates, window: Window, f_nom: float) -> Settling:
-    """Measure the settling after one event of one case."""
     assert window.rows(history.t).all()
     end = history.t >= window.end - min(SWING, 0.5 * (window.end - window.start)) - 1e-9
     forming, f = history.present[:, nameplates.GFM], history.f[:, nameplates.GFM]

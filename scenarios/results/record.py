@@ -63,7 +63,6 @@ class Recorded:
         return History.of(self.inverters, self.table) if self.file is None else self.file.physics()
 
     def traces(self) -> Iterator[LinkTrace]:
-        """Yield the verdicts of the emulated links, in parts of one link."""
         yield from self.links.traces if self.file is None else self.file.links()
 
 

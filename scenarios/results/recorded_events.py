@@ -24,7 +24,6 @@ class LawFailure(NamedTuple):
 
 
 def law_failures(events: Iterable[PlantEvent]) -> tuple[LawFailure, ...]:
-    """Return the failures among the events of a case, the first one first."""
     found = []
     for event in events:
         if event.kind == "law":
@@ -34,7 +33,6 @@ def law_failures(events: Iterable[PlantEvent]) -> tuple[LawFailure, ...]:
 
 
 def ended_by_a_law(on_law_failure: OnLawFailure, events: Iterable[PlantEvent]) -> bool:
-    """Return whether a failed law has ended a run that broke."""
     return on_law_failure == "stop" and any(event.kind == "law" for event in events)
 
 

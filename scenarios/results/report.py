@@ -121,7 +121,6 @@ def _state(report: RunReport, case: str) -> str:
 
 
 def _answer(report: RunReport, failed: Sequence[str]) -> Text:
-    """Say in one line which cases keep their limits and which break them, as expected or not."""
     states = {case: _state(report, case) for case in report.checks}
     wrong = sum(verdict.status == "FAIL" for verdict in report.verdicts)
     for named in (len(_STATES), 1, 0):  # the first clauses name their cases, as far as there is room
@@ -186,7 +185,6 @@ def _claims_that_hold(report: RunReport) -> list[Text]:
 
 
 def _next(report: RunReport, after: str) -> str:
-    """Return the command to type next: it explains the first failure, or shows the run."""
     folder = report.folder.rstrip("/")
     for case in report.checks:
         for verdict in report.broken(case):
@@ -201,12 +199,11 @@ def _cut(text: str, width: int = COLUMNS) -> str:
 
 
 def show(report: RunReport, console: Console) -> None:
-    """Print a report, with colours on a terminal."""
     blocks: list[list[Text]] = [
         [Text(f"FAILED  case {case}: {first_of(of)}", "bold red") for case, of in report.failures.items() if of],
         *_tables(report),
         [*_claims(report)],
-        [_checks(case, verdicts) for case, verdicts in report.checks.items()],
+        [_checks(case, of) for case, of in report.checks.items()],
     ]
     blocks += [[Text.assemble(("NOTE", "yellow"), f"  {note}")] for note in report.notes]
     blocks += [[Text.assemble("Results: ", (report.folder, "bold"))]] if report.folder else []

@@ -95,7 +95,6 @@ def set_status(folder: Path, status: str) -> None:
 
 
 def set_complete(folder: Path) -> None:
-    """Write to status.txt that a run has ended and has its results."""
     set_status(folder, "complete")
 
 

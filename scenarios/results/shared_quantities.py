@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 
 
 class SharedRecord(NamedTuple):
-    """A shared quantity in the cases of a run."""
-
     quantity: SharedQuantity
     frames: Mapping[str, pd.DataFrame]
     """By case: a column for each inverter, index t (s)."""
@@ -85,7 +83,6 @@ def _units(record: RunRecord) -> dict[str, str]:
 
 
 def shared_records(cases: Mapping[str, CheckedCase]) -> dict[str, SharedRecord]:
-    """Return what the laws of a run declare to share, by name, in the cases that were recorded."""
     found: dict[str, SharedRecord] = {}
     for name, case in cases.items():
         declared = law_of(case.scenario, name).shared

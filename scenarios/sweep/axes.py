@@ -131,16 +131,12 @@ def _tree(code: Sequence[int]) -> set[tuple[int, int]]:
 
 
 class Setting(NamedTuple):
-    """One point of an axis."""
-
     shown: Mapping[str, Any]
     put: Mapping[str, Any]
     """Keys of the scenario, by path."""
 
 
 class Axis(NamedTuple):
-    """Keys that vary together."""
-
     origin: Mapping[str, str]
     """Key of the sweep file by key of the scenario."""
     settings: Sequence[Setting]
@@ -148,7 +144,6 @@ class Axis(NamedTuple):
 
 
 def samples(settings: Iterable[Sequence[Setting]]) -> Iterator[Setting]:
-    """Return every combination, the last axis fastest."""
     for points in product(*settings):
         yield Setting(
             {name: value for point in points for name, value in point.shown.items()},
@@ -163,7 +158,6 @@ def axis_of(values: Mapping[str, Sequence[Any]], origin: Mapping[str, str]) -> A
 
 
 def own_axes(sweep: Sweep, problems: Problems) -> list[Axis]:
-    """Return the axes of the tables [grid] and [zip]."""
     grid = _values_of(sweep.grid, "grid", problems)
     axes = [axis_of({path: values}, {path: f"grid.{path}"}) for path, values in grid.items()]
     together = _values_of(sweep.zip, "zip", problems)

@@ -59,7 +59,6 @@ FATE = ("status", "why", "trips", "link_warnings", "history_sha256", "links_sha2
 
 
 def run_one(number: int, scenario: ScenarioModel, case: str) -> SweepRow:
-    """Run one case in this thread and measure it."""
     try:
         return _run(number, scenario, case)
     except Exception as error:

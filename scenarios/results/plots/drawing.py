@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
 
 class Mark(NamedTuple):
-    """An event in a figure."""
-
     label: str
     """Label of its window; "" for none."""
     t: float
@@ -32,8 +30,6 @@ class Mark(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Drawing:
-    """Data that all figures of a run share."""
-
     histories: Mapping[str, History]
     titles: Mapping[str, str]
     nameplates: Nameplates

@@ -141,8 +141,6 @@ def drawn(page: Page, drawing: Drawing) -> Figure:
 
 
 class PlotMeasure(NamedTuple):
-    """A measure over time as figures show it."""
-
     title: str
     label: str
     """Label of the axis, with the unit."""
@@ -230,7 +228,6 @@ def plug_and_play(drawing: Drawing) -> Page:
 
 
 def powers(drawing: Drawing, *, GFM: bool) -> Page:
-    """Return P of each inverter of one kind (pu of its rating), one panel per case."""
     nameplates = drawing.nameplates
     series = {
         case: {nameplates.names[i]: (of.t, of.P[:, i] / nameplates.s[i]) for i in np.flatnonzero(nameplates.GFM == GFM)}
@@ -241,7 +238,6 @@ def powers(drawing: Drawing, *, GFM: bool) -> Page:
 
 
 def shared(drawing: Drawing, name: str) -> Page:
-    """Return a quantity that laws share, of each inverter, one panel per case."""
     quantity, frames = drawing.shared[name]
     series = {
         case: {it: (sent.index.to_numpy(), sent.to_numpy()) for it in frame if (sent := frame[it].dropna()).size}
@@ -255,7 +251,6 @@ def shared(drawing: Drawing, name: str) -> Page:
 def _by_inverter(
     drawing: Drawing, series: Mapping[str, Mapping[str, tuple[Floats, Floats]]], label: str, title: str
 ) -> Page:
-    """Return a panel for each case, with the times and values of each inverter."""
     columns, panels = 2 if len(series) > 1 else 1, []
     for place, (case, of_case) in enumerate(series.items()):
         widths = np.linspace(2.4, 0.9, len(of_case))  # wide below narrow: where curves coincide all of them are seen
