@@ -30,10 +30,10 @@ class Gains(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     beta_GFL: Annotated[float, Plausible("gain beta_GFL", 0.0, 1e4)] = 1.0
     """Weight of the var-sharing sum of a GFL, (14). The paper has 1."""
     alpha_min: Annotated[float, Below("alpha", only_with="V_full"), Plausible("gain alpha_min", 0.0, 1e4)] = 0.0
-    """Least weight of a small voltage error, with V_full; below alpha."""
+    """Least weight of a small voltage error, with V_full_pu above 0; below alpha."""
     V_full: Annotated[float, Unit("pu"), Plausible("a voltage error", 0.0, 0.2)] = 0.0
-    """Voltage error (pu) from which on alpha counts in full; a smaller one counts in proportion, but not below
-    alpha_min. 0: always in full, the paper's way."""
+    """Voltage error (pu) above which alpha counts in full. Below it, alpha falls in proportion, down to alpha_min. 0:
+    always in full, as in the paper."""
     P_set_min: Annotated[float, Unit("pu"), Below("P_set_max"), Plausible("a limit of P_set", -1.2, 1.2)] = 0.0
     """Lower limit of P_set (pu), anti-windup."""
     P_set_max: Annotated[float, Unit("pu"), Plausible("a limit of P_set", -1.2, 2.0)] = 1.0
@@ -53,8 +53,8 @@ class DegradedCommunication(msgspec.Struct, frozen=True, forbid_unknown_fields=T
     """
 
     stale: Literal["hold", "skip", "age-weighted"] = "hold"
-    """Weight of a neighbour's state that is not new: 1 ("hold"), 0 ("skip"), or smaller the older it is beyond the
-    usual age on its link ("age-weighted")."""
+    """Weight of a neighbour's state that is not new: 1 ("hold"), 0 ("skip"), or falling with its age beyond the usual
+    age on the link ("age-weighted")."""
     T_age: Annotated[float, Unit("s"), Plausible("a time in which a state ages", 1e-3, 60.0, above_zero=True)] = 0.2
     """Time (s) in which the weight of an ageing state falls to 1/e, for "age-weighted"."""
     max_age: Annotated[float, Unit("s"), Plausible("the greatest age of a state", 0.0, 60.0)] = 0.0
@@ -66,21 +66,20 @@ class DegradedCommunication(msgspec.Struct, frozen=True, forbid_unknown_fields=T
     beta_c: Annotated[float, Plausible("factor beta_c", 0.0, 1e4)] = 8.0
     """Factor on beta_GFM and beta_GFL, for "degree-normalised"; the paper's is the number of neighbours."""
     anti_windup: Literal["clamp", "none", "conditional"] = "clamp"
-    """Set-points of a saturated inverter: limited ("clamp"), free ("none", the paper's Remark 2), or limited and also
-    not integrated further ("conditional")."""
+    """Set-points of a saturated inverter: limited ("clamp"), free ("none", Remark 2 of the paper), or limited without
+    further integration ("conditional")."""
     T_sat: Annotated[
         float, Unit("s"), Plausible("a time until an inverter counts as saturated", 1e-3, 60.0, above_zero=True)
     ] = 0.5
-    """Time (s) without progress towards its droop characteristic, after which an inverter counts as saturated, for
-    "conditional"."""
+    """For "conditional": time (s) without progress towards its droop characteristic after which an inverter counts as
+    saturated."""
     islands: Literal["switches", "frequency", "ignored"] = "switches"
-    """How an agent detects neighbours in another island, to leave them out: by the positions of switches ("switches"),
-    by the drift of their angles ("frequency"), or not at all ("ignored"). It always knows whether it is
-    grid-connected."""
+    """Detection of neighbours in another island, which the sums leave out: by positions of switches ("switches"), by
+    the drift of their angles ("frequency"), or none ("ignored"). An agent always knows if it is grid-connected."""
     slip_max: Annotated[
         float, Unit("cycles"), Plausible("the greatest slip within an island", 1e-4, 0.5, above_zero=True)
     ] = 0.01
-    """Drift (cycles) of a neighbour's angle beyond which it counts as in another island, for "frequency"; set it above
+    """For "frequency": drift (cycles) of a neighbour's angle above which it counts as in another island. Set it above
     the swings of angles within an island."""
 
 

@@ -40,10 +40,10 @@ def predict(
         bool, flag("Predict modes of voltage and vars too, which takes a second or two.", "--vars/--no-vars")
     ] = True,
 ) -> None:
-    """Predict from theory how a scenario will go.
+    """Predict the behaviour of a scenario from theory.
 
-    It prints modes, settling times, limits of step and delay, and times to restore after each event. It runs the
-    plant on droop alone, for the load of each event and the effect of V_set on vars. docs/understand/findings.md has
+    It prints modes, settling times, limits of step and delay, and times to restore after each event. For the load of
+    each event and the effect of V_set on vars, it runs the plant on droop alone. docs/understand/findings.md has
     the equations, and compares predictions with the plant.
 
     Example:  gridpeers predict islanding --case IV
@@ -70,10 +70,10 @@ def why(
     t: Annotated[float, argument("TIME", "Run time (s) of the decision.")],
     case: CaseOfRun = "",
 ) -> None:
-    """Explain why an agent decided as it did.
+    """Explain a decision of an agent, term by term.
 
-    The answer comes from the record of the run: the measurement, the neighbours that the agent heard or missed, each
-    term of its law, and the limits. docs/how-to/explain-a-run.md has examples.
+    From the record it shows the measurement, each neighbour with the age of its state, each term of the law, and the
+    limits. docs/how-to/explain-a-run.md has examples.
 
     Example:  gridpeers why runs/islanding/latest/IV inv4 4.3
     """
@@ -138,10 +138,10 @@ def replay(
     since: Annotated[float, option("T", "Run time (s) from which links change; 0: the start.", "--from")] = 0.0,
     out: Annotated[Path | None, option("DIR", "New folder for the changed run; in runs/ if left out.", "--out")] = None,
 ) -> None:
-    """Replay a recorded run, or show what would have been.
+    """Replay a recorded run, unchanged or with a change.
 
-    Without a change, every process gets its recorded inputs again, and must decide the same within 1e-9. With a change,
-    the run goes on in a closed loop with gridpeers' own plant. docs/how-to/explain-a-run.md explains both.
+    Without a change, every process gets its recorded inputs again, and must give the same results within 1e-9. With a
+    change, agents and gridpeers' own plant run in a closed loop. docs/how-to/explain-a-run.md explains both.
 
     Example:  gridpeers replay runs/islanding/latest/IV --without "inv4 <-> inv7" --from 2
     """

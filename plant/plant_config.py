@@ -17,16 +17,18 @@ from gridpeers.wire.trust.credentials import Credentials
 
 
 class SyncCheck(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Synchronism check of a switch that joins two live islands: the largest differences across it."""
+    """Synchronism check of a switch that joins two live islands: the largest differences across it.
+
+    At 0 they are those of IEEE 1547-2018, Table 5, for a smaller island of up to 500 kVA, up to 1500 kVA, or more.
+    """
 
     angle: Annotated[float, Unit("deg"), Plausible("a window of angles", 0.0, 180.0)] = 0.0
-    """Largest angle (deg); 0: 20, 15 or 10 for up to 500, up to 1500, or more kVA in the smaller island (IEEE
-    1547-2018, Table 5)."""
+    """Largest difference of angle (deg); 0: 20, 15 or 10 by rating."""
     f: Annotated[float, Unit("Hz"), Plausible("a window of frequencies", 0.0, 10.0)] = 0.0
-    """Largest difference of frequency (Hz); 0: 0.3, 0.2 or 0.1 at 60 Hz by the same ratings, in proportion at another
-    nominal frequency."""
+    """Largest difference of frequency (Hz); 0: 0.3, 0.2 or 0.1 by rating at 60 Hz, in proportion at another nominal
+    frequency."""
     V: Annotated[float, Unit("pu"), Plausible("a window of voltages", 0.0, 1.0)] = 0.0
-    """Largest difference of voltage (pu of nominal); 0: 0.10, 0.05 or 0.03 by the same ratings."""
+    """Largest difference of voltage (pu of nominal); 0: 0.10, 0.05 or 0.03 by rating."""
     timeout: Annotated[float, Unit("s"), Plausible("the longest wait for synchronism", 0.0, 3600.0)] = 10.0
     """Longest wait (s) of a scheduled switch for synchronism."""
 
@@ -35,16 +37,16 @@ class Protection(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     """Trips of inverters by voltage or frequency, and their return to service: IEEE 1547-2018."""
 
     category: Literal["II", "III", "off"] = "III"
-    """Abnormal operating performance category of the default trip settings; "off": no inverter trips."""
+    """Abnormal operating performance category, which gives the default trip settings; "off": no inverter trips."""
     trips: Annotated[dict[str, tuple[float, float]], Example("{ UV2 = [0.5, 0.2] }")] = {}
-    """Settings that replace the defaults, by the standard's names OV2, OV1, UV1, UV2, OF2, OF1, UF1, UF2: threshold, in
-    pu or in Hz, and clearing time in seconds: { UV2 = [0.5, 0.2] }. The standard's own are for 60 Hz; at another
-    nominal frequency the defaults are in proportion."""
+    """Trip settings that replace the defaults, e.g. { UV2 = [0.5, 0.2] }: threshold (pu or Hz), and clearing time in
+    seconds. Names are OV2, OV1, UV1, UV2, OF2, OF1, UF1 and UF2. If the nominal frequency is not 60 Hz, default
+    frequencies are in proportion."""
     enter_service: Annotated[
         float, Unit("s"), Plausible("the delay of entering service", 0.01, 3600.0, above_zero=True)
     ] = 5.0
-    """How long (s) voltage (0.917 to 1.05 pu) and frequency (59.5 to 60.1 Hz, in proportion at another nominal
-    frequency) must be normal before a tripped inverter returns. The standard's default is 300 s, longer than a run."""
+    """Time (s) of normal voltage and frequency before a tripped inverter returns: 0.917 to 1.05 pu, and 59.5 to 60.1
+    Hz, in proportion at another nominal frequency. The default of the standard is 300 s."""
 
 
 class SwitchEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -170,9 +170,9 @@ def _messages() -> Iterator[str]:
 
 def _scenario() -> Iterator[str]:
     yield from ("# The scenario file", "")
-    yield "TOML. A key that is a time, a frequency or a per-unit value ends in its unit: `_s`, `_Hz`, `_pu` (of the"
-    yield "inverter's own rating or nominal voltage); parameters of laws have no suffix. A key without a default"
-    yield "is required. An unknown key, or a value out of its range, is an error."
+    yield "TOML. Times, frequencies and per-unit values end in their unit: `_s`, `_Hz`, `_pu` (of the inverter's own"
+    yield "rating or nominal voltage). Parameters of laws have no suffix. A key without a default is required. An"
+    yield "unknown key, or a value out of its range, is an error."
     titles: dict[type, list[str]] = {ScenarioModel: ["Top of the file"]}
     for title, cls in tables_in(ScenarioModel):
         titles.setdefault(cls, []).append(title)

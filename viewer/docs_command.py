@@ -23,11 +23,11 @@ SITE, CONFIG = Path(__file__).with_name("site"), Path(__file__).parents[2] / "mk
 
 def docs(
     port: Annotated[int, option("N", "Port of the pages; 0 takes any free one.")] = 8124,
-    no_browser: Annotated[bool, flag("Print the address alone.", "--no-browser")] = False,
+    no_browser: Annotated[bool, flag("Print the address, and open no browser.", "--no-browser")] = False,
 ) -> None:
     """Show the documentation in the browser, offline.
 
-    Only this host reaches the pages. A clone builds them first. Ctrl-C ends the command.
+    Only this host reaches the pages. In a clone of the repository, the command builds them first. Ctrl-C ends it.
 
     Example:  gridpeers docs
     """

@@ -39,17 +39,17 @@ def view(
         bool, typer.Option("--control", help="Let the page act: switches, loads, agents, links.")
     ] = False,
     address: Annotated[
-        str, typer.Option("--address", metavar="HOST", help="Address of the page; any other asks for a token.")
+        str, typer.Option("--address", metavar="HOST", help="Address of the page; all but the default need a token.")
     ] = HERE,
     port: Annotated[int, typer.Option("--port", metavar="N", help="Port of the page; 0 takes any free one.")] = PORT,
     token: Annotated[
-        str, typer.Option("--token", metavar="TEXT", help="Token that the page asks for; random for other addresses.")
+        str, typer.Option("--token", metavar="TEXT", help="Token of the page; a random one if --address needs one.")
     ] = "",
 ) -> None:
     """Show a run in the browser: feeder, links, strips and agents.
 
-    Of a live run it shows the present, of a RECORD any time, and how an agent decided then. Ctrl-C ends the page, and
-    not the run.
+    It shows a live run as it is now, or a RECORD at any time, with the decisions of its agents. Ctrl-C ends the page,
+    and not the run.
 
     Example:  gridpeers view --control
     """

@@ -44,10 +44,11 @@ def argument(metavar: str, help: str) -> Any:
 ScenarioName = Annotated[str, argument("SCENARIO", "A name that `gridpeers list` shows, or the path of a file.")]
 FigureFormat = Annotated[Literal["png", "pdf", "svg"], typer.Option("--format", help="Format of the figures.")]
 Switches = Annotated[
-    list[str] | None, option("LINE", "A line of a .dss or .glm file to make a switch; repeat it.", "--switch")
+    list[str] | None, option("LINE", "Line of the .dss or .glm file to turn into a switch; repeatable.", "--switch")
 ]
 LeaveOut = Annotated[
-    list[str] | None, option("ELEMENT", 'Do without Class.name, * for any: "PVSystem.*"; repeat it.', "--leave-out")
+    list[str] | None,
+    option("ELEMENT", 'Element to leave out, Class.name; * is any name: "PVSystem.*"; repeatable.', "--leave-out"),
 ]
 
 PASSED, CLAIM_FAILED, BAD_INPUT, BROKEN, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 130, 143

@@ -45,11 +45,11 @@ def chaos(
         Path | None, option("DIR", "Folder for the results, new or empty; runs/SCENARIO-chaos/TIME if left out.")
     ] = None,
 ) -> None:
-    """Disturb a scenario at random; judge and shrink what fails.
+    """Disturb a scenario at random, and shrink the failures.
 
     Agents are killed and paused, leave and join; links are cut, slow and lossy; switches open and close; agents lie.
-    After the last disturbance, the checks judge the run (docs/how-to/chaos.md). Each kind of failure becomes a
-    scenario file with few disturbances, for `gridpeers run`.
+    After the last disturbance, the checks judge the run (docs/how-to/chaos.md). For each kind of failure, the command
+    writes a scenario file with few disturbances, for `gridpeers run`.
 
     Example:  gridpeers chaos islanding --runs 200
     """

@@ -25,10 +25,10 @@ class Partition(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     groups: Annotated[tuple[tuple[str, ...], ...], Example('[["inv1", "inv2"], ["MG2"]]')] = ()
     """Groups of inverters or microgrids, e.g. [["inv1", "inv2"], ["MG2"]]."""
     by: Literal["", "microgrid", "island", "halves"] = ""
-    """Instead of groups: one for each microgrid, one for each electrical island, or the first and the second half of
-    the inverters' table."""
+    """Groups by rule: "microgrid", one for each microgrid; "island", one for each electrical island; "halves", the
+    first and the second half of the table of inverters."""
     alone: str = ""
-    """Instead of groups: the agent of this inverter, apart from all others."""
+    """Inverter whose agent is alone in its group, instead of groups."""
     from_s: RunTime = 0.0
     """Start (s of run time)."""
     to_s: EndTime = None

@@ -32,14 +32,14 @@ if TYPE_CHECKING:
 def experiment(
     name: Annotated[str, argument("NAME", "Name of an experiment; `list` shows all.")] = "list",
     out: Annotated[
-        Path | None, option("DIR", "Folder, new or of this experiment; runs/experiments/NAME if left out.")
+        Path | None, option("DIR", "Folder, new or begun by this experiment; runs/experiments/NAME if left out.")
     ] = None,
     figures: FigureFormat = "png",
-    jobs: Annotated[int | None, option("N", "Processes of a sweep; one per core if left out.", min=1)] = None,
+    jobs: Annotated[int | None, option("N", "Parallel processes; one per core if left out.", min=1)] = None,
 ) -> None:
     """Run an experiment on late, lossy or broken links.
 
-    It writes a figure and a table, with theory beside. The same command resumes an interrupted sweep.
+    It writes a figure and a table that compare the runs with theory. The same command resumes an interrupted sweep.
     docs/understand/findings.md has the findings.
 
     Example:  gridpeers experiment delay

@@ -116,10 +116,10 @@ class Gfl(InverterModel, frozen=True, kw_only=True):
     """Grid-following inverter, per unit of its own rating; its equations are in `plant/inverters/gfl.py`."""
 
     model: str = "voltage_source"
-    """Which model: "voltage_source" or "current_source", by its representation towards the network; or one of your own,
-    `module:Class`."""
+    """Model: "voltage_source" or "current_source", as seen from the network; or one of your own, `module:Class`."""
     mode: Literal["positive_sequence", "balanced_power"] = "positive_sequence"
-    """Control of its phases: one PLL for all and equal currents, or a PLL for each and equal powers."""
+    """"positive_sequence": one PLL and balanced currents. "balanced_power": a PLL for each phase and equal power in
+    each."""
     R_f: Annotated[Resistance, "Filter resistance (pu)."] = 0.01
     k_pPLL: Annotated[Gain, Unit("rad/s per pu"), "PLL proportional gain (rad/s per pu)."] = 50.0
     k_iPLL: Annotated[Gain, Unit("rad/s^2 per pu"), "PLL integral gain (rad/s^2 per pu)."] = 900.0
@@ -135,15 +135,15 @@ class Gfl(InverterModel, frozen=True, kw_only=True):
     """Lag of the P reference (s). GridLAB-D's default 0.5 s is too slow for consensus in 1 s."""
     T_vf: Annotated[TimeConstant, "Filter of measured V (s)."] = 0.05
     T_qf: TimeConstant = 0.1
-    """Lag of the Q reference (s). 5 % droop is a gain of 20 from V to Q: with T_vf 0.02 and T_qf 0.05 s one GFM with
-    four GFL oscillates on this feeder; GridLAB-D's 0.2 s only slows the sharing of vars."""
+    """Lag of the Q reference (s). With 5 % droop the gain from V to Q is 20: with T_vf_s = 0.02 and T_qf_s = 0.05, one
+    GFM with four GFL oscillates on this feeder. GridLAB-D's 0.2 s only slows the sharing of vars."""
     db_UF: Annotated[FrequencyBand, "Dead band below nominal frequency (Hz)."] = 0.0
     db_OF: Annotated[FrequencyBand, "Dead band above nominal frequency (Hz)."] = 0.0
     db_UV: Annotated[VoltageBand, "Dead band below V_set (pu)."] = 0.0
     db_OV: Annotated[VoltageBand, "Dead band above V_set (pu)."] = 0.0
     dead_band: Literal["gridlabd", "ieee1547"] = "gridlabd"
-    """Droop outside of a dead band, of freq-watt and volt-var: by the full deviation, so that it jumps at the edge, as
-    GridLAB-D, or by the deviation from the edge, as IEEE 1547-2018."""
+    """Droop of frequency and voltage outside a dead band: "gridlabd", by the full deviation, with a jump at the edge;
+    or "ieee1547", by the deviation from the edge."""
     P_max: Annotated[LimitOfP, "Upper bound of the P reference (pu)."] = 1.0
     P_min: Annotated[LimitOfP, Below("P_max"), "Lower bound of the P reference (pu)."] = -1.0
     S_max: Annotated[Capacity, "Apparent-power limit (pu of the rating): bounds Q at sqrt(S_max^2 - P^2)."] = 1.2
@@ -151,8 +151,8 @@ class Gfl(InverterModel, frozen=True, kw_only=True):
     Q_min: Annotated[LimitOfQ, Below("Q_max"), "Lower bound of the Q reference (pu): Q4 of IEEE 1547-2018."] = -10.0
     i_max: Annotated[Capacity, "Bound of each axis of the current reference (pu)."] = 1.2
     P_set_lim: BoundOfPset = 1.0
-    """Bound of P_set, either way (pu), before the droop (7) is added: the rating, as in GridLAB-D. A larger one lets a
-    set-point that was wound up delay the inverter's response."""
+    """Limit of abs(P_set) (pu), before the droop (7) is added; 1 is the rating, as in GridLAB-D. With a larger limit, a
+    wound-up set-point delays the response of the inverter."""
 
     kind: ClassVar[Kind] = "GFL"
     STATES: ClassVar[tuple[str, ...]] = (

@@ -119,7 +119,7 @@ class GfmDroop(InverterModel, frozen=True, kw_only=True):
     E_min: Annotated[InternalVoltage, Below("E_max"), "Lower bound of the internal voltage (pu)."] = 0.0
     E_max: Annotated[InternalVoltage, "Upper bound of the internal voltage (pu)."] = 1.25
     I_max: PhaseCurrent = 2.0
-    """Largest current of a phase (pu of the rating): beyond it the phase keeps its angle and loses the surplus."""
+    """Largest current of a phase (pu of the rating); a larger one is limited, at the same angle."""
 
     STATES: ClassVar[tuple[str, ...]] = ("p", "q", "v", "x_over", "x_under", "y_over", "y_under", "e", "E")
     """Filtered P, Q and mean V (pu); integrators of the limiters of P (rad/s) and Q (pu V): x_over, y_over <= 0 <=

@@ -143,8 +143,8 @@ class InverterModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     R_f: Annotated[Resistance, "Filter resistance (pu)."] = 0.015
     X_f: Annotated[Reactance, "Filter reactance (pu)."] = 0.15
     P_set_lim: BoundOfPset = 3.0
-    """Bound of P_set, either way (pu). P_set shifts the droop (3), so it may exceed P_max; with 3 pu and 1 % droop an
-    unloaded GFM stays within 3 % of nominal frequency. GridLAB-D has no such bound."""
+    """Limit of abs(P_set) (pu). P_set shifts the droop (3), so it may exceed P_max. With 3 pu and 1 % droop, an
+    unloaded GFM stays within 3 % of nominal frequency. GridLAB-D has no such limit."""
     V_set_min: Annotated[BoundOfVset, Below("V_set_max"), "Lower bound of V_set (pu)."] = 0.8
     V_set_max: Annotated[BoundOfVset, "Upper bound of V_set (pu)."] = 1.2
 

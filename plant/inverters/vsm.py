@@ -30,7 +30,7 @@ class Vsm(InverterModel, frozen=True, kw_only=True):
     """Damping (pu power per pu speed), beside 1/m_p: the droop at rest is 1/(1/m_p + D)."""
     T_q: Annotated[TimeConstant, "Filter of measured Q (s)."] = 0.02
     I_max: PhaseCurrent = 2.0
-    """Largest current of a phase (pu of the rating): beyond it the phase keeps its angle and loses the surplus."""
+    """Largest current of a phase (pu of the rating); a larger one is limited, at the same angle."""
 
     STATES: ClassVar[tuple[str, ...]] = ("q",)  # filtered reactive power, pu
 

@@ -59,8 +59,8 @@ class Time(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     ] = 0.002
     """Integration step of the plant (s); divides T_c_s."""
     method: Method = "first-order"
-    """Method of time stepping of the plant: "first-order", GridLAB-D's own; or "second-order", at 2 ms ten
-    times as accurate as the other at 0.25 ms (with GFL as voltage sources), at 2.5 times its time a step."""
+    """Time stepping of the plant: "first-order", as in GridLAB-D; or "second-order", which takes 2.5 times as long a
+    step. With GFL as voltage sources, its error at 2 ms is a tenth of that of "first-order" at 0.25 ms."""
     record_s: Annotated[
         float,
         Unit("s"),
@@ -68,7 +68,7 @@ class Time(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         Divides("T_c_s"),
         Plausible("the distance of recorded rows", 1e-5, 2.0, above_zero=True),
     ] = 0.01
-    """Distance of the rows in history.csv (s): a multiple of h_s that divides T_c_s."""
+    """Time between two rows of history.csv (s): a multiple of h_s that divides T_c_s."""
 
 
 class InverterTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -85,8 +85,8 @@ class InverterTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     P_rated_kW: Annotated[float | None, Unit("kW"), Plausible("a rating", 0.1, 1e6)] = None
     """Rated power (kW), the base of its per-unit values."""
     parameters: Annotated[str | None, Example('"regfm_a1"')] = None
-    """Published set of parameters ("regfm_a1", "regfm_a1_vflag0"); it replaces the one in inverters.csv, and ""
-    removes that one."""
+    """Published set of parameters, "regfm_a1" or "regfm_a1_vflag0", in place of the one in inverters.csv; "": no
+    set."""
     own: Annotated[OwnParameters, INLINE, ChosenBy("model", chosen_own)] = OwnParameters()
     """Parameters of its kind, in its table."""
 
@@ -106,7 +106,7 @@ class PlantTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     V_set0_pu: Annotated[float, Unit("pu"), Plausible("a voltage set-point", 0.8, 1.2, above_zero=True)] = 1.0
     """First V_set of every inverter (pu of its nominal voltage)."""
     f_nom_Hz: Annotated[float | None, Unit("Hz"), Plausible("a nominal frequency", 16.0, 400.0)] = None
-    """Nominal frequency (Hz), by default the feeder's. At another frequency the equipment stays the same, and its
+    """Nominal frequency (Hz); without it, the feeder's. At another frequency the equipment stays the same, and its
     reactances scale with the frequency (plant/data/README.md)."""
     load_factor: Annotated[float, Plausible("a factor on the loads", 0.0, 10.0)] = 1.0
     """Factor on all loads of the feeder, real and reactive power."""
@@ -175,11 +175,11 @@ class Case(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """Checks that this case is built to fail, e.g. ["frequency", "var_sharing"] without secondary control. The
     summary of a run and `--require-checks` do not count them as failures."""
     secondary: Annotated[Secondary, Example('["inv1", "inv4"]')]
-    """Inverters that run the secondary law (12)-(15): "none", "GFM", "all", or a list, e.g. ["inv1", "inv4"]. The
-    others keep their first set-points, and still send them to their neighbours."""
+    """Inverters that run the secondary law (12)-(15): "none", "GFM", "all", or a list, e.g. ["inv1", "inv4"]. The other
+    agents keep their first set-points, and still send them."""
     graph: PluginKey
-    """Links between agents: "full", "none", "GFM-only", "clustered", "ring", "links" as listed, or a rule of your own,
-    "mine:my_graph" or { use = "mine:MyGraph", k = 2 } (`gridpeers doc graphs`)."""
+    """Links between agents: "full", "none", "GFM-only", "clustered", "ring", "links" (the pairs in links), or a graph
+    of your own, e.g. "mine:my_graph" or { use = "mine:MyGraph", k = 2 } (`gridpeers doc graphs`)."""
     links: Annotated[tuple[tuple[str, str], ...], Example('[["inv1", "inv4"]]')] = ()
     """Undirected links for the graph "links", e.g. [["inv1", "inv4"], ["inv4", "inv7"]]."""
     without: Annotated[tuple[tuple[str, str], ...], Example('[["inv1", "inv4"]]')] = ()
@@ -187,20 +187,21 @@ class Case(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     without_agent: Annotated[tuple[str, ...], Example('["inv2"]')] = ()
     """Inverters without an agent in this case, in addition to those without one in every case."""
     P_max_kW: Annotated[dict[str, dict[str, float]], Example("{ clouds = { inv2 = 225 } }")] = {}
-    """Available power of inverters (kW) in this case only, by the label of the event whose values it replaces:
-    { clouds = { inv2 = 225 } }."""
+    """Available power (kW) in this case only: the label of an event, and the values that replace its P_max_kW, e.g. {
+    clouds = { inv2 = 225 } }."""
     law: LawKey = ""
-    """Control law of this case only; without it, `law` at the top."""
+    """Control law of this case only; without it, the key `law` at the top."""
     gains: Annotated[Gains, INHERITED] = Gains()
-    """Table `[case.NAME.gains]`: gains of this case only; `[gains]` supplies the others."""
+    """Table `[case.NAME.gains]`, for this case only; `[gains]` supplies the other keys."""
     degraded_communication: Annotated[DegradedCommunication, INHERITED] = DegradedCommunication()
-    """Table of this case only; `[degraded_communication]` supplies the other keys."""
+    """Table `[case.NAME.degraded_communication]`, for this case only; `[degraded_communication]` supplies the other
+    keys."""
     netem: Annotated[Netem, INLINE] = Netem()
     """Entries `[[case.NAME.link]]`, `[[case.NAME.partition]]`, `[[case.NAME.node]]`: of this case only."""
 
 
 class Processes(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Table `[processes]`: how the processes of a run find and await each other. It changes no result."""
+    """Table `[processes]`: connections between the processes of a run. It changes no result."""
 
     deadline_s: Annotated[float, Unit("s"), Plausible("a deadline", 0.1, 600.0, above_zero=True)] = 20.0
     """Longest wait for a message (s of real time); then the run ends and names the missing processes."""
@@ -219,32 +220,31 @@ class ScenarioModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     """The keys outside any table come first in the file."""
 
     name: str = ""
-    """Name of the run folder, by default that of the file."""
+    """Name of the run folder; without it, the name of the file."""
     title: str = ""
     """One line for `gridpeers list`."""
     paper: PluginKey = ""
-    """Benchmark whose published numbers and claims judge the run: "islanding", "intermittency", "communication",
-    "switching", "plug-n-play" and "wind-up" of the paper, or your own as "module:Name"; "" judges nothing."""
+    """Benchmark, the numbers and claims of a publication that judge the run: "islanding", "intermittency",
+    "communication", "switching", "plug-n-play" and "wind-up" of the paper, or your own as "module:Name"; "": none."""
     seed: Annotated[int, Plausible("a seed", 0, 2**63 - 1)] = 1
     """Seed of all random draws: the fates of messages on links with faults."""
     security: Literal["none", "mtls"] = "none"
-    """"mtls": links between processes are mutual TLS, and a run needs --keys DIR, a folder with certificates
-    (docs/how-to/several-hosts.md); "none": links are open, unless --keys is given. A run in one process has no
-    links."""
+    """Links between processes: "mtls", mutual TLS, for which a run needs --keys DIR, a folder with certificates
+    (docs/how-to/several-hosts.md); "none", open links unless --keys is given. A run in one process has no links."""
     record: RecordLevel = "all"
-    """Contents of the record run.mcap of each case: "all", decisions of agents with their inputs but no arrivals
-    ("decisions"), or rows and events alone ("physics")."""
+    """Contents of run.mcap of each case: "all"; "decisions", without the arrival times of messages; or "physics",
+    without messages and decisions."""
     metrics: Annotated[tuple[PluginKey, ...], Example('["mine:Name"]')] = ()
-    """Metrics of your own, measured in every window: ["mine:nadir_Hz", { use = "mine:Within", band_Hz = 0.05, name =
-    "within_50mHz" }] (`gridpeers doc metrics`)."""
+    """Further metrics of every window, also your own: ["S_max_pu", "mine:nadir_Hz", { use = "mine:Within", band_Hz =
+    0.05, name = "within_50mHz" }] (`gridpeers doc metrics`)."""
     claims: Annotated[tuple[PluginKey, ...], Example('["mine:Name"]')] = ()
     """Claims of your own that judge the run: ["mine:restored"] (`gridpeers doc claims`)."""
     checks: Annotated[tuple[PluginKey, ...], Example('["mine:Name"]')] = ()
-    """Checks of your own, and other limits for the checks of every run: ["mine:Calm", { use = "frequency", within_s
-    = 1.0 }, { use = "rating", off = true }] (`gridpeers doc checks`)."""
+    """Checks of your own, and other limits of the checks of every run: ["mine:Calm", { use = "frequency", within_s =
+    1.0 }] (`gridpeers doc checks`)."""
     without_agent: Annotated[tuple[str, ...], Example('["inv2"]')] = ()
-    """Inverters without an agent, in every case, e.g. ["inv2"]: the plant runs them on primary droop at their first
-    set-points, other agents do not know them, and the sharing indices leave them out."""
+    """Inverters without an agent in every case, e.g. ["inv2"]. They stay on primary droop at their first set-points.
+    Other agents do not know them, and the sharing indices leave them out."""
     time: Time
     """Table `[time]`."""
     plant: PlantTable = PlantTable()
@@ -252,12 +252,12 @@ class ScenarioModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     protection: Protection = Protection()
     """Table `[protection]`: when inverters trip, and when they return."""
     law: LawKey = "consensus"
-    """Control law that the agents run: a name that `gridpeers doc laws` lists, "mine:Mine" for the class Mine of
-    mine.py beside this file, or a table `[law]` with one of use, command = ["./mylaw"] (any program), fmu = "law.fmu",
-    and with the law's parameters; time_limit_s is the longest time of one step."""
+    """Control law of the agents: a name from `gridpeers doc laws`, or "mine:Mine" for the class Mine of mine.py beside
+    this file. A table `[law]` takes one of use, command = ["./mylaw"] (a program) and fmu = "law.fmu"; the parameters
+    of the law; and time_limit_s, the longest time of one step."""
     on_law_failure: OnLawFailure = "droop"
-    """Consequence of an error in a law, or in a graph of your own: "droop", its inverter continues on primary droop, as
-    real hardware would, and the check "law_failed" fails; "stop", the run ends there. The run fails in both cases."""
+    """Consequence of an error in a law, or in a graph of your own. "droop": the inverter of that agent stays on primary
+    droop, and the check "law_failed" fails. "stop": the run ends at the error. Both fail the run."""
     gains: Gains = Gains()
     """Table `[gains]`: of the law "consensus", for every case."""
     degraded_communication: DegradedCommunication = DegradedCommunication()

@@ -22,14 +22,14 @@ app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Import, che
 FeederName = Annotated[
     str, argument("FEEDER", "A feeder that comes with gridpeers, a folder of tables, or a .dss or .glm file.")
 ]
-LoadSet = Annotated[str | None, option("NAME", "Load table of a folder of tables; main if left out.", "--load-set")]
+LoadSet = Annotated[str | None, option("NAME", "Load table of the feeder; main if left out.", "--load-set")]
 SHOWN = 12  # Notes that are shown
 
 
 @app.command("import")
 def import_(
     file: Annotated[Path, argument("FILE", "Script for OpenDSS (.dss) or model for GridLAB-D (.glm).")],
-    out: Annotated[Path | None, typer.Option(help="Folder for its tables; else the feeder's name.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for the tables; named after the feeder if left out.")] = None,
     switch: Switches = None,
     leave_out: LeaveOut = None,
 ) -> None:
@@ -74,8 +74,8 @@ def check(feeder: FeederName, load_set: LoadSet = None, switch: Switches = None,
 @app.command()
 def solve(
     feeder: FeederName,
-    open_: Annotated[list[str] | None, option("SWITCH", "Open it first; repeat it.", "--open")] = None,
-    csv: Annotated[Path | None, typer.Option(help="File for all voltages.")] = None,
+    open_: Annotated[list[str] | None, option("SWITCH", "Switch to open first; repeatable.", "--open")] = None,
+    csv: Annotated[Path | None, typer.Option(help="CSV file for all voltages.")] = None,
     load_set: LoadSet = None,
     switch: Switches = None,
     leave_out: LeaveOut = None,

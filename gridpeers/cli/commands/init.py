@@ -19,15 +19,14 @@ TEMPLATE = Path(__file__).parents[1] / "template"  # Folder that is copied
 
 def init(
     folder: Annotated[Path, argument("DIR", "Folder of the project, new or empty.")],
-    feeder: Annotated[
-        Path | None, option("FILE", "Propose an islanding of this feeder, a .dss or .glm file.", "--feeder")
-    ] = None,
+    feeder: Annotated[Path | None, option("FILE", "Feeder to island, a .dss or .glm file.", "--feeder")] = None,
     switch: Switches = None,
     leave_out: LeaveOut = None,
 ) -> None:
-    """Make a project of your own, or an islanding of your feeder.
+    """Start a project: a law of your own, or an islanding of your feeder.
 
-    The project has a law, a scenario and a test; with --feeder the tables of the feeder, inverters and a scenario.
+    The project has a law, a scenario and a test. With --feeder it has the tables of the feeder, inverters and a
+    scenario.
 
     Example:  gridpeers init my-study --feeder Master.dss
     """

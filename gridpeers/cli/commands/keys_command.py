@@ -20,7 +20,7 @@ app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
     help="Make, issue and revoke the certificates of a site.\n\n"
-    "Links are then encrypted, every process proves who it is, and may send only its own messages "
+    "Links are then encrypted. Every process proves its identity, and can send only its own messages "
     "(docs/how-to/several-hosts.md).\n\n"
     "Example:  gridpeers keys init lab",
 )
@@ -32,12 +32,10 @@ _require_cryptography = partial(require, {"cryptography": "certificates"}, "inst
 
 @app.command()
 def init(
-    site: Annotated[Path, argument("SITE", "New folder for the certificates; its name is the site's.")],
+    site: Annotated[Path, argument("SITE", "New folder for the certificates; the site takes its name.")],
     days: _Days = 365.0,
 ) -> None:
-    """Make a site with its first certificates.
-
-    These are an authority, and certificates of a plant, an operator and a viewer.
+    """Make a site: an authority, and certificates of a plant, an operator and a viewer.
 
     Example:  gridpeers keys init lab
     """
@@ -52,7 +50,7 @@ def init(
 
 @app.command()
 def issue(
-    names: Annotated[list[str], argument("NAME...", "Names; an agent has the name of its inverter.")],
+    names: Annotated[list[str], argument("NAME...", "Names of the members; an agent has the name of its inverter.")],
     role: Annotated[
         Role | None, flag("Role of a new name, agent if left out; a known name keeps its role.", "--role")
     ] = None,
@@ -75,12 +73,12 @@ def issue(
 
 @app.command()
 def revoke(
-    name: Annotated[str, argument("NAME", "Its name; an agent has that of its inverter, e.g. inv4.")],
+    name: Annotated[str, argument("NAME", "Name of the member; an agent has the name of its inverter, e.g. inv4.")],
     keys: _Keys = Path(),
 ) -> None:
     """Revoke a certificate.
 
-    Processes that start later with the new list refuse it.
+    Copy members.json to every host, and restart the processes: until then they accept the certificate.
 
     Example:  gridpeers keys revoke inv4 --keys lab
     """
@@ -96,7 +94,7 @@ def revoke(
 def show(keys: _Keys = Path()) -> None:
     """Show the members of a site.
 
-    Each line has the role, the end of the certificate, and whether the key is here.
+    Each line has the role, the name, the end of the certificate, and "key here" if this folder has the key.
 
     Example:  gridpeers keys show --keys lab
     """

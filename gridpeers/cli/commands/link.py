@@ -15,13 +15,13 @@ link = typer.Typer(
     no_args_is_help=True,
     help="Impair and heal links of a live run.\n\n"
     "A link goes from an agent to an agent, or between the plant and an agent. "
-    'Name it by sender and receiver, "inv1 -> inv4" or inv1 inv4; "inv4 <-> inv7" is both ways, "MG1 -> MG2" '
-    'and "* -> inv2" are several, and plant is a name too. Times are in s, probabilities from 0 to 1.\n\n'
+    'Name it by sender and receiver: "inv1 -> inv4", or inv1 inv4. "inv4 <-> inv7" means both directions; '
+    '"MG1 -> MG2" and "* -> inv2" mean several links; "plant" is a name too.\n\n'
     'Example:  gridpeers link set "inv1 -> inv4" --delay 0.1 --jitter 0.02 --loss 0.2',
 )
 
 _Ends = Annotated[list[str], argument("LINKS", 'A pattern such as "inv1 -> inv4", or two names: sender and receiver.')]
-_For = Annotated[float | None, option("SECONDS", "Run time after which the fault ends; it stays if left out.", "--for")]
+_For = Annotated[float | None, option("SECONDS", "Duration of the fault (s of run time); no end if left out.", "--for")]
 
 
 @link.command("set")
@@ -31,14 +31,14 @@ def set_(
     live: LiveRun,
     delay: Annotated[float | None, option("SECONDS", "Delay of every message.")] = None,
     jitter: Annotated[float | None, option("SECONDS", "Uniform delays: --delay plus or minus this time.")] = None,
-    loss: Annotated[float | None, option("P", "Probability that a message is lost.")] = None,
-    duplicate: Annotated[float | None, option("P", "Probability of a second copy.")] = None,
-    corrupt: Annotated[float | None, option("P", "Probability of a flipped bit.")] = None,
-    rate: Annotated[float | None, option("BYTES", "Bytes per second that the link sends.")] = None,
+    loss: Annotated[float | None, option("P", "Probability that a message is lost, 0 to 1.")] = None,
+    duplicate: Annotated[float | None, option("P", "Probability of a second copy, 0 to 1.")] = None,
+    corrupt: Annotated[float | None, option("P", "Probability of a flipped bit, 0 to 1.")] = None,
+    rate: Annotated[float | None, option("BYTES", "Rate of the link, in bytes per second.")] = None,
     profile: Annotated[str, option("NAME", "A named link, e.g. lte; see docs/reference/link-faults.md.")] = "",
     duration: _For = None,
 ) -> None:
-    """Give links faults. A fault replaces the link's fault of the same kind.
+    """Set faults of links. A fault replaces the link's fault of the same kind.
 
     Example:  gridpeers link set inv1 inv4 --delay 0.1 --loss 0.2 --for 10
     """
@@ -55,11 +55,11 @@ def set_(
 def cut(
     links: _Ends,
     live: LiveRun,
-    one_way: Annotated[bool, flag("With two names: only from the first.", "--one-way")] = False,
+    one_way: Annotated[bool, flag("With two names: cut only from the first to the second.", "--one-way")] = False,
     hold: Annotated[bool, flag("Keep the messages, and deliver them when the link is healed.", "--hold")] = False,
     duration: _For = None,
 ) -> None:
-    """Cut links; two names mean both ways.
+    """Cut links; two names mean both directions.
 
     Example:  gridpeers link cut inv4 inv7 --for 5
     """
@@ -73,7 +73,7 @@ def cut(
 def heal(
     live: LiveRun,
     links: Annotated[
-        list[str] | None, argument("[LINKS]", "A pattern, or two names (both ways); all links if left out.")
+        list[str] | None, argument("[LINKS]", "A pattern, or two names (both directions); all links if left out.")
     ] = None,
 ) -> None:
     """End the present faults of links. Later faults of the scenario still begin.

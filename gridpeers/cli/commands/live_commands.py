@@ -37,20 +37,22 @@ from gridpeers.wire.driver.ending import watch_readers
 
 
 def agent(
-    inverters: Annotated[list[str], argument("INVERTER", "Names of their inverters, e.g. inv2; also spare ones.")],
+    inverters: Annotated[list[str], argument("INVERTER", "Inverters, e.g. inv2; also spare ones.")],
     run: Run = RUN,
     connect: Connect = None,
     listen: Annotated[
-        list[str] | None, option("ENDPOINT", "Where this agent listens for others; any free port if left out.")
+        list[str] | None, option("ENDPOINT", "Where this process listens for other agents; a free port if left out.")
     ] = None,
     wait: Wait = 60.0,
     keys: Keys = None,
     insecure: Insecure = False,
     own_code: Annotated[
-        bool, flag("Run a law, graph or link fault of your own for a plant on another host.", "--own-code")
+        bool, flag("Run your own law, graph or link fault if a plant on another host names it.", "--own-code")
     ] = False,
 ) -> None:
-    """Run the agent of an inverter, or of several, in this terminal. At Ctrl-C it leaves and switches them off.
+    """Run the agent of an inverter, or of several, in this terminal.
+
+    At Ctrl-C the agents leave, and their inverters are switched off.
 
     Example:  gridpeers agent inv2 --keys lab --connect tls/192.168.1.10:7447
     """
@@ -86,7 +88,7 @@ def watch(
     live: LiveRun,
     duration: Annotated[float | None, option("SECONDS", "End after this time; at Ctrl-C if left out.", "--for")] = None,
 ) -> None:
-    """Watch a run as a live table, until Ctrl-C. If the output is no terminal, print a text every second.
+    """Watch a run as a live table, until Ctrl-C. Outside a terminal, print a text every second.
 
     Example:  gridpeers watch --keys lab --connect tls/192.168.1.10:7447
     """
@@ -98,7 +100,7 @@ def watch(
 
 
 @of_live_run
-def stop(inverter: Annotated[str, argument("INVERTER", "Name of its inverter, e.g. inv2.")], live: LiveRun) -> None:
+def stop(inverter: Annotated[str, argument("INVERTER", "Inverter of the agent, e.g. inv2.")], live: LiveRun) -> None:
     """Make an agent leave: its inverter is switched off.
 
     The others take its load.
@@ -114,7 +116,7 @@ def stop(inverter: Annotated[str, argument("INVERTER", "Name of its inverter, e.
 @of_live_run
 def event(
     action: Annotated[Literal["open", "close"], argument("open|close", "What to do with the switch.")],
-    switch: Annotated[str, argument("SWITCH", 'Its name, e.g. "13-152" or "sw1_2".')],
+    switch: Annotated[str, argument("SWITCH", 'Name of the switch, e.g. "13-152" or "sw1_2".')],
     live: LiveRun,
     synchronised: Annotated[
         bool, flag("Close only when both sides are in synchronism (IEEE 1547, Table 5).", "--synchronised")
@@ -132,7 +134,7 @@ def event(
 
 @of_live_run
 def load(
-    name: Annotated[str, argument("LOAD", 'Its bus, e.g. "48"; in an imported feeder its name.')],
+    name: Annotated[str, argument("LOAD", 'Bus of the load, e.g. "48"; in an imported feeder, its name.')],
     live: LiveRun,
     factor: Annotated[float | None, option("X", "Factor on the power of the feeder's table; 1 restores it.")] = None,
     P: Annotated[float | None, option("KW", "Real power at nominal voltage.", "--P")] = None,
@@ -140,7 +142,7 @@ def load(
 ) -> None:
     """Set a load of a running plant.
 
-    The power changes at the next step, in proportion in all phases. Without --P or --Q that power stays. In a scenario,
+    The power changes at the next step, in all phases in proportion. A power that is not given stays. In a scenario,
     load = { 48 = { factor = 1.5 } } in an [[event]] does the same.
 
     Example:  gridpeers load 48 --factor 1.5

@@ -42,7 +42,7 @@ Keys = Annotated[
 ]
 As = Annotated[str, option("NAME", "With --keys, the member whose certificate is used; operator if left out.", "--as")]
 Insecure = Annotated[
-    bool, flag("Allow an open endpoint beyond the loopback: everybody who reaches it has access.", "--insecure")
+    bool, flag("Allow an unencrypted endpoint beyond the loopback, open to everybody who reaches it.", "--insecure")
 ]
 
 

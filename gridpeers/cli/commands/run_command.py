@@ -43,23 +43,22 @@ def run(
     clock: Annotated[
         str,
         option(
-            "simulated|realtime", "simulated: in lock-step, the same result every time; realtime: agents run freely."
+            "simulated|realtime",
+            "simulated: in lock-step, with the same result every time; realtime: each agent by its own clock.",
         ),
     ] = "simulated",
-    speed: Annotated[float, option("X", "With --clock realtime: seconds of the run per second of real time.")] = 1.0,
-    strict: Annotated[bool, flag("With --clock realtime: break the run if it cannot keep pace.", "--strict")] = False,
+    speed: Annotated[float, option("X", "With --clock realtime: seconds of run time per second of real time.")] = 1.0,
+    strict: Annotated[bool, flag("With --clock realtime: end the run if it cannot keep pace.", "--strict")] = False,
     plant: Annotated[
         str | None,
-        option("NAME", "Simulator of the plant: gridpeers, gridlabd or helics; that of the scenario if left out."),
+        option("NAME", "Simulator of the plant: gridpeers, gridlabd or helics; the scenario's if left out."),
     ] = None,
     processes: Annotated[int, option("N", "Number of processes that the agents share; 0: one per agent.")] = 0,
     keys: Keys = None,
     case: Annotated[str | None, option("NAMES", "Cases to run, e.g. I,IV; all if left out.")] = None,
     seed: Annotated[int | None, option("N", "Seed instead of the one in the scenario.", min=0)] = None,
     require_checks: Annotated[bool, flag("End with code 1 if a check fails unexpectedly.", "--require-checks")] = False,
-    details: Annotated[
-        bool, flag("Print the whole report, as report.txt has it: tables, claims, checks, notes.", "--details")
-    ] = False,
+    details: Annotated[bool, flag("Print the whole report.txt: tables, claims, checks, notes.", "--details")] = False,
     figures: FigureFormat = "png",
     out: Annotated[
         Path | None, option("DIR", "Folder for the results, new or empty; runs/SCENARIO/TIME if left out.")

@@ -28,11 +28,11 @@ def list_() -> None:
         typer.echo(f"{name:{width}}  {title}. Cases: {', '.join(cases)}")
 
 
-def check(file: Annotated[str, argument("FILE", "Path of a scenario file, or a name from the catalogue.")]) -> None:
+def check(file: Annotated[str, argument("FILE", "A name that `gridpeers list` shows, or the path of a file.")]) -> None:
     """Check a scenario file and its feeder for problems.
 
     It lists all problems at once. If there is none, it solves the operating point of the feeder at the start. Notes
-    name the buses that an event de-energises, and graphs that bear fewer liars than their law should.
+    name buses that an event de-energises, and graphs with too few links for a law that resists liars.
 
     Example:  gridpeers check my-islanding.toml
     """
@@ -50,8 +50,8 @@ def check(file: Annotated[str, argument("FILE", "Path of a scenario file, or a n
 def doc(topic: Annotated[Topic, argument("TOPIC", "Topic of the page.")]) -> None:
     """Print a reference page that is made from the code.
 
-    keys and messages are those of the protocol; scenario has the keys of a scenario file, with units and defaults;
-    laws, inverters, metrics, claims, checks, faults and graphs list what you can plug in, yours included.
+    keys and messages describe the protocol, scenario the keys of a scenario file, and feeder the tables of a feeder.
+    The other topics list the plug-ins, yours too, with their parameters.
 
     Example:  gridpeers doc scenario
     """
@@ -102,11 +102,10 @@ def export(
 ) -> None:
     """Write a run's tables as CSV, Parquet, MATLAB or Excel files.
 
-    The tables come from the record run.mcap, also of a run that was killed or goes on; a note then says where they
-    end. csv, parquet and feather write a file for each table, mat and xlsx one for all. Files of the same name are
-    replaced.
+    The tables come from the record run.mcap. If the run was killed or still goes on, a note says where they end. csv,
+    parquet and feather write a file for each table; mat and xlsx write one file. Files of the same name are replaced.
 
-    Exit code: 0 written, 2 bad usage, no record, no rows, or a folder that cannot be written.
+    Exit code: 0 if written; 2 for wrong options, no record, no rows, or a folder that cannot be written.
 
     Example:  gridpeers export runs/islanding/latest --to parquet
     """

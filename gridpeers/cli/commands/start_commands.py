@@ -41,9 +41,11 @@ class Start:
     connect: Annotated[
         list[str] | None, option("ENDPOINT", "Endpoint that the plant connects to, e.g. a Zenoh router; repeatable.")
     ] = None
-    speed: Annotated[float, option("X", "Seconds of the run per second, 0.1 to 50; 1 is real time.")] = 1.0
-    wait: Annotated[float, option("SECONDS", "How long the plant waits for its agents before it starts.")] = 30.0
-    duration: Annotated[float | None, option("SECONDS", "Run time of the end; no end if left out.", "--for")] = None
+    speed: Annotated[float, option("X", "Seconds of run time per second of real time, 0.1 to 50.")] = 1.0
+    wait: Annotated[float, option("SECONDS", "Longest wait of the plant for its agents before the start.")] = 30.0
+    duration: Annotated[
+        float | None, option("SECONDS", "Run time (s) at which the run ends; no end if left out.", "--for")
+    ] = None
     strict: Annotated[bool, flag("End with exit code 3 if the plant cannot keep pace.", "--strict")] = False
     out: Annotated[Path | None, option("DIR", "Record the run in this new folder, and measure it at its end.")] = None
     figures: FigureFormat = "png"

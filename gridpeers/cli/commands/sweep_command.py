@@ -32,9 +32,11 @@ if TYPE_CHECKING:
 
 
 def sweep(
-    file: Annotated[str, argument("FILE", "Path of a sweep file, or a name, e.g. gains, topology.")],
-    out: Annotated[Path | None, option("DIR", "Folder, new or of this sweep; runs/sweeps/NAME if left out.")] = None,
-    jobs: Annotated[int | None, option("N", "Processes; one per core if left out.", min=1)] = None,
+    file: Annotated[str, argument("FILE", "Path of a sweep file, or a name such as gains or topology.")],
+    out: Annotated[
+        Path | None, option("DIR", "Folder, new or begun by this sweep; runs/sweeps/NAME if left out.")
+    ] = None,
+    jobs: Annotated[int | None, option("N", "Parallel processes; one per core if left out.", min=1)] = None,
     dry_run: Annotated[bool, flag("Check every run, print their number, and run nothing.", "--dry-run")] = False,
 ) -> None:
     """Run a scenario many times over values of its keys.

@@ -36,7 +36,7 @@ def reproduce(
         int | None, option("N", "Seed instead of those of the scenarios, also for random graphs.", min=0)
     ] = None,
     jobs: Annotated[
-        int | None, option("N", "Random graphs that run at a time; one per core if left out.", min=1)
+        int | None, option("N", "Random graphs that run in parallel; one per core if left out.", min=1)
     ] = None,
     out: Annotated[
         Path | None, option("DIR", "Folder for the report, new or empty; runs/reproduce/TIME if left out.")
