@@ -72,8 +72,8 @@ def why(
 ) -> None:
     """Explain a decision of an agent, term by term.
 
-    From the record it shows the measurement, each neighbour with the age of its state, each term of the law, and the
-    limits. docs/how-to/explain-a-run.md has examples.
+    It shows the measurement, each neighbour with the age of its state, each term of the law, and the limits.
+    docs/how-to/explain-a-run.md has examples.
 
     Example:  gridpeers why runs/islanding/latest/IV inv4 4.3
     """

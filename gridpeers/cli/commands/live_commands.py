@@ -41,7 +41,7 @@ def agent(
     run: Run = RUN,
     connect: Connect = None,
     listen: Annotated[
-        list[str] | None, option("ENDPOINT", "Where this process listens for other agents; a free port if left out.")
+        list[str] | None, option("ENDPOINT", "Endpoint for other agents; a free port if left out.")
     ] = None,
     wait: Wait = 60.0,
     keys: Keys = None,
@@ -115,7 +115,7 @@ def stop(inverter: Annotated[str, argument("INVERTER", "Inverter of the agent, e
 
 @of_live_run
 def event(
-    action: Annotated[Literal["open", "close"], argument("open|close", "What to do with the switch.")],
+    action: Annotated[Literal["open", "close"], argument("open|close", "Operation of the switch.")],
     switch: Annotated[str, argument("SWITCH", 'Name of the switch, e.g. "13-152" or "sw1_2".')],
     live: LiveRun,
     synchronised: Annotated[

@@ -33,9 +33,7 @@ if TYPE_CHECKING:
     from gridpeers.scenarios.live.run_client import RunClient
 
 Run = Annotated[str, option("NAME", "Name of the run; runs of other names do not hear each other.")]
-Connect = Annotated[
-    list[str] | None, option("ENDPOINT", f"Where the plant listens, {ENDPOINT} if left out; repeatable.")
-]
+Connect = Annotated[list[str] | None, option("ENDPOINT", f"Endpoint of the plant, {ENDPOINT} if left out; repeatable.")]
 Wait = Annotated[float, option("SECONDS", "Longest wait for the plant.")]
 Keys = Annotated[
     Path | None, option("DIR", "Folder with certificates; links are then TLS (docs/how-to/several-hosts.md).")

@@ -56,7 +56,7 @@ def run(
     processes: Annotated[int, option("N", "Number of processes that the agents share; 0: one per agent.")] = 0,
     keys: Keys = None,
     case: Annotated[str | None, option("NAMES", "Cases to run, e.g. I,IV; all if left out.")] = None,
-    seed: Annotated[int | None, option("N", "Seed instead of the one in the scenario.", min=0)] = None,
+    seed: Annotated[int | None, option("N", "Seed in place of the scenario's.", min=0)] = None,
     require_checks: Annotated[bool, flag("End with code 1 if a check fails unexpectedly.", "--require-checks")] = False,
     details: Annotated[bool, flag("Print the whole report.txt: tables, claims, checks, notes.", "--details")] = False,
     figures: FigureFormat = "png",

@@ -98,7 +98,7 @@ def export(
         Literal["csv", "parquet", "feather", "mat", "xlsx"], typer.Option(help="Format: text, Arrow, MATLAB or Excel.")
     ] = "csv",
     case: Annotated[str, option("NAME", "Case of the run; all if left out.")] = "",
-    out: Annotated[Path | None, option("DIR", "Folder for the files; that of each record if left out.")] = None,
+    out: Annotated[Path | None, option("DIR", "Folder for the files; beside each record if left out.")] = None,
 ) -> None:
     """Write a run's tables as CSV, Parquet, MATLAB or Excel files.
 

@@ -36,7 +36,7 @@ class Start:
     case: Annotated[str, option("NAME", "Case of the scenario; the last one if left out.")] = ""
     run: Run = RUN
     listen: Annotated[
-        str, option("ENDPOINT", "Where the plant listens; for other hosts tls/0.0.0.0:7447 with --keys.", "--listen")
+        str, option("ENDPOINT", "Endpoint of the plant; for other hosts tls/0.0.0.0:7447 with --keys.", "--listen")
     ] = ENDPOINT
     connect: Annotated[
         list[str] | None, option("ENDPOINT", "Endpoint that the plant connects to, e.g. a Zenoh router; repeatable.")

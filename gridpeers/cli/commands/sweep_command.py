@@ -37,7 +37,7 @@ def sweep(
         Path | None, option("DIR", "Folder, new or begun by this sweep; runs/sweeps/NAME if left out.")
     ] = None,
     jobs: Annotated[int | None, option("N", "Parallel processes; one per core if left out.", min=1)] = None,
-    dry_run: Annotated[bool, flag("Check every run, print their number, and run nothing.", "--dry-run")] = False,
+    dry_run: Annotated[bool, flag("Check all runs, print their number, and start none.", "--dry-run")] = False,
 ) -> None:
     """Run a scenario many times over values of its keys.
 

@@ -33,7 +33,7 @@ def reproduce(
         str | None, option("WHAT", "Part of the report: tables (without figures), figures, or the name of a scenario.")
     ] = None,
     seed: Annotated[
-        int | None, option("N", "Seed instead of those of the scenarios, also for random graphs.", min=0)
+        int | None, option("N", "Seed of all scenarios and random graphs, in place of theirs.", min=0)
     ] = None,
     jobs: Annotated[
         int | None, option("N", "Random graphs that run in parallel; one per core if left out.", min=1)
