@@ -45,8 +45,8 @@ class Protection(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     enter_service: Annotated[
         float, Unit("s"), Plausible("the delay of entering service", 0.01, 3600.0, above_zero=True)
     ] = 5.0
-    """Time (s) of normal voltage and frequency before a tripped inverter returns: 0.917 to 1.05 pu, and 59.5 to 60.1
-    Hz, in proportion at another nominal frequency. The default of the standard is 300 s."""
+    """Time (s) of normal voltage and frequency before a tripped inverter returns. Normal is 0.917 to 1.05 pu, and 59.5
+    to 60.1 Hz, in proportion at another nominal frequency. The default of the standard is 300 s."""
 
 
 class SwitchEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -135,8 +135,8 @@ class Gfl(InverterModel, frozen=True, kw_only=True):
     """Lag of the P reference (s). GridLAB-D's default 0.5 s is too slow for consensus in 1 s."""
     T_vf: Annotated[TimeConstant, "Filter of measured V (s)."] = 0.05
     T_qf: TimeConstant = 0.1
-    """Lag of the Q reference (s). With 5 % droop the gain from V to Q is 20: with T_vf_s = 0.02 and T_qf_s = 0.05, one
-    GFM with four GFL oscillates on this feeder. GridLAB-D's 0.2 s only slows the sharing of vars."""
+    """Lag of the Q reference (s). 5 % droop is a gain of 20 from V to Q. With T_vf_s = 0.02 and T_qf_s = 0.05, one GFM
+    with four GFL oscillates on this feeder. GridLAB-D's 0.2 s only slows the sharing of vars."""
     db_UF: Annotated[FrequencyBand, "Dead band below nominal frequency (Hz)."] = 0.0
     db_OF: Annotated[FrequencyBand, "Dead band above nominal frequency (Hz)."] = 0.0
     db_UV: Annotated[VoltageBand, "Dead band below V_set (pu)."] = 0.0

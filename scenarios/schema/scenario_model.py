@@ -253,8 +253,8 @@ class ScenarioModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     """Table `[protection]`: when inverters trip, and when they return."""
     law: LawKey = "consensus"
     """Control law of the agents: a name from `gridpeers doc laws`, or "mine:Mine" for the class Mine of mine.py beside
-    this file. A table `[law]` takes one of use, command = ["./mylaw"] (a program) and fmu = "law.fmu"; the parameters
-    of the law; and time_limit_s, the longest time of one step."""
+    this file. A table `[law]` takes one of use, command = ["./mylaw"] (a program) and fmu = "law.fmu". It also takes
+    the parameters of the law, and time_limit_s, the longest time of one step."""
     on_law_failure: OnLawFailure = "droop"
     """Consequence of an error in a law, or in a graph of your own. "droop": the inverter of that agent stays on primary
     droop, and the check "law_failed" fails. "stop": the run ends at the error. Both fail the run."""
