@@ -143,17 +143,18 @@ _UNDATED: Mapping[Format, dict[str, Any]] = {"png": {}, "pdf": {"CreationDate": 
 """Metadata that leave the time of writing out of a file."""
 
 
+@mpl.rc_context(PAGE | _REPRODUCIBLE)
 def save(
     figure: Figure, folder: Path, name: str, formats: Sequence[Format] = ("png",), dpi: float | None = None
 ) -> tuple[Path, ...]:
     folder.mkdir(parents=True, exist_ok=True)
     if (layout := figure.get_layout_engine()) is not None:
-        layout.execute(figure)  # once, as no file changes it
+        layout.execute(figure)  # once, as no file changes it; with the ticks that these sizes of text give
         figure.set_layout_engine("none")
     files = []
     for kind in formats:
         unfinished, file = folder / f".{name}.{kind}", folder / f"{name}.{kind}"
-        with mpl.rc_context(PAGE | _REPRODUCIBLE), unfinished.open("wb") as stream:  # closed whatever goes wrong
+        with unfinished.open("wb") as stream:  # closed whatever goes wrong
             figure.savefig(stream, format=kind, metadata=_UNDATED[kind], dpi=dpi or PAGE["savefig.dpi"])
         unfinished.replace(file)
         files.append(file)

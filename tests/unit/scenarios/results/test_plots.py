@@ -79,6 +79,19 @@ def test_a_case_has_one_colour_everywhere_and_no_two_share_it() -> None:
     assert len({colour for colour, _ in STYLES}) == 6
 
 
+def test_labels_beside_wide_ticks_are_within_the_figure(tmp_path: Path) -> None:
+    """The layout has the ticks of the file: the borders stay blank."""
+    made_up = drawing("I", "IV")
+    history = made_up.histories["I"]
+    late = (history.t > 1.0)[:, None]  # ticks like 59.75 and 0.025
+    wide = replace(history, f=history.f - 0.25 * late, V=history.V * (1.0 + 0.03 * late))
+    page = draw(replace(made_up, histories=made_up.histories | {"I": wide}), "overview")
+    pixels = imread(*save(page, tmp_path, "overview"))[:, :, :3]
+
+    for border in (pixels[:, :3], pixels[:, -3:], pixels[:3], pixels[-3:]):
+        assert border.min() == 1.0
+
+
 @pytest.mark.parametrize("kind", ["pdf", "svg"])
 def test_a_figure_has_the_same_bytes_each_time_it_is_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: Format
