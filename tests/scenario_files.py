@@ -10,14 +10,12 @@ from gridpeers.scenarios.schema import ScenarioError, load_scenario
 
 
 def written(folder: Path, text: str) -> Path:
-    """A scenario file with this text."""
     path = folder / "mine.toml"
     path.write_text(text, encoding="utf-8")
     return path
 
 
 def problems(folder: Path, text: str) -> tuple[str, ...]:
-    """Problems of a scenario file of this text."""
     with pytest.raises(ScenarioError) as caught:
         load_scenario(written(folder, text))
     return caught.value.problems

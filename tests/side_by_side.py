@@ -22,8 +22,7 @@ ONE_RUN = ("tests/golden/catalogue", "tests/papers/singhal2022", "tests/conforma
 """Tests that look at the same runs of the catalogue: one worker has them all, and runs each case once."""
 
 
-EACH = ("tests/pages", "tests/validation")
-"""Tests that take seconds and share nothing: any worker has any of them."""
+EACH = ("tests/pages", "tests/validation")  # Tests that take seconds and share nothing: any worker has any of them
 
 SLOW = {
     "tests/processes": "processes and real time",

@@ -46,16 +46,13 @@ def test_every_graph_gives_the_same_telemetry(graph: GraphRule) -> None:
     assert both(Control(secondary="all", graph=graph))[1] == ""
 
 
-@pytest.mark.parametrize(
-    "options",
-    [
-        DegradedCommunication(stale="skip"),
-        DegradedCommunication(stale="age-weighted", T_age=0.05, weights="degree-normalised"),
-        DegradedCommunication(max_age=0.03, anti_windup="conditional", T_sat=0.1),
-        DegradedCommunication(islands="frequency"),
-        DegradedCommunication(islands="ignored", anti_windup="none"),
-    ],
-)
+@pytest.mark.parametrize("options", [
+    DegradedCommunication(stale="skip"),
+    DegradedCommunication(stale="age-weighted", T_age=0.05, weights="degree-normalised"),
+    DegradedCommunication(max_age=0.03, anti_windup="conditional", T_sat=0.1),
+    DegradedCommunication(islands="frequency"),
+    DegradedCommunication(islands="ignored", anti_windup="none"),
+])  # fmt: skip
 def test_every_option_for_degraded_communication_gives_the_same_telemetry(options: DegradedCommunication) -> None:
     """Arrivals, ages, angles and saturation equal those with messages."""
     both(Control(secondary="all", graph="ring", degraded_communication=options))

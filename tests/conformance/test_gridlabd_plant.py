@@ -33,7 +33,6 @@ def islanding() -> gp.Scenario:
 
 @pytest.fixture(scope="module")
 def case_IV(islanding: gp.Scenario) -> Result:
-    """Its case IV on GridLAB-D."""
     return islanding.run("IV")
 
 

@@ -67,8 +67,7 @@ def test_metrics_are_finite_where_there_is_power_and_absent_where_there_is_none(
         assert set(found[label].p.values()) == {0.0}
 
 
-EVENT, END = 4.0, 9.0
-"""When the microgrid falls into three islands, and when it is looked at (s)."""
+EVENT, END = 4.0, 9.0  # When the microgrid falls into three islands, and when it is looked at (s)
 PLATES = Nameplates.of(read_feeder("microgrid123").inverters)
 
 

@@ -113,5 +113,4 @@ def test_a_sweep_takes_a_metric_as_a_function_and_varies_parameters(project: Pat
 
 
 def lost(window):  # type: ignore[no-untyped-def]
-    """Asks for an inverter that there is not."""
     return window.history["inv99"]["f"].min()

@@ -54,15 +54,12 @@ def test_emulated_links_and_nodes(tmp_path: Path) -> None:
     assert sum(len(trace.seq) for trace in record.links()) == len([row for row in rows if "copy" not in row]) > 10_000
 
 
-@pytest.mark.parametrize(
-    ("scenario", "case"),
-    [
-        ("partition", "halves-expire"),
-        ("unheard-switches", "frequency"),
-        ("reduced-communication", "reduced"),
-        ("plug-n-play", "IV"),
-    ],
-)
+@pytest.mark.parametrize(("scenario", "case"), [
+    ("partition", "halves-expire"),
+    ("unheard-switches", "frequency"),
+    ("reduced-communication", "reduced"),
+    ("plug-n-play", "IV"),
+])  # fmt: skip
 def test_agents_with_a_memory(scenario: str, case: str, tmp_path: Path) -> None:
     """Ages, islands by frequency, quiet laws, and an agent that leaves and joins again."""
     assert_decisions_are_recorded(recorded_run(scenario, case, tmp_path / case), "inv1", "inv2", "inv5")

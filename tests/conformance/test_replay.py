@@ -106,17 +106,14 @@ def test_a_replay_of_a_part_claims_equality_of_that_part_alone(run: Result, tmp_
     assert "within 1e-9." not in text
 
 
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
-        (("--without", "inv4 -> inv77"), 'there is no "inv77"'),
-        (("--without", "inv4"), '"inv4" names no links'),
-        (("--law", "dappi"), 'did you mean "dapi"'),
-        (("--set", "gains.kp=1"), 'did you mean "k_p"'),
-        (("--set", "gains.k_p"), "needs a key and its value, as gains.k_p=0.001"),
-        (("--from", "0.5"), "nothing changes from then on"),
-    ],
-)
+@pytest.mark.parametrize(("words", "told"), [
+    (("--without", "inv4 -> inv77"), 'there is no "inv77"'),
+    (("--without", "inv4"), '"inv4" names no links'),
+    (("--law", "dappi"), 'did you mean "dapi"'),
+    (("--set", "gains.kp=1"), 'did you mean "k_p"'),
+    (("--set", "gains.k_p"), "needs a key and its value, as gains.k_p=0.001"),
+    (("--from", "0.5"), "nothing changes from then on"),
+])  # fmt: skip
 def test_an_impossible_change_is_refused(words: tuple[str, ...], told: str, run: Result, elsewhere: Path) -> None:
     """Each is one line with exit code 2; no folder of results remains."""
     code, text = invoke("replay", str(run.folder), *words)

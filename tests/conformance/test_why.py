@@ -184,16 +184,13 @@ def test_the_command(islanded: RunRecord) -> None:
     assert "\x1b" not in printed
 
 
-@pytest.mark.parametrize(
-    ("arguments", "complaint"),
-    [
-        (("inv77", "0.5"), "there was no agent inv77; agents are inv1-9"),
-        (("plant", "0.5"), "there was no agent plant; agents are inv1-9"),
-        (("inv4", "7"), "t = 7 s is outside of the record, which has 0 to 0.80 s"),
-        (("inv4", "nan"), "needs a run time in s"),
-        (("inv4", "0.5", "--case", "V"), 'it is the record of one case, and "V" is another one; leave --case out'),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "complaint"), [
+    (("inv77", "0.5"), "there was no agent inv77; agents are inv1-9"),
+    (("plant", "0.5"), "there was no agent plant; agents are inv1-9"),
+    (("inv4", "7"), "t = 7 s is outside of the record, which has 0 to 0.80 s"),
+    (("inv4", "nan"), "needs a run time in s"),
+    (("inv4", "0.5", "--case", "V"), 'it is the record of one case, and "V" is another one; leave --case out'),
+])  # fmt: skip
 def test_bad_input(arguments: tuple[str, ...], complaint: str, islanded: RunRecord) -> None:
     """One line has the problem and the valid names."""
     code, printed = invoke("why", str(islanded.path.parent), *arguments)

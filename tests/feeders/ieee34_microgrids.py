@@ -48,7 +48,6 @@ PLACES = {
 
 
 def ieee34_microgrids() -> Tables:
-    """Return the feeder, by the OpenDSS engine."""
     text = SCRIPT.read_text(encoding="utf-8")
     text = re.sub(r"taps=\(1 [\d.]+\)", "taps=(1 1)", text).replace("pu=1.05", "pu=1.0")
     with tempfile.TemporaryDirectory() as folder:

@@ -14,8 +14,7 @@ from time import perf_counter
 from tests.fuzz.mutation import Mutation
 from tests.fuzz.receivers import receivers
 
-SEED = 16
-"""Seed of the command and of the test."""
+SEED = 16  # Seed of the command and of the test
 
 
 class FuzzError(AssertionError):

@@ -19,8 +19,7 @@ from tests.fuzz.mutation import NUMBERS, TEXTS
 from tests.record.recorded_runs import toy_info
 from tests.toy.toy_configs import toy_configs
 
-T_END = 1.0
-"""End of the run (s)."""
+T_END = 1.0  # End of the run (s)
 
 
 class JournalFile:

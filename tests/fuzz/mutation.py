@@ -14,8 +14,7 @@ from gridpeers.wire.codec import CRC
 from gridpeers.wire.messages import MESSAGES
 from tests.hostile.cases import cases, packed, sealed, sound
 
-EPOCH = 7
-"""Epoch in which everybody really lives."""
+EPOCH = 7  # Epoch in which everybody really lives
 
 SENDERS = ("plant", "inv1", "inv2", "inv3", "inv9", "visitor")
 

@@ -46,11 +46,8 @@ from tests.hostile.scenes import (
 )
 from tests.toy.toy_configs import agent_config
 
-LIFE = 2_000
-"""Messages after which a core is made anew: a false one may have ended what it does."""
-
-TICK = 200
-"""Messages between two ticks of its honest peers."""
+LIFE = 2_000  # Messages after which a core is made anew: a false one may have ended what it does
+TICK = 200  # Messages between two ticks of its honest peers
 
 
 class Receiver(Protocol):

@@ -52,7 +52,6 @@ class Case(NamedTuple):
 
 
 def sealed(body: bytes) -> bytes:
-    """Bytes with a checksum that is right."""
     return body + crc32(body).to_bytes(CRC, "little")
 
 

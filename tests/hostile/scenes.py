@@ -18,8 +18,7 @@ from tests.toy.toy_plant import ToyPlant
 
 KEYS = Keys("toy")
 T_C = 0.02
-EPOCH = 7
-"""That in which everybody really lives."""
+EPOCH = 7  # That in which everybody really lives
 
 NAMES = ("inv1", "inv2", "inv3")
 INSTANCES = {"inv1": "a", "inv2": "b", "inv3": "c"}

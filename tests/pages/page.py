@@ -208,7 +208,6 @@ class PageRun:
         problems.raise_if_any()
 
     def end(self) -> None:
-        """End what the page has left running."""
         for group in self._groups:
             with suppress(ProcessLookupError):
                 os.killpg(group, signal.SIGKILL)

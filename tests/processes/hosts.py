@@ -57,7 +57,6 @@ class Hosts:
         self._ip("-n", self._switch, "link", "set", self._port(host), "nomaster")
 
     def heal(self, host: int) -> None:
-        """Bring a host back."""
         self._ip("-n", self._switch, "link", "set", self._port(host), "master", "br0")
 
     @property

@@ -15,8 +15,7 @@ from types import TracebackType
 
 from tests.command_line import invoke
 
-DEADLINE = 80.0
-"""Longest wait (s) for any line, of a command that runs; on an idle machine all come within 3 s."""
+DEADLINE = 80.0  # Longest wait (s) for any line, of a command that runs; on an idle machine all come within 3 s
 
 
 class Terminal:
@@ -43,12 +42,10 @@ class Terminal:
 
     @property
     def pid(self) -> int:
-        """Process id."""
         return self._process.pid
 
     @property
     def text(self) -> str:
-        """All that it has printed."""
         return "".join(self.lines)
 
     def expect(self, pattern: str, deadline: float = DEADLINE) -> re.Match[str]:
@@ -76,7 +73,6 @@ class Terminal:
                 assert waits or text in self.text, f"{self}: no {text!r}. It printed:\n{self.text}"
 
     def signal(self, number: int) -> None:
-        """Send a signal to the process."""
         self._process.send_signal(number)
 
     def end(self, deadline: float = DEADLINE) -> int:
@@ -89,7 +85,6 @@ class Terminal:
         return status
 
     def kill(self) -> None:
-        """End it, whatever state it is in."""
         if self._process.poll() is None:
             self._process.send_signal(signal.SIGCONT)
             self._process.send_signal(signal.SIGTERM)

@@ -41,11 +41,8 @@ Node = PlantNode | AgentNode
 Delay = Callable[[str, str, str, int], float | None]
 """Returns how long (s) a message is on the wire, by sender, receiver, key and number on that link; None: it is lost."""
 
-START = 1000.0
-"""Time (s) on the fake clock at which the processes start."""
-
-READY = 0.26
-"""Time (s) after which the run is at t = 0, about: all have met, and the plant has waited its lead."""
+START = 1000.0  # Time (s) on the fake clock at which the processes start
+READY = 0.26  # Time (s) after which the run is at t = 0, about: all have met, and the plant has waited its lead
 
 
 def at_once(src: str, dst: str, key: str, number: int) -> float:

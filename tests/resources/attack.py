@@ -20,8 +20,7 @@ from gridpeers.wire.messages import Command, Measurement, State, Stop
 from tests.hostile.cases import packed, sound
 
 LINKED = "linked"
-RATE = 10_000.0
-"""Messages a second."""
+RATE = 10_000.0  # Messages a second
 
 
 class Attack(msgspec.Struct, kw_only=True):

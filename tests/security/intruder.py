@@ -20,8 +20,7 @@ from gridpeers.wire.messages import Message
 from gridpeers.wire.trust.credentials import Credentials
 from gridpeers.wire.trust.key_folder import open_credentials
 
-PATIENCE = 60.0
-"""Longest wait (s) for anything."""
+PATIENCE = 60.0  # Longest wait (s) for anything
 
 
 class Intruder:

@@ -20,8 +20,7 @@ from tests.toy.town import Town
 
 pytest.importorskip("cryptography", reason="certificates need the extra keys")
 
-LIE = 12345.0
-"""Set-point (W) that no honest agent of the toy has."""
+LIE = 12345.0  # Set-point (W) that no honest agent of the toy has
 
 
 def state_of(town: Town, name: str, seq: int = 0, sender: str = "") -> State:

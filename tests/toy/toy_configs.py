@@ -11,8 +11,7 @@ from tests.toy.toy_plant import F_NOM, M_P, P_RATED, V_NOM
 Schedule = tuple[tuple[float, str, Literal["leave", "join"]], ...]
 """Time (s), inverter, and whether it leaves or joins."""
 
-ALL_FULL = Control(secondary="all", graph="full")
-"""Case IV."""
+ALL_FULL = Control(secondary="all", graph="full")  # Case IV
 
 
 def agent_config(name: str, control: Control = ALL_FULL, *, deadline: float = 10.0, run: str = "toy") -> AgentConfig:

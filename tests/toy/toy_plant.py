@@ -16,8 +16,7 @@ from gridpeers.wire.messages import LoadSetting, PlantEvent
 M_P, F_NOM, V_NOM, P_RATED, LOAD = 0.01, 60.0, 277.0, 100e3, 0.8
 """Droop (pu), nominal frequency (Hz) and voltage (V), rating (W), load per inverter in the island (pu)."""
 
-ISLANDING = 0.1
-"""Time (s) at which the grid is lost."""
+ISLANDING = 0.1  # Time (s) at which the grid is lost
 
 
 class ToyPlant(RecordedPlant):

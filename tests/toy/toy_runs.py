@@ -17,8 +17,7 @@ from gridpeers.scenarios.run_request import Outcome
 from gridpeers.wire.messages import PlantEvent, Telemetry
 from tests.toy import toy_plant
 
-TOY = (toy_plant.__file__,)
-"""Command of the toy plant's process."""
+TOY = (toy_plant.__file__,)  # Command of the toy plant's process
 
 Rows = list[tuple[float, ...]]
 COLUMNS = ("f (Hz)", "P (W)", "Q (var)", "V (V)", "P_set (W)", "V_set (V)")

@@ -251,7 +251,6 @@ class DaeDynamics(Dynamics):
         return np.array([self._read(x) for x in solution.y.T])
 
     def slopes(self, t: float, x: Real) -> Real:
-        """Return the time derivatives of all states."""
         gfm, gfl, _, V = self._algebraic(x)
         P_set, V_set, _ = self.inverters.set_points.T
         former, follower = self._places()

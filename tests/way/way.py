@@ -36,8 +36,7 @@ ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "architecture.md"
 BEGIN, END = "<!-- begin: python -m tests.way.way --write -->\n", "<!-- end -->\n"
 
-TICK = 55
-"""In the islanded microgrid, at t = 1.1 s."""
+TICK = 55  # In the islanded microgrid, at t = 1.1 s
 
 FAULTS = (Fault(on="* -> *", loss=1e-6),)
 """Between agents alone: a fault of a link of the plant has the same steps as that of the leg to the neighbour."""
@@ -198,7 +197,6 @@ def way() -> dict[str, list[tuple[str, str]]]:
 
 
 def files_of(leg: Sequence[tuple[str, str]]) -> dict[str, list[str]]:
-    """Return the functions of a leg by file."""
     return {file: [name for other, name in leg if other == file] for file in dict.fromkeys(file for file, _ in leg)}
 
 

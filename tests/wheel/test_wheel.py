@@ -20,8 +20,7 @@ import gridpeers as gp
 from tests.golden.catalogue.pins import ran
 
 HOME = Path(gp.__file__).parent
-NEIGHBOUR = "openai-agents"
-"""A distribution with a package `agents`."""
+NEIGHBOUR = "openai-agents"  # A distribution with a package `agents`
 
 PIP = (sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet")
 

@@ -16,8 +16,7 @@ from tests.conformance.laws.consensus_fmi3 import NAME, build, described
 from tests.conformance.laws.law_runs import SHORT, islanding, written
 
 HERE = Path(__file__).parent
-PATIENT = {"time_limit_s": 30.0}
-"""A busy machine is no reason to fail."""
+PATIENT = {"time_limit_s": 30.0}  # A busy machine is no reason to fail
 
 
 @pytest.fixture(scope="module")

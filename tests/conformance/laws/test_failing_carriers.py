@@ -24,7 +24,6 @@ NAME = "FailingFmu.fmu"
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where the FMU is that fails on demand."""
     place = tmp_path_factory.mktemp("fmu")
     source = str(Path(__file__).parent / "failing_fmu.py")
     subprocess.run([sys.executable, "-m", "pythonfmu", "build", "-f", source, "-d", str(place)], check=True)
@@ -91,8 +90,7 @@ def test_an_fmu_that_cannot_be_loaded_is_reported(
 
 OWN = Own("inv1", True, 0.0, 0.5, 0.0, 1.0, 0.0, 0.0, 0.5, 1.0, 0.01, 0.05, 6e5, 277.0, 60.0)
 
-STAYS = "sleep 600 & sleep 600"
-"""A shell that ignores the end of its input, and has started another program."""
+STAYS = "sleep 600 & sleep 600"  # A shell that ignores the end of its input, and has started another program
 
 AGENT = f"""
 import os, signal
@@ -121,8 +119,7 @@ def test_programs_that_ignore_the_end_of_their_input_are_waited_for_together() -
 SHORT, ENDS, LONG = 0.05, 0.3, 6.0
 """Limits (s) of a program that never answers, of one that ends meanwhile, and of one that answers sooner or later."""
 
-READY = 'echo \'{"type": "ready"}\'; read -r _'
-"""Answers the start, and takes the step."""
+READY = 'echo \'{"type": "ready"}\'; read -r _'  # Answers the start, and takes the step
 
 
 @pytest.mark.parametrize(("script", "limit", "said"), [
@@ -143,7 +140,6 @@ def test_a_program_with_a_wrong_answer_fails_with_one_line(script: str, limit: f
 
 
 def test_a_closed_law_raises_an_error(tmp_path: Path) -> None:
-    """A closed law raises an error when it is called, and can be closed twice."""
     law = ProgramLaw(LawChoice(command=("cat",), folder=str(tmp_path)))
     law.close()
     law.close()

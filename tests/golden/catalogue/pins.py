@@ -19,11 +19,8 @@ from gridpeers.scenarios.run_request import Outcome
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.schema.configs import configs
 
-FILE = Path(__file__).parent / "hashes.toml"
-"""The pins."""
-
-QUANTITIES = ("f_Hz", "P_W", "Q_var", "V_V", "P_set_W", "V_set_V")
-"""What the last row of the first inverter has."""
+FILE = Path(__file__).parent / "hashes.toml"  # The pins
+QUANTITIES = ("f_Hz", "P_W", "Q_var", "V_V", "P_set_W", "V_set_V")  # What the last row of the first inverter has
 
 
 class Pin(NamedTuple):

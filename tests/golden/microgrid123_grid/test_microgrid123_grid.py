@@ -14,8 +14,7 @@ from gridpeers.plant.plant_config import PlantSettings
 from gridpeers.plant.tables import read_feeder
 
 HERE = Path(__file__).parent
-Z_GFM = 0.0025 + 0.05j
-"""Coupling impedance of the GFM in the study (pu of the own rating)."""
+Z_GFM = 0.0025 + 0.05j  # Coupling impedance of the GFM in the study (pu of the own rating)
 
 
 def rows(file: str) -> list[dict[str, str]]:

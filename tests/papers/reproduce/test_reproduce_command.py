@@ -35,13 +35,10 @@ def test_one_part_from_end_to_end(tmp_path: Path) -> None:
     }
 
 
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
-        (["--only", "table"], '--only: no part "table"; did you mean "tables"?'),
-        (["--out", __file__], "this is a file; give a new or an empty folder"),
-    ],
-)
+@pytest.mark.parametrize(("words", "told"), [
+    (["--only", "table"], '--only: no part "table"; did you mean "tables"?'),
+    (["--out", __file__], "this is a file; give a new or an empty folder"),
+])  # fmt: skip
 def test_a_wrong_option_is_refused_before_any_run(words: list[str], told: str) -> None:
     """Exit code 2, and a sentence with the right choice."""
     code, text = invoke("reproduce", *words)

@@ -52,25 +52,22 @@ def test_the_papers_own_numbers_pass_every_claim() -> None:
     }
 
 
-@pytest.mark.parametrize(
-    ("name", "results"),
-    [
-        ("table_I_f_error_Hz", changed("I", "event1", f_error_Hz=0.151)),
-        ("table_I_MPSI", changed("II", "event2", MPSI=0.215)),
-        ("table_II_V_error", changed("III", "event2", V_error=0.0051)),
-        ("only_IV_restores", changed("IV", "event1", f_error_Hz=0.011)),
-        ("only_IV_restores", changed("III", "event1", f_error_Hz=0.009)),
-        ("IV_within_1_s", changed("IV", "event2", t_restore_s=1.01)),
-        ("IV_within_1_s", changed("IV", "event1", t_restore_s=None)),
-        ("GFL_idle", changed("III", "event2", p={"inv2": 0.67})),
-        ("MQSI_order", changed("II", "event1", MQSI=1.76)),
-        ("MQSI_order", changed("IV", "event2", MQSI=1.2)),
-        ("IV_shares_vars", changed("IV", "event2", MQSI=0.101)),
-        ("IV_5_times_below_II_and_III", changed("III", "event2", MQSI=0.24)),
-        ("IV_MQSI_5_times_better_than_I", changed("I", "event1", MQSI=0.19)),
-        ("table_I_MPSI", changed("II", "event2", MPSI=float("nan"))),
-    ],
-)
+@pytest.mark.parametrize(("name", "results"), [
+    ("table_I_f_error_Hz", changed("I", "event1", f_error_Hz=0.151)),
+    ("table_I_MPSI", changed("II", "event2", MPSI=0.215)),
+    ("table_II_V_error", changed("III", "event2", V_error=0.0051)),
+    ("only_IV_restores", changed("IV", "event1", f_error_Hz=0.011)),
+    ("only_IV_restores", changed("III", "event1", f_error_Hz=0.009)),
+    ("IV_within_1_s", changed("IV", "event2", t_restore_s=1.01)),
+    ("IV_within_1_s", changed("IV", "event1", t_restore_s=None)),
+    ("GFL_idle", changed("III", "event2", p={"inv2": 0.67})),
+    ("MQSI_order", changed("II", "event1", MQSI=1.76)),
+    ("MQSI_order", changed("IV", "event2", MQSI=1.2)),
+    ("IV_shares_vars", changed("IV", "event2", MQSI=0.101)),
+    ("IV_5_times_below_II_and_III", changed("III", "event2", MQSI=0.24)),
+    ("IV_MQSI_5_times_better_than_I", changed("I", "event1", MQSI=0.19)),
+    ("table_I_MPSI", changed("II", "event2", MPSI=float("nan"))),
+])  # fmt: skip
 def test_a_number_that_is_off_fails_the_claim(name: str, results: Table) -> None:
     """Each claim can fail, and says what was found."""
     failed = verdict(name, results)
@@ -131,18 +128,15 @@ def over_graphs(times: dict[int, float | None]) -> Findings:
     return GraphFindings(results={}, graphs=runs)
 
 
-@pytest.mark.parametrize(
-    ("name", "times", "status"),
-    [
-        ("more_links_are_faster", {8: 1.5, 12: 0.6, 36: 0.5}, "PASS"),
-        ("more_links_are_faster", {8: 0.5, 12: 0.6, 36: 0.5}, "FAIL"),
-        ("more_links_are_faster", {8: None, 12: 0.6, 36: 0.5}, "PASS"),
-        ("steepest_at_few_links", {8: 1.5, 12: 0.6, 36: 0.5}, "PASS"),
-        ("steepest_at_few_links", {8: 1.5, 12: 1.4, 36: 0.5}, "FAIL"),
-        ("none_below_8", {7: None, 8: 1.5, 12: 0.6, 36: 0.5}, "PASS"),
-        ("none_below_8", {8: 1.5, 12: 0.6, 36: 0.5}, "FAIL"),
-    ],
-)
+@pytest.mark.parametrize(("name", "times", "status"), [
+    ("more_links_are_faster", {8: 1.5, 12: 0.6, 36: 0.5}, "PASS"),
+    ("more_links_are_faster", {8: 0.5, 12: 0.6, 36: 0.5}, "FAIL"),
+    ("more_links_are_faster", {8: None, 12: 0.6, 36: 0.5}, "PASS"),
+    ("steepest_at_few_links", {8: 1.5, 12: 0.6, 36: 0.5}, "PASS"),
+    ("steepest_at_few_links", {8: 1.5, 12: 1.4, 36: 0.5}, "FAIL"),
+    ("none_below_8", {7: None, 8: 1.5, 12: 0.6, 36: 0.5}, "PASS"),
+    ("none_below_8", {8: 1.5, 12: 0.6, 36: 0.5}, "FAIL"),
+])  # fmt: skip
 def test_claims_of_topologies_hold_and_fail(name: str, times: dict[int, float | None], status: str) -> None:
     """A missing time counts as later than all others; without runs below 8 links that claim fails."""
     assert {v.claim.name: v.status for v in judge(over_graphs(times), CLAIMS["topology"])}[name] == status

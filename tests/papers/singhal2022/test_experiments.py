@@ -19,17 +19,14 @@ from .experiment import Experiment, expected, experiment
 INV1, INV2 = 0, 1
 
 
-@pytest.mark.parametrize(
-    ("scenario", "benchmark"),
-    [
-        ("islanding", "islanding"),
-        ("intermittency", "intermittency"),
-        ("wind-up", "wind-up"),
-        ("reduced-communication", "communication"),
-        ("plug-n-play", "plug-n-play"),
-        ("microgrid-switching", "switching"),
-    ],
-)
+@pytest.mark.parametrize(("scenario", "benchmark"), [
+    ("islanding", "islanding"),
+    ("intermittency", "intermittency"),
+    ("wind-up", "wind-up"),
+    ("reduced-communication", "communication"),
+    ("plug-n-play", "plug-n-play"),
+    ("microgrid-switching", "switching"),
+])  # fmt: skip
 def test_every_claim_holds_but_for_the_known_deviations(scenario: str, benchmark: str) -> None:
     """`gridpeers run` reports the same claims as docs/understand/evidence.md."""
     assert experiment(scenario).statuses(benchmark) == expected(benchmark)

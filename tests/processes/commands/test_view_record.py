@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 pytest.importorskip("starlette", reason="the extra view is not installed")
 pytest.importorskip("websockets", reason="the extra view is not installed")
 
-WAIT = 80_000
-"""Longest wait (ms) for anything on the page."""
+WAIT = 80_000  # Longest wait (ms) for anything on the page
 
 ISLANDED = """
 name = "islanded"
@@ -48,14 +47,12 @@ from_s = 0.5
 
 @pytest.fixture
 def desk(tmp_path: Path) -> Iterator[Desk]:
-    """Terminals in an empty folder."""
     with Desk(tmp_path) as terminals:
         yield terminals
 
 
 @pytest.fixture(scope="module")
 def records(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Folder with a run of two cases."""
     folder = tmp_path_factory.mktemp("records")
     second = '[case.two]\nsecondary = "all"\ngraph = "full"\n'
     (folder / "it.toml").write_text(ISLANDED.format(end=1.0) + second, encoding="utf-8")
@@ -65,7 +62,6 @@ def records(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def page_of(browser: Browser, url: str) -> Page:
-    """The page, with a record on it."""
     page = browser.new_page(viewport={"width": 1500, "height": 1200})
     page.set_default_timeout(WAIT)
     page.goto(url)

@@ -85,14 +85,11 @@ def test_our_agents_control_a_grid_of_somebody_else_alike_under_both_drivers() -
     assert results[0].metrics.loc["islanding", "f_error_Hz"] < 0.01
 
 
-@pytest.mark.parametrize(
-    ("what", "said", "deadline", "wait"),
-    [
-        ("error", "t = 0.09 s: the federation ended: no solution of my power flow", 30.0, 30.0),
-        ("hangs", "strange did not let time go on to 0.1 s within 2 s; end what hangs", 2.0, 30.0),
-        ("not beginning", "did not begin within 1 s (are all started?)", 30.0, 1.0),
-    ],
-)
+@pytest.mark.parametrize(("what", "said", "deadline", "wait"), [
+    ("error", "t = 0.09 s: the federation ended: no solution of my power flow", 30.0, 30.0),
+    ("hangs", "strange did not let time go on to 0.1 s within 2 s; end what hangs", 2.0, 30.0),
+    ("not beginning", "did not begin within 1 s (are all started?)", 30.0, 1.0),
+])  # fmt: skip
 def test_a_federate_of_others_that_fails_ends_the_run_with_one_line(
     what: str, said: str, deadline: float, wait: float
 ) -> None:

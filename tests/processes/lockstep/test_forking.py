@@ -28,7 +28,6 @@ pytestmark = pytest.mark.skipif(not AVAILABLE, reason="forks on Linux alone")
 
 
 def stat_of(pid: int) -> list[str]:
-    """Fields of a process, from its state on."""
     return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
 
 

@@ -27,8 +27,7 @@ from tests.toy.toy_runs import ProcessRun
 
 pytestmark = pytest.mark.skipif(find_spec("gridlabd") is None, reason="the extra gridlabd is not installed")
 
-PATIENCE = 100.0
-"""Deadline (s) of runs: GridLAB-D computes for seconds before it answers for the first time."""
+PATIENCE = 100.0  # Deadline (s) of runs: GridLAB-D computes for seconds before it answers for the first time
 
 TWO_CASES = (
     'name = "two"\n[time]\nend_s = {end}\n[plant]\nsimulator = "gridlabd"\n[processes]\ndeadline_s = 100.0\n'

@@ -30,8 +30,7 @@ from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
 from tests.toy.toy_runs import ProcessRun, Rows
 
-LONG = 2000.0
-"""An end (s) that no test waits for."""
+LONG = 2000.0  # An end (s) that no test waits for
 
 
 def last_P_set(row: tuple[float, ...], inverter: int) -> float:

@@ -25,11 +25,8 @@ QUIET = [
 ]
 """A browser that asks nobody outside."""
 
-WAIT = 80_000
-"""Longest wait (ms) for anything on the page."""
-
-SLOW = "0.2"
-"""Speed of the runs: a control period is 100 ms of real time, so that a busy machine keeps pace."""
+WAIT = 80_000  # Longest wait (ms) for anything on the page
+SLOW = "0.2"  # Speed of the runs: a control period is 100 ms of real time, so that a busy machine keeps pace
 
 
 @contextmanager
@@ -46,7 +43,6 @@ def chromium() -> Iterator[Browser]:
 
 
 def plant_of(desk: Desk) -> Terminal:
-    """A plant that has begun."""
     words = ("--run", "lab", "--listen", desk.options[-1], "--wait", "0", "--speed", SLOW)
     plant = desk.open_bare("plant", "calm.toml", *words)
     plant.expect("t = 0; speed")
@@ -68,7 +64,6 @@ def view_of(desk: Desk, *words: str) -> tuple[Terminal, str]:
 
 
 def page_of(browser: Browser, url: str) -> Page:
-    """The page, with numbers of now on it."""
     page = browser.new_page(viewport={"width": 1500, "height": 1000})
     page.set_default_timeout(WAIT)
     page.goto(url)

@@ -38,7 +38,6 @@ def run_of(folder: Path, schedule: Schedule, clock: str) -> tuple[ProcessRun, Ou
 
 
 def lives(run: ProcessRun, name: str) -> tuple[Child, ...]:
-    """All processes that ran under a name."""
     assert run.children is not None
     return run.children.lives(name)
 
@@ -71,7 +70,6 @@ class Broken(ToyPlant):
     """Divides by zero in its first step."""
 
     def advance(self) -> None:
-        """Go one control period on, in vain."""
         raise ZeroDivisionError("no step")
 
 

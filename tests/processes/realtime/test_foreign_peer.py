@@ -20,8 +20,7 @@ from tests.toy.toy_runs import Rows, first_difference
 
 REAL = ("-m", "gridpeers.scenarios.emulation.emulated_plant")
 
-ISLANDED = 1.0
-"""Time (s) of the scenario's first event."""
+ISLANDED = 1.0  # Time (s) of the scenario's first event
 
 
 def test_a_foreign_agent_takes_its_share_in_real_time(tmp_path: Path) -> None:

@@ -30,7 +30,6 @@ T_C = 0.02
 
 
 def setup(*, nodes: tuple[NodeFault, ...] = (), **netem: tuple[Fault | Partition, ...]) -> EmulationConfig:
-    """Configuration of the toy run's processes."""
     return EmulationConfig(netem=Netem(seed=5, nodes=nodes, **netem), microgrids=MICROGRIDS, real_nodes=True)  # type: ignore[arg-type]
 
 
@@ -47,7 +46,6 @@ def fates(trace: LinkTrace) -> dict[int, tuple[float, Outcome]]:
 
 
 def simulated(told: EmulationConfig, end: float) -> dict[tuple[str, str], LinkTrace]:
-    """Verdicts of the toy run in simulated time."""
     links = LinkRecord()
     plant, agents = toy_configs(4, end=end)
     plant = replace(plant, links=told.to_tree())

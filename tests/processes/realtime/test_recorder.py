@@ -75,8 +75,7 @@ def test_a_recorder_that_stood_still_has_every_row(desk: Desk) -> None:
     assert (measured["f_error_Hz"] is None) == ("f_error_Hz" in measured.get("reasons", {}))
 
 
-MOST = 4.0
-"""Run time (s) of a run beyond which it would take long to read."""
+MOST = 4.0  # Run time (s) of a run beyond which it would take long to read
 
 
 @pytest.mark.parametrize(("who", "clock"), [("plant", "realtime"), ("inv1", "simulated")])
@@ -109,17 +108,13 @@ graph = "full"
 without_agent = ["inv3", "inv5", "inv6", "inv8", "inv9"]
 """
 
-ROOM = 180_000
-"""Greatest size (bytes) of any file of a run, which its record reaches after some seconds."""
+ROOM = 180_000  # Greatest size (bytes) of any file of a run, which its record reaches after some seconds
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("run", "--clock", "realtime"), "here/calm/run.mcap: cannot be written: File too large"),
-        (("up", "--run", "full", "--for", "7", "--listen", "tcp/127.0.0.1:0"), "s: File too large"),
-    ],
-)
+@pytest.mark.parametrize(("words", "said"), [
+    (("run", "--clock", "realtime"), "here/calm/run.mcap: cannot be written: File too large"),
+    (("up", "--run", "full", "--for", "7", "--listen", "tcp/127.0.0.1:0"), "s: File too large"),
+])  # fmt: skip
 def test_a_run_without_room_for_its_record_ends_and_has_what_came_until_then(
     words: tuple[str, ...], said: str, elsewhere: Path
 ) -> None:

@@ -23,7 +23,6 @@ CALM = '[time]\nend_s = 10.0\n[case.IV]\nsecondary = "all"\ngraph = "full"\n'
 
 @pytest.fixture
 def hosts() -> Iterator[Hosts]:
-    """Three hosts on one switch."""
     try:
         with Hosts(3) as made:
             yield made
@@ -95,7 +94,6 @@ class Router:
         self._session = zenoh.open(zenoh.Config.from_json5(json.dumps(config)))
 
     def stop(self) -> None:
-        """End it."""
         if self._session is not None:
             self._session.close()
         self._session = None

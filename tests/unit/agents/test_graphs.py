@@ -31,22 +31,19 @@ def rule(graph: GraphRule) -> Control:
     return Control(secondary="all", graph=graph, links=LINKS if graph == "links" else ())
 
 
-@pytest.mark.parametrize(
-    ("graph", "name", "expected"),
-    [
-        ("full", "inv5", {"inv1", "inv2", "inv3", "inv4", "inv6", "inv7", "inv8", "inv9"}),
-        ("none", "inv5", set()),
-        ("GFM-only", "inv4", {"inv1", "inv7"}),
-        ("GFM-only", "inv5", set()),
-        ("clustered", "inv4", {"inv5", "inv6", "inv1", "inv7"}),
-        ("clustered", "inv5", {"inv4", "inv6"}),
-        ("ring", "inv5", {"inv4", "inv6"}),
-        ("ring", "inv1", {"inv2", "inv9"}),
-        ("links", "inv4", {"inv1", "inv7"}),
-        ("links", "inv9", {"inv2"}),
-        ("links", "inv5", set()),
-    ],
-)
+@pytest.mark.parametrize(("graph", "name", "expected"), [
+    ("full", "inv5", {"inv1", "inv2", "inv3", "inv4", "inv6", "inv7", "inv8", "inv9"}),
+    ("none", "inv5", set()),
+    ("GFM-only", "inv4", {"inv1", "inv7"}),
+    ("GFM-only", "inv5", set()),
+    ("clustered", "inv4", {"inv5", "inv6", "inv1", "inv7"}),
+    ("clustered", "inv5", {"inv4", "inv6"}),
+    ("ring", "inv5", {"inv4", "inv6"}),
+    ("ring", "inv1", {"inv2", "inv9"}),
+    ("links", "inv4", {"inv1", "inv7"}),
+    ("links", "inv9", {"inv2"}),
+    ("links", "inv5", set()),
+])  # fmt: skip
 def test_each_rule_gives_the_neighbours_it_is_named_for(graph: GraphRule, name: str, expected: set[str]) -> None:
     """Each rule, on the paper's nine inverters (its section 4)."""
     assert set(in_neighbours(rule(graph), name, PAPER)) == expected
@@ -125,14 +122,11 @@ def test_a_function_and_a_class_with_parameters_are_rules(folder: str) -> None:
     assert in_neighbours(replace(star, without=(("inv3", "inv1"),)), "inv3", members) == ()  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(
-    ("use", "said"),
-    [
-        ("my_graphs:Wrong", "my_graphs:Wrong is no graph: the class needs a method __call__(self, members)"),
-        ("my_graphs:of_two", "my_graphs:of_two is no graph: it is called with one argument, the members: missing"),
-        ("rings", 'there is no graph "rings"; did you mean "ring"? The graphs are full, none, GFM-only, clustered'),
-    ],
-)
+@pytest.mark.parametrize(("use", "said"), [
+    ("my_graphs:Wrong", "my_graphs:Wrong is no graph: the class needs a method __call__(self, members)"),
+    ("my_graphs:of_two", "my_graphs:of_two is no graph: it is called with one argument, the members: missing"),
+    ("rings", 'there is no graph "rings"; did you mean "ring"? The graphs are full, none, GFM-only, clustered'),
+])  # fmt: skip
 def test_an_impossible_rule_is_refused_in_one_line(folder: str, use: str, said: str) -> None:
     """The problem of the rule, and a remedy."""
     (wrong,) = plugin_problems(GRAPHS, plugin_of({"use": use}, folder))
@@ -142,16 +136,13 @@ def test_an_impossible_rule_is_refused_in_one_line(folder: str, use: str, said: 
     assert "\n" not in wrong[1]
 
 
-@pytest.mark.parametrize(
-    ("rule", "said"),
-    [
-        (lambda members: {"inv1": ["inv9"]}, "graph mine lets inv1 listen to inv9, which is no agent of the run"),
-        (lambda members: {"inv9": []}, "graph mine names inv9, which is no agent of the run"),
-        (lambda members: {"inv1": ["inv1"]}, "graph mine lets inv1 listen to itself; leave it out"),
-        (lambda members: {"inv1": 3}, "of inv1, inv2 failed: TypeError: 'int' object is not iterable"),
-        (lambda members: 1 / 0, "of inv1, inv2 failed: ZeroDivisionError: division by zero"),
-    ],
-)
+@pytest.mark.parametrize(("rule", "said"), [
+    (lambda members: {"inv1": ["inv9"]}, "graph mine lets inv1 listen to inv9, which is no agent of the run"),
+    (lambda members: {"inv9": []}, "graph mine names inv9, which is no agent of the run"),
+    (lambda members: {"inv1": ["inv1"]}, "graph mine lets inv1 listen to itself; leave it out"),
+    (lambda members: {"inv1": 3}, "of inv1, inv2 failed: TypeError: 'int' object is not iterable"),
+    (lambda members: 1 / 0, "of inv1, inv2 failed: ZeroDivisionError: division by zero"),
+])  # fmt: skip
 def test_a_result_that_is_no_graph_is_reported_in_one_line(rule: object, said: str) -> None:
     """The error names the agent, and what the rule returned or raised."""
     with pytest.raises(GraphError) as caught:

@@ -20,8 +20,7 @@ Matrix = NDArray[np.float64]
 UNBOUNDED = Gains(P_set_min=-1e9, P_set_max=1e9, V_set_min=-1e9, V_set_max=1e9)
 M_P = 0.01
 KAPPA = M_P / UNBOUNDED.k_p
-PERIODS = st.floats(-3.0, 1.0).map(lambda x: 10.0**x)
-"""From 1 ms to 10 s."""
+PERIODS = st.floats(-3.0, 1.0).map(lambda x: 10.0**x)  # From 1 ms to 10 s
 
 
 @st.composite

@@ -69,15 +69,12 @@ def test_a_leaving_agent_gets_ready_for_no_roster() -> None:
     assert ("ready", "0") not in lab.take()
 
 
-@pytest.mark.parametrize(
-    ("number", "roster", "kind"),
-    [
-        (2, {"inv1": "me", "inv2": "inv2"}, "stale"),
-        (3, {"inv1": "me"}, "stale"),
-        (4, {"inv1": "another"}, "unexpected"),
-        (4, {"inv1": "another", "inv2": "b"}, "unexpected"),
-    ],
-)
+@pytest.mark.parametrize(("number", "roster", "kind"), [
+    (2, {"inv1": "me", "inv2": "inv2"}, "stale"),
+    (3, {"inv1": "me"}, "stale"),
+    (4, {"inv1": "another"}, "unexpected"),
+    (4, {"inv1": "another", "inv2": "b"}, "unexpected"),
+])  # fmt: skip
 def test_an_old_or_foreign_roster_changes_nothing(number: int, roster: dict[str, str], kind: str) -> None:
     """An old roster, or a roster without this process."""
     lab = Lab()

@@ -27,14 +27,11 @@ def test_an_agent_whose_plant_is_there_but_mute_begins_again_with_a_new_session(
     assert lab.side.failed == ""
 
 
-@pytest.mark.parametrize(
-    ("roster", "heard", "why"),
-    [
-        (("inv1", "inv2", "inv3"), ("inv2",), "the plant hears inv3, but nothing comes from it here"),
-        (("inv1", "inv2", "inv7"), ("inv2", "inv3"), "the plant hears inv7, but nothing comes from it here"),
-        (("inv2", "inv3"), ("inv2", "inv3"), "the plant is heard, but does not hear this agent"),
-    ],
-)
+@pytest.mark.parametrize(("roster", "heard", "why"), [
+    (("inv1", "inv2", "inv3"), ("inv2",), "the plant hears inv3, but nothing comes from it here"),
+    (("inv1", "inv2", "inv7"), ("inv2", "inv3"), "the plant hears inv7, but nothing comes from it here"),
+    (("inv2", "inv3"), ("inv2", "inv3"), "the plant is heard, but does not hear this agent"),
+])  # fmt: skip
 def test_an_agent_that_hears_less_than_the_plant_opens_a_new_session(
     roster: tuple[str, ...], heard: tuple[str, ...], why: str
 ) -> None:

@@ -114,13 +114,10 @@ def test_an_fmu_declares_by_its_outputs(tmp_path: Path) -> None:
     assert shared_by(LawChoice(fmu="none.fmu", folder=str(tmp_path))) == ()
 
 
-@pytest.mark.parametrize(
-    ("then", "said"),
-    [
-        ({"Omega": 0.1}, "Omega, which must be from -0.05 to 0.05 pu, got 0.1"),
-        ({"Omga": 0.0}, 'Omga, which it does not declare; did you mean "Omega"? The quantities are Omega'),
-    ],
-)
+@pytest.mark.parametrize(("then", "said"), [
+    ({"Omega": 0.1}, "Omega, which must be from -0.05 to 0.05 pu, got 0.1"),
+    ({"Omga": 0.0}, 'Omga, which it does not declare; did you mean "Omega"? The quantities are Omega'),
+])  # fmt: skip
 def test_a_law_that_shares_a_value_beyond_its_range_or_another_name_fails(then: dict[str, float], said: str) -> None:
     law = Shares()
     law.then = then

@@ -48,7 +48,6 @@ def test_a_clock_that_drifts_against_the_plants_is_led_back_to_the_middle() -> N
 
 
 def test_an_emulated_drift_is_not_corrected() -> None:
-    """The timer does not correct the ticks of an emulated drifting clock."""
     timer = TickTimer(T, keeps_clear=False)
     timer.start(5.0)
     seen = phases(timer, 4.999, 3000, drift=1e-3)

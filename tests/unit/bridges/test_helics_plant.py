@@ -36,19 +36,16 @@ class _MadeUp:
         self.aborted = reason
 
 
-@pytest.mark.parametrize(
-    ("missing", "other", "said"),
-    [
-        (
-            ["grid/inv3/V"],
-            {},
-            "HELICS: nobody publishes grid/inv3/V (in the federation: strange); publish these topics",
-        ),
-        ([], {"grid/inv3/V": None}, "HELICS, t = 0 s: no value yet of grid/inv3/V; publish all at t = 0 or before"),
-        ([], {"grid/inv1/f": -1e49}, "HELICS, t = 0 s: grid/inv1/f is not a finite number; correct its publisher"),
-        ([], {"grid/inv1/island": "a b"}, "grid/inv1/island must be the name of an inverter, grid or off, got 'a b'"),
-    ],
-)
+@pytest.mark.parametrize(("missing", "other", "said"), [
+    (
+        ["grid/inv3/V"],
+        {},
+        "HELICS: nobody publishes grid/inv3/V (in the federation: strange); publish these topics",
+    ),
+    ([], {"grid/inv3/V": None}, "HELICS, t = 0 s: no value yet of grid/inv3/V; publish all at t = 0 or before"),
+    ([], {"grid/inv1/f": -1e49}, "HELICS, t = 0 s: grid/inv1/f is not a finite number; correct its publisher"),
+    ([], {"grid/inv1/island": "a b"}, "grid/inv1/island must be the name of an inverter, grid or off, got 'a b'"),
+])  # fmt: skip
 def test_topics_of_others_that_cannot_be_used_end_the_run_with_one_line(
     missing: list[str], other: dict[str, Any], said: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

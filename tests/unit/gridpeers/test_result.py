@@ -24,7 +24,6 @@ def scenario() -> gp.Scenario:
 
 @pytest.fixture(scope="module")
 def run(scenario: gp.Scenario) -> gp.Result:
-    """One case of it."""
     return scenario.run("IV")
 
 

@@ -19,7 +19,6 @@ SHORT = {"time.end_s": 1.1, "event": [{"label": "event1", "t_s": 1.0, "open": ["
 
 
 def copy(page: str, name: str, folder: Path) -> Path:
-    """Write a file of a page into a folder."""
     blocks = blocks_of((PAGES / page).read_text(encoding="utf-8"))
     (code,) = (block.text for block in blocks if block.comments.get("file") == name)
     (folder / name).write_text(code, encoding="utf-8")

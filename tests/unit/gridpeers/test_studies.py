@@ -21,7 +21,6 @@ def scenario() -> gp.Scenario:
 
 @pytest.fixture(scope="module")
 def runs(scenario: gp.Scenario) -> gp.Results:
-    """Both cases of it."""
     return scenario.run()
 
 

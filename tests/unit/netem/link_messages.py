@@ -19,8 +19,7 @@ MICROGRIDS = {f"inv{i}": f"MG{(i + 2) // 3}" for i in range(1, 10)}
 steady = settings(derandomize=True, max_examples=50)
 """The same examples every time, and no limit on an example's time, which a busy machine would break."""
 
-T_C = 0.02
-"""Distance of the messages (s)."""
+T_C = 0.02  # Distance of the messages (s)
 
 
 def channel(seed: int = 1, src: str = "inv1", dst: str = "inv2", **kinds: Any) -> Channel:

@@ -90,7 +90,6 @@ def test_messages_lost_at_a_lower_probability_are_lost_at_a_higher_one(seed: int
 
 
 def test_corruption_flips_every_bit_with_equal_probability() -> None:
-    """A message is corrupted with probability p, and each of its bits is equally likely."""
     bits = [fate.deliveries[0][1] for fate in fates(channel(corrupt=Corrupt(p=0.2)), range(N), size=4)]
     flipped = Counter(bit for bit in bits if bit is not None)
 

@@ -68,22 +68,19 @@ def test_a_scenarios_entries_are_read_as_written() -> None:
     assert msgspec.json.decode(msgspec.json.encode(netem), type=Netem) == netem
 
 
-@pytest.mark.parametrize(
-    ("text", "path", "words"),
-    [
-        (_lying('model = "offset"'), "node[0].lies", ["changes nothing", "P_set_W"]),
-        (_lying('model = "scale", Q = 1e9'), "node[0].lies.Q", ["-1e+06 to 1e+06"]),
-        (_lying('model = "replay", delay_s = 2000'), "node[0].lies.delay_s", ["2 (2000 ms)"]),
-        (_lying('model = "freeze", of = ["f"]'), "node[0].lies.of", ['a list with one of "P_set", "V_set", "Q"']),
-        (_lying('model = "freeze", in_name_of = "inv3"'), "node[0].lies.in_name_of", ["inv3 is the liar"]),
-        (_lying('model = "freeze"') + "\nkill = true", "node[0].lies", ["sends nothing"]),
-        (
-            _lying('model = "freeze", in_name_of = "inv1"') + "\n" + _lying('model = "freeze", in_name_of = "inv1"', 4),
-            "node[1].lies.in_name_of",
-            ["node[0]"],
-        ),
-    ],
-)
+@pytest.mark.parametrize(("text", "path", "words"), [
+    (_lying('model = "offset"'), "node[0].lies", ["changes nothing", "P_set_W"]),
+    (_lying('model = "scale", Q = 1e9'), "node[0].lies.Q", ["-1e+06 to 1e+06"]),
+    (_lying('model = "replay", delay_s = 2000'), "node[0].lies.delay_s", ["2 (2000 ms)"]),
+    (_lying('model = "freeze", of = ["f"]'), "node[0].lies.of", ['a list with one of "P_set", "V_set", "Q"']),
+    (_lying('model = "freeze", in_name_of = "inv3"'), "node[0].lies.in_name_of", ["inv3 is the liar"]),
+    (_lying('model = "freeze"') + "\nkill = true", "node[0].lies", ["sends nothing"]),
+    (
+        _lying('model = "freeze", in_name_of = "inv1"') + "\n" + _lying('model = "freeze", in_name_of = "inv1"', 4),
+        "node[1].lies.in_name_of",
+        ["node[0]"],
+    ),
+])  # fmt: skip
 def test_an_impossible_lie_is_a_problem_at_its_key(text: str, path: str, words: list[str]) -> None:
     """The only problem found, at its key; those of links, partitions and other nodes are in tests/golden/problems."""
     (found,) = problems_of(text)
@@ -92,18 +89,15 @@ def test_an_impossible_lie_is_a_problem_at_its_key(text: str, path: str, words: 
     assert all(word in found for word in words), found
 
 
-@pytest.mark.parametrize(
-    ("first", "second", "clash"),
-    [
-        ({"on": "* -> inv2", "loss": 0.1}, {"on": "inv1 <-> *", "loss": 0.2}, True),
-        ({"on": "* -> inv2", "loss": 0.1}, {"on": "inv1 <-> *", "delay": 0.2}, False),
-        ({"on": "* -> inv2", "loss": 0.1}, {"on": "* -> inv3", "loss": 0.2}, False),
-        ({"on": "* -> inv2", "loss": 0.1, "to_s": 2.0}, {"on": "* -> *", "loss": 0.2, "from_s": 2.0}, False),
-        ({"on": "* -> inv2", "loss": 0.1, "to_s": 2.1}, {"on": "* -> *", "loss": 0.2, "from_s": 2.0}, True),
-        ({"on": "MG1 -> MG2", "profile": "lte"}, {"on": "inv1 -> inv4", "delay": 0.1}, True),
-        ({"on": "MG1 -> MG2", "cut": True}, {"on": "inv1 -> inv4", "cut": Cut(hold=True), "from_s": 5.0}, True),
-    ],
-)
+@pytest.mark.parametrize(("first", "second", "clash"), [
+    ({"on": "* -> inv2", "loss": 0.1}, {"on": "inv1 <-> *", "loss": 0.2}, True),
+    ({"on": "* -> inv2", "loss": 0.1}, {"on": "inv1 <-> *", "delay": 0.2}, False),
+    ({"on": "* -> inv2", "loss": 0.1}, {"on": "* -> inv3", "loss": 0.2}, False),
+    ({"on": "* -> inv2", "loss": 0.1, "to_s": 2.0}, {"on": "* -> *", "loss": 0.2, "from_s": 2.0}, False),
+    ({"on": "* -> inv2", "loss": 0.1, "to_s": 2.1}, {"on": "* -> *", "loss": 0.2, "from_s": 2.0}, True),
+    ({"on": "MG1 -> MG2", "profile": "lte"}, {"on": "inv1 -> inv4", "delay": 0.1}, True),
+    ({"on": "MG1 -> MG2", "cut": True}, {"on": "inv1 -> inv4", "cut": Cut(hold=True), "from_s": 5.0}, True),
+])  # fmt: skip
 def test_two_entries_of_one_kind_on_one_link_at_one_time_contradict_each_other(
     first: dict[str, Any], second: dict[str, Any], clash: bool
 ) -> None:
@@ -114,16 +108,13 @@ def test_two_entries_of_one_kind_on_one_link_at_one_time_contradict_each_other(
     assert all("link[0] gives inv1 -> inv" in problem.text for problem in found)
 
 
-@pytest.mark.parametrize(
-    ("partition", "groups"),
-    [
-        (Partition(by="microgrid"), [NAMES[:3], NAMES[3:6], NAMES[6:]]),
-        (Partition(by="halves"), [NAMES[:5], NAMES[5:]]),
-        (Partition(alone="inv4"), [["inv4"], [name for name in NAMES if name != "inv4"]]),
-        (Partition(groups=(("MG1",), ("inv4", "inv5"))), [NAMES[:3], NAMES[3:5], NAMES[5:]]),
-        (Partition(groups=(("MG1", "plant"),)), [[*NAMES[:3], "plant"], NAMES[3:]]),
-    ],
-)
+@pytest.mark.parametrize(("partition", "groups"), [
+    (Partition(by="microgrid"), [NAMES[:3], NAMES[3:6], NAMES[6:]]),
+    (Partition(by="halves"), [NAMES[:5], NAMES[5:]]),
+    (Partition(alone="inv4"), [["inv4"], [name for name in NAMES if name != "inv4"]]),
+    (Partition(groups=(("MG1",), ("inv4", "inv5"))), [NAMES[:3], NAMES[3:5], NAMES[5:]]),
+    (Partition(groups=(("MG1", "plant"),)), [[*NAMES[:3], "plant"], NAMES[3:]]),
+])  # fmt: skip
 def test_a_partition_cuts_exactly_the_links_between_its_groups(partition: Partition, groups: list[list[str]]) -> None:
     """Agents hear each other within a group and not across groups; the plant hears all unless it is in a group."""
     group = {name: i for i, names in enumerate(groups) for name in names}
@@ -188,21 +179,18 @@ def test_a_trace_with_decimal_commas_has_its_delays(tmp_path: Path) -> None:
     assert netem.links[0].models()["delay"].delays_s == (0.012, 0.5)
 
 
-@pytest.mark.parametrize(
-    ("rows", "words"),
-    [
-        (
-            "delay_s\n0.01\nabc\n-0.1\n20\n",
-            ['row 3: delay_s must be a number of seconds, got "abc"', "row 4:", "row 5: 20 s"],
-        ),
-        ("delay\n0.01\n", ['no column "delay_s"']),
-        ("delay_s\n12\n13\n", ["are they in milliseconds?"]),
-        ("delay_s\n", ["no row"]),
-        ("t_s,delay_s\n0,1,0,012\n", ["row 2: 4 cells, but the header has 2"]),
-        ("delay_s\n" + "x\n" * 30, [*[f"row {i}:" for i in range(2, 22)], "10 more rows"]),
-        (None, ["there is no file"]),
-    ],
-)
+@pytest.mark.parametrize(("rows", "words"), [
+    (
+        "delay_s\n0.01\nabc\n-0.1\n20\n",
+        ['row 3: delay_s must be a number of seconds, got "abc"', "row 4:", "row 5: 20 s"],
+    ),
+    ("delay\n0.01\n", ['no column "delay_s"']),
+    ("delay_s\n12\n13\n", ["are they in milliseconds?"]),
+    ("delay_s\n", ["no row"]),
+    ("t_s,delay_s\n0,1,0,012\n", ["row 2: 4 cells, but the header has 2"]),
+    ("delay_s\n" + "x\n" * 30, [*[f"row {i}:" for i in range(2, 22)], "10 more rows"]),
+    (None, ["there is no file"]),
+])  # fmt: skip
 def test_bad_rows_of_a_trace_are_named(tmp_path: Path, rows: str | None, words: list[str]) -> None:
     """Each problem has its row; a whole file in milliseconds is one problem."""
     if rows is not None:

@@ -88,17 +88,14 @@ def test_it_adds_delay_and_leaves_the_fates_of_other_faults(folder: str) -> None
     assert all(0.2 < ours.deliveries[0][0] < 0.21 for ours, _ in pairs if ours.deliveries)
 
 
-@pytest.mark.parametrize(
-    ("name", "said"),
-    [
-        ("Late", "link fault my_faults:Late on inv1 -> inv2 raised RuntimeError: no idea at t = 0.06 s, message 3; it"),
-        (
-            "Leaves",
-            "my_faults:Leaves on inv1 -> inv2 raised SystemExit: 3 at t = 0 s, message 0; it does nothing from then on",
-        ),
-        ("Early", "my_faults:Early on inv1 -> inv2 returned -0.1; return a delay from 0 to 3600 s, or None to drop at"),
-    ],
-)
+@pytest.mark.parametrize(("name", "said"), [
+    ("Late", "link fault my_faults:Late on inv1 -> inv2 raised RuntimeError: no idea at t = 0.06 s, message 3; it"),
+    (
+        "Leaves",
+        "my_faults:Leaves on inv1 -> inv2 raised SystemExit: 3 at t = 0 s, message 0; it does nothing from then on",
+    ),
+    ("Early", "my_faults:Early on inv1 -> inv2 returned -0.1; return a delay from 0 to 3600 s, or None to drop at"),
+])  # fmt: skip
 def test_a_fault_that_fails_is_ignored_from_then_on_and_reported_once(folder: str, name: str, said: str) -> None:
     """Messages then pass as without it; the report of the link has the sentence."""
     receiver = Receiver("inv2", Netem(links=(fault(folder, name),)), {"inv1": "MG1", "inv2": "MG1"})

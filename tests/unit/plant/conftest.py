@@ -10,11 +10,9 @@ from gridpeers.plant.tables import read_feeder
 
 @pytest.fixture(scope="session")
 def network() -> Network:
-    """The networked microgrids."""
     return Network(read_feeder("microgrid123"))
 
 
 @pytest.fixture(scope="session")
 def standard() -> Network:
-    """The standard feeder."""
     return Network(read_feeder("standard123"))

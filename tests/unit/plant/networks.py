@@ -7,8 +7,7 @@ from typing import Any
 from gridpeers.plant.equipment import Bus, Tables
 from gridpeers.plant.network import Network
 
-PAPER_ISLANDS = ("13-152", "sw1_2", "sw2_3")
-"""Switches whose opening leaves three microgrids."""
+PAPER_ISLANDS = ("13-152", "sw1_2", "sw2_3")  # Switches whose opening leaves three microgrids
 
 
 def opened(network: Network, *switches: str) -> frozenset[str]:

@@ -32,7 +32,6 @@ class PlantLab:
         self.do()
 
     def do(self) -> None:
-        """Take the actions, and let it work."""
         while True:
             for action in self.node.take_actions():
                 if isinstance(action, Publish):
@@ -43,17 +42,14 @@ class PlantLab:
                 return
 
     def token(self, name: str, instance: str = "", *, gone: bool = False) -> None:
-        """A token of an agent comes or goes."""
         (self.node.vanished if gone else self.node.appeared)(KEYS.alive_agent(name, instance or name), self.now)
         self.do()
 
     def recorder(self, name: str, *, gone: bool = False) -> None:
-        """A recorder's token comes or goes."""
         (self.node.vanished if gone else self.node.appeared)(KEYS.alive_recorder(name), self.now)
         self.do()
 
     def hear(self, key: str, message: Message) -> None:
-        """A message comes in."""
         self.node.received(key, encode(message), self.now)
         self.do()
 
@@ -65,13 +61,11 @@ class PlantLab:
             self.hear(KEYS.nameplate(name, instance or name), plate)
 
     def state(self, name: str, seq: int, P_set: float = 5e4, epoch: int = 1, **fields: Any) -> None:
-        """An agent's state comes in."""
         t = round(0.02 * seq, 9)
         state = State(sender=name, epoch=epoch, seq=seq, t=t, P_set=P_set, V_set=277.0, Q=0.0, **fields)
         self.hear(KEYS.state(name), state)
 
     def take(self, kind: type[Message]) -> list[Any]:
-        """Messages of a type since last taken."""
         taken = [message for _, message in self.sent if type(message) is kind]
         self.sent = [(key, message) for key, message in self.sent if type(message) is not kind]
         return taken

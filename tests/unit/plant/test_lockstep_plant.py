@@ -60,22 +60,18 @@ class Lab(PlantLab):
         return numbers
 
     def ready(self, number: int, *names: str) -> None:
-        """Agents are ready for a roster."""
         for name in names:
             self.hear(KEYS.ready(name), Ready(sender=name, epoch=1, seq=number, t=0.0))
 
     def states(self, k: int, *names: str) -> None:
-        """States of tick k."""
         for name in names:
             self.state(name, k)
 
     def tick(self, count: int) -> None:
-        """Let the whole roster do ticks."""
         for _ in range(count):
             self.states(self.node.stepper.tick, *self.last(Prepare).roster)
 
     def last(self, kind: type[Any]) -> Any:
-        """The last message of a type."""
         return [message for _, message in self.sent if isinstance(message, kind)][-1]
 
     def stopped(self) -> dict[tuple[str, ...], tuple[str, bool]]:
@@ -85,7 +81,6 @@ class Lab(PlantLab):
 
     @property
     def missing(self) -> list[tuple[str, str]]:
-        """Missing messages: their kind and sender."""
         return [(what, who) for what, who in self.node.missing_messages()]
 
 

@@ -33,23 +33,19 @@ class MadeUp(Simulator):
     table = Table
 
     def start(self, config: Any, feeder: Any) -> Any:
-        """Return what it was asked for."""
         return config.settings.simulators, feeder.name
 
     def check(self, scenario: Any, feeder: Any, problems: Any) -> None:
-        """Refuse events."""
         if scenario.events:
             problems.add("event[0]", "the made-up plant has no switches")
 
 
 @pytest.fixture(autouse=True)
 def made_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Register it for one test."""
     monkeypatch.setattr(SIMULATORS, "_added", {"made_up": MadeUp()})
 
 
 def scenario(**plant: Any) -> gp.Scenario:
-    """Return a scenario on it."""
     return gp.Scenario(
         time={"end_s": 0.2}, plant={"simulator": "made_up", **plant}, case={"I": {"secondary": "none", "graph": "none"}}
     )
@@ -66,13 +62,10 @@ def test_its_table_goes_from_the_scenario_to_its_start() -> None:
     )
 
 
-@pytest.mark.parametrize(
-    ("plant", "said"),
-    [
-        ({"made_up": {"mesh": "fine"}}, 'plant.made_up.mesh: must be "coarse"'),
-        ({"simulator": "made-up"}, 'plant.simulator: there is no "made-up"; did you mean "made_up"?'),
-    ],
-)
+@pytest.mark.parametrize(("plant", "said"), [
+    ({"made_up": {"mesh": "fine"}}, 'plant.made_up.mesh: must be "coarse"'),
+    ({"simulator": "made-up"}, 'plant.simulator: there is no "made-up"; did you mean "made_up"?'),
+])  # fmt: skip
 def test_what_is_wrong_in_it_is_said_as_of_any_table(plant: dict[str, Any], said: str) -> None:
     """Values, relations, keys, and the simulator's name."""
     with pytest.raises(gp.ScenarioError) as error:

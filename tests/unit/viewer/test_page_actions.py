@@ -54,13 +54,11 @@ class Plant:
         """It is there."""
 
     def fetch(self, key: str) -> None:
-        """Hand out a configuration."""
         links = EmulationConfig(netem=Netem(), microgrids={"inv1": "mg1", "inv4": "mg2"}).to_tree()
         config = msgspec.structs.replace(agent_config("inv1"), links=links)
         self._waiting.append((self.keys.config("inv1"), msgspec.json.encode(config)))
 
     def publish(self, key: str, payload: bytes) -> None:
-        """Note a command, and answer it."""
         command = decode(payload)
         assert isinstance(command, Command)
         assert key == self.keys.for_verb(command.verb)
@@ -74,12 +72,10 @@ class Plant:
         self._waiting.append((self.keys.answer(self.id), encode(answer)))
 
     def take(self, seconds: float) -> Iterator[tuple[str, bytes, float]]:
-        """Yield what waits."""
         while self._waiting:
             yield *self._waiting.pop(0), monotonic()
 
     def read(self, key: str, payload: bytes) -> AnyMessage:
-        """Return the message in the bytes."""
         return decode(payload)
 
 

@@ -141,11 +141,9 @@ class Talk:
         self._pages, self._page = pages, RecordPage()
 
     def news(self) -> dict[str, Any]:
-        """All that the server says by itself."""
         return self._merged(self._pages.news(self._page))
 
     def ask(self, **question: Any) -> dict[str, Any]:
-        """All that it answers."""
         asked = msgspec.json.decode(json.dumps(question), type=RecordQuestion)
         return self._merged([*self._pages.frame(self._page, asked), *self._pages.decision(self._page, asked)])
 

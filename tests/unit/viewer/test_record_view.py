@@ -38,7 +38,6 @@ loss = 0.5
 
 @pytest.fixture(scope="module")
 def record(tmp_path_factory: pytest.TempPathFactory) -> RunRecord:
-    """The record of such a run, in many parts."""
     return recorded_in_chunks(ISLANDED, tmp_path_factory.mktemp("run"), chunk=60_000)
 
 
@@ -49,7 +48,6 @@ def view(record: RunRecord) -> RecordView:
 
 
 def encoded(frame: Frame) -> bytes:
-    """All that a page would get."""
     return msgspec.json.encode(frame)
 
 

@@ -25,7 +25,6 @@ def row(t: float, P: float = 3e4) -> tuple[float, ...]:
 
 
 def telemetry(t: float, epoch: int = 7, *events: PlantEvent, final: bool = False, outcome: str = "") -> Telemetry:
-    """Telemetry of the plant with one row."""
     return Telemetry(
         sender="plant", epoch=epoch, seq=0, t=t, inverters=NAMES, rows=(row(t),), events=events, final=final,
         outcome=outcome, reproducible=False, pacing=None,
@@ -33,7 +32,6 @@ def telemetry(t: float, epoch: int = 7, *events: PlantEvent, final: bool = False
 
 
 def status(name: str, *, used: tuple[str, ...], age: float = 0.02, sent: int = 0, **others: object) -> AgentStatus:
-    """Status of an agent with one neighbour."""
     (neighbour,) = set(NAMES) - {name}
     fields: dict[str, object] = {
         "phase": "running", "waits_for": "", "island": "inv1", "neighbours": (neighbour,), "ages": (age,), "used": used,

@@ -73,21 +73,18 @@ def test_no_field_is_without_bounds() -> None:
     assert found == ["Telemetry.rows[]", "Telemetry.rows[][]"]
 
 
-@pytest.mark.parametrize(
-    ("kind", "changes"),
-    [
-        (Measurement, {"roster": ["inv1", "inv2", "inv1"]}),
-        (Prepare, {"instances": ["a"]}),
-        (Prepare, {"roster": ["inv1", "inv1"]}),
-        (LinkReport, {"final": True, "instance": ""}),
-        (AgentStatus, {"ages": [0.1]}),
-        (AgentStatus, {"neighbours": ["inv2", "inv2"], "ages": [0.1, 0.2]}),
-        (Telemetry, {"inverters": ["inv1", "inv2"]}),
-        (Telemetry, {"rows": [[0.0, *[1.0] * 6], [0.0, *[1.0] * 6]]}),
-        (Telemetry, {"rows": [[math.nan, *[1.0] * 6]]}),
-        (Telemetry, {"rows": [[]]}),
-    ],
-)
+@pytest.mark.parametrize(("kind", "changes"), [
+    (Measurement, {"roster": ["inv1", "inv2", "inv1"]}),
+    (Prepare, {"instances": ["a"]}),
+    (Prepare, {"roster": ["inv1", "inv1"]}),
+    (LinkReport, {"final": True, "instance": ""}),
+    (AgentStatus, {"ages": [0.1]}),
+    (AgentStatus, {"neighbours": ["inv2", "inv2"], "ages": [0.1, 0.2]}),
+    (Telemetry, {"inverters": ["inv1", "inv2"]}),
+    (Telemetry, {"rows": [[0.0, *[1.0] * 6], [0.0, *[1.0] * 6]]}),
+    (Telemetry, {"rows": [[math.nan, *[1.0] * 6]]}),
+    (Telemetry, {"rows": [[]]}),
+])  # fmt: skip
 def test_what_a_message_says_twice_must_agree(kind: type[Message], changes: dict[str, Any]) -> None:
     """Rosters have no name twice, related lists have one length, and rows are in order of time."""
     assert refusal(packed(sound(kind, **changes))) == "implausible"

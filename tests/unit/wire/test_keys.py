@@ -80,7 +80,6 @@ def test_names_that_zenoh_would_refuse_or_hide_are_refused(bad: str) -> None:
 
 @given(st.from_regex(r"[A-Za-z0-9_.-]{1,64}", fullmatch=True))
 def test_every_name_that_is_accepted_makes_a_key(name: str) -> None:
-    """Zenoh accepts every name that gridpeers accepts."""
     check_name("run", name)
 
     zenoh.KeyExpr(Keys(name).state(name))

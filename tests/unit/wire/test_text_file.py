@@ -44,15 +44,12 @@ def test_decimal_commas_of_one_column_are_no_separators() -> None:
     assert read_table_text(b"delay_s\n0,012\n0,5\n", ["delay_s"], ["delay_s"]).rows == [(2, ["0.012"]), (3, ["0.5"])]
 
 
-@pytest.mark.parametrize(
-    ("rows", "said"),
-    [
-        ("a;1,500\nb;20", r'^"1,500" \(row 2\) has a comma for decimals or thousands; write it with a point'),
-        ("a;1,5\nb;1.5", r'^has decimal commas, "1,5" \(row 2\), and points, "1.5" \(row 3\); write all numbers'),
-        ("a;1,5\nb;1.500,5", r'^has decimal commas, "1,5" \(row 2\), and points, "1.500,5" \(row 3\)'),
-        ('a;"1', "^not a CSV file"),
-    ],
-)
+@pytest.mark.parametrize(("rows", "said"), [
+    ("a;1,500\nb;20", r'^"1,500" \(row 2\) has a comma for decimals or thousands; write it with a point'),
+    ("a;1,5\nb;1.5", r'^has decimal commas, "1,5" \(row 2\), and points, "1.5" \(row 3\); write all numbers'),
+    ("a;1,5\nb;1.500,5", r'^has decimal commas, "1,5" \(row 2\), and points, "1.500,5" \(row 3\)'),
+    ('a;"1', "^not a CSV file"),
+])  # fmt: skip
 def test_a_number_with_two_meanings_is_refused_in_one_line(rows: str, said: str) -> None:
     """1,500 is 1.5 in Germany and 1500 in England; a wrong load would be silent."""
     with pytest.raises(TextFileError, match=said):

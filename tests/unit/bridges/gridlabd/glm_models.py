@@ -133,7 +133,6 @@ object node { name nothing; phases ABCN; nominal_voltage 7200; }
 
 
 def write(folder: Path, text: str, name: str = "feeder.glm") -> Path:
-    """Write a model."""
     path = folder / name
     path.write_text(text)
     return path

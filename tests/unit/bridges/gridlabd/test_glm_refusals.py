@@ -18,7 +18,6 @@ NODE = "object node { name NAME; phases ABCN; nominal_voltage 7200; }\n"
 
 
 def line(name: str, start: str, end: str, length: str = "100") -> str:
-    """An overhead line."""
     words = {"NAME": name, "FROM": start, "TO": end, "LENGTH": length}
     text = LINE
     for key, value in words.items():

@@ -60,7 +60,6 @@ object volt_var_control { control_method ACTIVE; regulator_list "reg"; capacitor
 
 
 def regulated(regulator: str, sense: str, capacitor: str) -> str:
-    """Return a model with these controls."""
     return REGULATED.replace("REGULATOR", regulator).replace("SENSE", sense).replace("CAPACITOR", capacitor)
 
 

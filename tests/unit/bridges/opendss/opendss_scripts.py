@@ -131,7 +131,6 @@ def loads_of_all_models(limits: str) -> str:
 
 
 def loads_of_all_connections(model: int) -> str:
-    """A load of this model in each connection."""
     return "\n".join(
         f"New Load.l{k} {connection} kw=15 kvar=5 {MODELS[model]} vminpu=0.8 vmaxpu=1.2"
         for k, connection in enumerate(CONNECTIONS.values())

@@ -33,22 +33,19 @@ def unlike(path: Path) -> float:
     return max(abs(ours[name] - theirs[name]) / nominal[name] for name in shared)
 
 
-@pytest.mark.parametrize(
-    ("parts", "note"),
-    [
-        pytest.param(
-            (FLOATING,), "buses e, d (first e.1, e.2, e.3): no path to the source; left out, with 10 kW", id="section"
-        ),
-        pytest.param(
-            (SPUR, "New Load.m bus1=f.2 phases=1 kv=0.277 kw=9"), "load.m: nothing else is connected", id="phase"
-        ),
-        pytest.param(
-            (SPUR, "New Load.m bus1=f.1.2 phases=1 conn=delta kv=0.48 kw=9"),
-            "load.m: nothing else is connected",
-            id="loose end",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("parts", "note"), [
+    pytest.param(
+        (FLOATING,), "buses e, d (first e.1, e.2, e.3): no path to the source; left out, with 10 kW", id="section"
+    ),
+    pytest.param(
+        (SPUR, "New Load.m bus1=f.2 phases=1 kv=0.277 kw=9"), "load.m: nothing else is connected", id="phase"
+    ),
+    pytest.param(
+        (SPUR, "New Load.m bus1=f.1.2 phases=1 conn=delta kv=0.48 kw=9"),
+        "load.m: nothing else is connected",
+        id="loose end",
+    ),
+])  # fmt: skip
 def test_what_nothing_feeds_is_left_out(tmp_path: Path, parts: tuple[str, ...], note: str) -> None:
     """A floating section, and loads on a missing phase or with a loose end, take nothing; the rest is the engine's."""
     path = write(tmp_path, LINE, STEP_DOWN, LOAD, *parts)

@@ -68,13 +68,10 @@ def test_a_crash_of_the_engine_is_one_line(tmp_path: Path, package: Path) -> Non
     assert "makes no circuit" in problem(path)
 
 
-@pytest.mark.parametrize(
-    ("damage", "reason"),
-    [
-        ("raise OSError('libdss.so: cannot open')", "(OSError: libdss.so: cannot open)"),
-        ("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)", "(its process was killed by SIGSEGV)"),
-    ],
-)
+@pytest.mark.parametrize(("damage", "reason"), [
+    ("raise OSError('libdss.so: cannot open')", "(OSError: libdss.so: cannot open)"),
+    ("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)", "(its process was killed by SIGSEGV)"),
+])  # fmt: skip
 def test_a_damaged_wheel_is_one_line(tmp_path: Path, package: Path, damage: str, reason: str) -> None:
     """A package that is there and does not load is not missing: the line says why, and how to mend it."""
     package.write_text(damage + "\n")

@@ -53,7 +53,6 @@ def feeder(phases: str = "ABC", P: float = 5e5, *, switched: bool = False, place
 
 
 def test_a_switch_that_cuts_off_the_load_is_proposed() -> None:
-    """The switch is the one that cuts off the load, and the inverters carry it with the margin."""
     proposal = propose(feeder(switched=True))
 
     assert proposal.switch == "l"
@@ -69,14 +68,11 @@ def test_without_a_switch_lines_to_be_one_are_named() -> None:
     assert refused.value.lines[0] == "Line.l"
 
 
-@pytest.mark.parametrize(
-    ("small", "told"),
-    [
-        (feeder("A"), "no single three-phase line does either"),
-        (feeder("A", switched=True), "no bus has phases A, B and C, which an inverter needs"),
-        (feeder(P=0.0, switched=True), "the feeder has no load"),
-    ],
-)
+@pytest.mark.parametrize(("small", "told"), [
+    (feeder("A"), "no single three-phase line does either"),
+    (feeder("A", switched=True), "no bus has phases A, B and C, which an inverter needs"),
+    (feeder(P=0.0, switched=True), "the feeder has no load"),
+])  # fmt: skip
 def test_what_cannot_be_islanded_says_why(small: Tables, told: str) -> None:
     """A feeder of one phase, and one without load, are refused in one line."""
     with pytest.raises(NoProposalError, match=told):
@@ -93,7 +89,6 @@ def test_a_feeder_without_coordinates_is_drawn_as_a_tree() -> None:
 
 
 def test_a_feeder_with_coordinates_is_drawn_on_them() -> None:
-    """Coordinates are kept."""
     assert places(feeder(places=True)) == {"s": (1.0, 1.0), "a": (2.0, 1.0), "b": (3.0, 1.0)}
 
 

@@ -60,7 +60,6 @@ def test_what_is_only_read_does_not_wait_for_heavy_modules(lines: list[list[str]
 
 
 def test_list_shows_the_catalogue() -> None:
-    """Each scenario with its title and cases."""
     code, text = invoke("list")
 
     assert code == 0
@@ -222,7 +221,6 @@ def test_the_version_is_told_without_a_command() -> None:
 
 
 def test_a_command_alone_shows_its_help() -> None:
-    """A command without arguments shows its help."""
     assert "Print the version, and end." in invoke()[1]
     assert "Commands:" in invoke("link")[1]
 

@@ -64,15 +64,12 @@ def read_mat(folder: Path) -> Tables:
     return {name: pd.DataFrame({key: column(of) for key, of in content[name].items()}) for name in NAMES}
 
 
-@pytest.mark.parametrize(
-    ("to", "package", "read"),
-    [
-        ("parquet", "pyarrow", lambda it: {name: pd.read_parquet(it / f"{name}.parquet") for name in NAMES}),
-        ("feather", "pyarrow", lambda it: {name: pd.read_feather(it / f"{name}.feather") for name in NAMES}),
-        ("xlsx", "openpyxl", lambda it: pd.read_excel(it / "run.xlsx", sheet_name=None)),
-        ("mat", "scipy", read_mat),
-    ],
-)
+@pytest.mark.parametrize(("to", "package", "read"), [
+    ("parquet", "pyarrow", lambda it: {name: pd.read_parquet(it / f"{name}.parquet") for name in NAMES}),
+    ("feather", "pyarrow", lambda it: {name: pd.read_feather(it / f"{name}.feather") for name in NAMES}),
+    ("xlsx", "openpyxl", lambda it: pd.read_excel(it / "run.xlsx", sheet_name=None)),
+    ("mat", "scipy", read_mat),
+])  # fmt: skip
 def test_other_formats_have_the_same_tables(
     to: str, package: str, read: Callable[[Path], Tables], run: Path, tmp_path: Path
 ) -> None:
@@ -103,16 +100,13 @@ def test_of_a_record_that_is_cut_off_there_is_what_it_has(run: Path, tmp_path: P
     assert rows == (run / "IV" / "history.csv").read_text().splitlines()[: len(rows)]
 
 
-@pytest.mark.parametrize(
-    ("words", "complaint"),
-    [
-        (("nowhere",), "nowhere: cannot be read: No such file or directory"),
-        (("{run}", "--case", "V"), 'no record of case "V"'),
-        (("{run}", "--to", "hdf"), "--to.*hdf.*xlsx"),
-        (("{run}/IV", "--to", "xlsx"), "history has 51 rows, and a sheet of xlsx takes 20; use --to"),
-        (("{run}/IV", "--to", "parquet"), r"pyarrow is not installed; .* pip install 'gridpeers\[export\]'"),
-    ],
-)
+@pytest.mark.parametrize(("words", "complaint"), [
+    (("nowhere",), "nowhere: cannot be read: No such file or directory"),
+    (("{run}", "--case", "V"), 'no record of case "V"'),
+    (("{run}", "--to", "hdf"), "--to.*hdf.*xlsx"),
+    (("{run}/IV", "--to", "xlsx"), "history has 51 rows, and a sheet of xlsx takes 20; use --to"),
+    (("{run}/IV", "--to", "parquet"), r"pyarrow is not installed; .* pip install 'gridpeers\[export\]'"),
+])  # fmt: skip
 def test_bad_input_is_one_line(
     words: tuple[str, ...], complaint: str, run: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -79,17 +79,14 @@ def test_the_command_keeps_every_run_with_its_seed_and_schedule(elsewhere: Path)
     assert "2 of 2 runs" in (elsewhere / "one" / "report.txt").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("nowhere",), 'no scenario "nowhere"'),
-        (("islanding", "--case", "V"), '--case: no case "V"'),
-        (("islanding", "--case", "I,IV"), "--case: takes one case, got I,IV"),
-        (("islanding", "--runs", "0"), "--runs"),
-        (("gridlabd.toml",), "lets no inverter leave or join"),
-        (("keys.toml", "--driver", "processes"), "needs certificates, and chaos uses no certificates"),
-    ],
-)
+@pytest.mark.parametrize(("words", "said"), [
+    (("nowhere",), 'no scenario "nowhere"'),
+    (("islanding", "--case", "V"), '--case: no case "V"'),
+    (("islanding", "--case", "I,IV"), "--case: takes one case, got I,IV"),
+    (("islanding", "--runs", "0"), "--runs"),
+    (("gridlabd.toml",), "lets no inverter leave or join"),
+    (("keys.toml", "--driver", "processes"), "needs certificates, and chaos uses no certificates"),
+])  # fmt: skip
 def test_bad_input_is_refused_in_one_line_before_anything_starts(
     words: tuple[str, ...], said: str, elsewhere: Path
 ) -> None:

@@ -117,17 +117,14 @@ ROW = ChaosRow(number=0, schedule=())
 LASTS = JudgedRun(ROW, collapses=(COLLAPSED,), off=WEST)
 
 
-@pytest.mark.parametrize(
-    ("faulty", "plain", "excused"),
-    [
-        (LASTS, LASTS, True),
-        (LASTS, LASTS._replace(collapses=()), False),  # faults led to the collapse
-        (LASTS, LASTS._replace(collapses=(COLLAPSED._replace(label="event2"),)), False),
-        (LASTS, LASTS._replace(collapses=(COLLAPSED._replace(inverters=EAST),)), False),  # they took another island
-        (LASTS, LASTS._replace(off=frozenset()), False),  # without faults it recovers
-        (LASTS._replace(off=frozenset()), LASTS, False),  # it has recovered, and is to be restored
-    ],
-)
+@pytest.mark.parametrize(("faulty", "plain", "excused"), [
+    (LASTS, LASTS, True),
+    (LASTS, LASTS._replace(collapses=()), False),  # faults led to the collapse
+    (LASTS, LASTS._replace(collapses=(COLLAPSED._replace(label="event2"),)), False),
+    (LASTS, LASTS._replace(collapses=(COLLAPSED._replace(inverters=EAST),)), False),  # they took another island
+    (LASTS, LASTS._replace(off=frozenset()), False),  # without faults it recovers
+    (LASTS._replace(off=frozenset()), LASTS, False),  # it has recovered, and is to be restored
+])  # fmt: skip
 def test_only_a_collapse_that_comes_and_lasts_without_faults_excuses(
     faulty: JudgedRun, plain: JudgedRun, excused: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:

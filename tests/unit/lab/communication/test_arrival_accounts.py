@@ -21,11 +21,8 @@ from tests.record.fake_clock import FakeClockRun, fake_clock_record
 
 LINK = ("inv1", "inv2")
 
-LINKED_WITHIN = 7.0
-"""Time (s) after which two processes that are there must hear each other."""
-
-IN_FLIGHT = 1.0
-"""Time (s) before the end of either side that is left out, as the check does."""
+LINKED_WITHIN = 7.0  # Time (s) after which two processes that are there must hear each other
+IN_FLIGHT = 1.0  # Time (s) before the end of either side that is left out, as the check does
 
 
 def missing(
@@ -121,8 +118,7 @@ def test_a_new_session_over_which_nothing_arrives_is_missed() -> None:
     assert min(second.missing.values()) == pytest.approx(12.1)
 
 
-LOST = range(50, 60)
-"""Numbers of the messages from inv1 to inv2 that never arrive: those of 1.0 to 1.2 s."""
+LOST = range(50, 60)  # Numbers of the messages from inv1 to inv2 that never arrive: those of 1.0 to 1.2 s
 
 
 LOST_OF = "states of inv1 neither heard nor lost: inv2 {} s (limit 0)"

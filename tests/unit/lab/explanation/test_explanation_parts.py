@@ -43,18 +43,15 @@ def fate_of(outcome: Outcome, *later: Outcome, **changes: Any) -> str:
     return missed(record, EVERY, EVERY.neighbours[0], fates, {})
 
 
-@pytest.mark.parametrize(
-    ("outcome", "why"),
-    [
-        ("loss", "loss"),
-        ("queue", "queue"),
-        (0.5, "late"),
-        (float("inf"), "kept"),
-        (((0.01, 3),), "damaged"),
-        (((0.01, 3), (0.5, None)), "late"),
-        (((float("inf"), None), (0.01, 3)), "kept"),
-    ],
-)
+@pytest.mark.parametrize(("outcome", "why"), [
+    ("loss", "loss"),
+    ("queue", "queue"),
+    (0.5, "late"),
+    (float("inf"), "kept"),
+    (((0.01, 3),), "damaged"),
+    (((0.01, 3), (0.5, None)), "late"),
+    (((float("inf"), None), (0.01, 3)), "kept"),
+])  # fmt: skip
 def test_the_verdict_of_the_link_says_why_a_state_was_not_heard(outcome: Outcome, why: str) -> None:
     """Of several copies the sound ones count, of several verdicts the last; other links, and other senders, do not."""
     assert fate_of(outcome) == f"1 state since: 1 {WORDS[why]}"

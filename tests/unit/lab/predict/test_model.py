@@ -125,14 +125,11 @@ def test_constant_differences_between_parts_of_the_graph_are_counted() -> None:
     assert Loop(inverters=inverters("path")).resting == 0
 
 
-@pytest.mark.parametrize(
-    ("ticks", "said"),
-    [
-        (Ticks(link=-1), "0 or more, got -1"),
-        (Ticks(loss=30.0), "got 30; write 0.3 for 30 %"),
-        (Ticks(loss=1.0), "from 0 to below 1, got 1"),
-    ],
-)
+@pytest.mark.parametrize(("ticks", "said"), [
+    (Ticks(link=-1), "0 or more, got -1"),
+    (Ticks(loss=30.0), "got 30; write 0.3 for 30 %"),
+    (Ticks(loss=1.0), "from 0 to below 1, got 1"),
+])  # fmt: skip
 def test_impossible_delays_and_losses_are_refused(ticks: Ticks, said: str) -> None:
     """They are errors."""
     with pytest.raises(ValueError, match=said):

@@ -52,13 +52,10 @@ def test_leave_and_return_are_predicted() -> None:
     assert "left out (--no-vars)" in words
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["predict", "islanding", "--case", "V"], '--case: no case "V"; did you mean "IV"?'),
-        (["predict", "bad.toml"], "bad.toml:15: time.T_c_s: 20 s is not plausible"),
-    ],
-)
+@pytest.mark.parametrize(("words", "said"), [
+    (["predict", "islanding", "--case", "V"], '--case: no case "V"; did you mean "IV"?'),
+    (["predict", "bad.toml"], "bad.toml:15: time.T_c_s: 20 s is not plausible"),
+])  # fmt: skip
 def test_bad_input_is_refused_as_by_the_other_commands(elsewhere: Path, words: list[str], said: str) -> None:
     """Exit code 2 and a line with the remedy."""
     (elsewhere / "bad.toml").write_text(ISLANDING.replace("T_c_s = 0.02", "T_c_s = 20"))

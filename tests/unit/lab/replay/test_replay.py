@@ -100,14 +100,11 @@ def test_where_parts_of_a_journal_are_lost_its_steps_end(missing: int, told: str
     assert process.ends.startswith(f"the journal of inv1 {told} at t = ")
 
 
-@pytest.mark.parametrize(
-    ("entry", "counts"),
-    [
-        (RejectedCount(1001.0, "state/inv2", "excess", 500), {"excess": 500}),
-        (RejectedCount(1001.0, "state/inv2", "of a later version", 7), {}),
-        (ReceivedMessage(1001.0, "measurement/inv1", b"", "corrupt"), {"corrupt": 1}),
-    ],
-)
+@pytest.mark.parametrize(("entry", "counts"), [
+    (RejectedCount(1001.0, "state/inv2", "excess", 500), {"excess": 500}),
+    (RejectedCount(1001.0, "state/inv2", "of a later version", 7), {}),
+    (ReceivedMessage(1001.0, "measurement/inv1", b"", "corrupt"), {"corrupt": 1}),
+])  # fmt: skip
 def test_what_was_rejected_unseen_is_rejected_again_by_its_number(
     entry: RejectedCount | ReceivedMessage, counts: dict[str, int], record: RunRecord
 ) -> None:
@@ -126,17 +123,14 @@ def test_what_was_rejected_unseen_is_rejected_again_by_its_number(
 # -------------------------------------------------------------------- differences
 
 
-@pytest.mark.parametrize(
-    ("changes", "found"),
-    [
-        ({}, None),
-        ({"P_set": 5e4 + 1e-10}, None),
-        ({"P_set": 5e4 + 1e-8}, ("P_set", "W")),
-        ({"shared": {"w": 0.5 + 1e-10}}, None),
-        ({"shared": {"w": 0.6}}, ("shared", "")),
-        ({"quiet": True}, ("quiet", "")),
-    ],
-)
+@pytest.mark.parametrize(("changes", "found"), [
+    ({}, None),
+    ({"P_set": 5e4 + 1e-10}, None),
+    ({"P_set": 5e4 + 1e-8}, ("P_set", "W")),
+    ({"shared": {"w": 0.5 + 1e-10}}, None),
+    ({"shared": {"w": 0.6}}, ("shared", "")),
+    ({"quiet": True}, ("quiet", "")),
+])  # fmt: skip
 def test_the_first_field_that_differs_is_named(changes: dict[str, Any], found: tuple[str, str] | None) -> None:
     """With its unit; numbers are the same within 1e-9."""
     difference = message_difference(STATE, replace(STATE, **changes))

@@ -22,10 +22,8 @@ Z_B = V_B**2 / (S_B / 3.0)
 A = np.exp(2j * np.pi / 3.0)
 BALANCED = np.array([1.0, A**2, A])
 
-GFM_D = GfmDroop(R_f=0.01, X_f=0.15, P_max=1.5, k_ip=30.0)
-"""GridLAB-D's defaults."""
-GFM_A = GfmDroop(R_f=0.014, X_f=0.1636, P_max=1.5, k_ip=30.0)
-"""The same with the autotest's filter."""
+GFM_D = GfmDroop(R_f=0.01, X_f=0.15, P_max=1.5, k_ip=30.0)  # GridLAB-D's defaults
+GFM_A = GfmDroop(R_f=0.014, X_f=0.1636, P_max=1.5, k_ip=30.0)  # The same with the autotest's filter
 GFL_D = Gfl(
     F_current=0.0, frequency_watt=False, volt_var=False, T_ff=0.1, T_pf=0.5, T_vf=0.05, T_qf=0.2, S_max=1.0, i_max=1.0
 )

@@ -119,7 +119,6 @@ def test_machine_code_in_a_folder_that_is_read_alone_is_used(folder: Path, monke
 
 
 def refuse(*_: object) -> None:
-    """Write nothing, as the system refuses it."""
     raise PermissionError
 
 

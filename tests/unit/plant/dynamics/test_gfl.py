@@ -194,8 +194,7 @@ def test_the_refused_gains_do_diverge() -> None:
     assert np.abs(p).max() > 100.0
 
 
-OPEN_LOOP = 5.0
-"""Open-loop response time of both functions (s): to 90 % of a step, 2.3 time constants."""
+OPEN_LOOP = 5.0  # Open-loop response time of both functions (s): to 90 % of a step, 2.3 time constants
 
 CATEGORY_B = replace(
     GFL_D,
@@ -216,8 +215,7 @@ CATEGORY_B = replace(
 )
 """The standard's default settings: V1 to V4 are 0.92, 0.98, 1.02 and 1.08 pu."""
 
-M_P, M_Q = 0.05, 0.06 / 0.44
-"""k_OF and k_UF, and (V2 - V1) / Q1."""
+M_P, M_Q = 0.05, 0.06 / 0.44  # k_OF and k_UF, and (V2 - V1) / Q1
 
 P_SET = 0.5
 
@@ -227,19 +225,16 @@ def record() -> Any:
     return by_name(on_stiff_bus(CATEGORY_B, m_p=M_P, m_q=M_Q).inverters.constants(0))
 
 
-@pytest.mark.parametrize(
-    ("V", "Q"),
-    [
-        (0.90, 0.44),
-        (0.92, 0.44),
-        (0.94, 0.44 * 4 / 6),
-        (0.98, 0.0),
-        (1.0, 0.0),
-        (1.02, 0.0),
-        (1.05, -0.22),
-        (1.1, -0.44),
-    ],
-)
+@pytest.mark.parametrize(("V", "Q"), [
+    (0.90, 0.44),
+    (0.92, 0.44),
+    (0.94, 0.44 * 4 / 6),
+    (0.98, 0.0),
+    (1.0, 0.0),
+    (1.02, 0.0),
+    (1.05, -0.22),
+    (1.1, -0.44),
+])  # fmt: skip
 def test_volt_var_is_the_standards_line_through_four_points(V: float, Q: float) -> None:
     """There are no vars within the band, and Q goes from its edges to Q1 and Q4 without a jump."""
     assert gfl.var_reference(record(), 1.0, 0.0, V, P_SET) == pytest.approx(Q, abs=1e-12)

@@ -55,8 +55,7 @@ def test_many_inverters_start_where_few_do(
 
 
 VOLT_VAR = replace(GFL_D, volt_var=True, F_current=0.6, T_qf=0.1)
-X, M_Q = 0.05, 0.05
-"""Reactance between the source and the inverter (pu), and the inverter's Q-V droop (pu per pu)."""
+X, M_Q = 0.05, 0.05  # Reactance between the source and the inverter (pu), and the inverter's Q-V droop (pu per pu)
 
 
 def started(parameters: Gfl, source: float, P: float = 0.0) -> Dynamics:

@@ -24,8 +24,7 @@ from tests.unit.plant.dynamics.circuits import (
     pair,
 )
 
-OMEGA_0 = 2.0 * np.pi * 60.0
-"""Nominal speed (rad/s)."""
+OMEGA_0 = 2.0 * np.pi * 60.0  # Nominal speed (rad/s)
 
 
 def constant_power(p: float) -> Circuit:

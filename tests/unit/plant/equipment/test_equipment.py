@@ -76,7 +76,6 @@ def part(name: str, bus: str, S: complex) -> LoadPart:
 
 
 def load(bus: str, *S: complex, model: str = "P") -> Load:
-    """A wye load of our own tables."""
     return Load(bus=bus, connection="Y", model=model, S=(S[0], S[1], S[2]))  # type: ignore[arg-type]
 
 
@@ -133,7 +132,6 @@ def test_branches_keep_their_shares() -> None:
 
 
 def scenario_of(tmp_path: Path, tables: str = "", feeder: str = "microgrid123") -> Path:
-    """Islanding with further tables."""
     text = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
     path = tmp_path / "mine.toml"
     path.write_text(text.replace('feeder = "microgrid123"', f'feeder = "{feeder}"') + tables, encoding="utf-8")
@@ -163,25 +161,22 @@ def test_an_inverters_own_keys_come_before_its_set_and_its_set_before_its_kind(t
     assert units["b"] == Gfl(T_pf=0.1, T_qf=0.15)
 
 
-@pytest.mark.parametrize(
-    ("tables", "said"),
-    [
-        ("[plant.inverter.inv1]\nS_max_pu = 1", r"plant.inverter.inv1.S_max_pu: a GFM has no such parameter"),
-        ('[plant.inverter.inv2]\nmodel = "regfm_a1"', r'inv2.model: a GFL has no model "regfm_a1"'),
-        ('[plant.inverter.inv1]\nparameters = "regfm_a"', r'no parameter set "regfm_a"; did you mean "regfm_a1"\?'),
-        ('[plant.inverter.inv2]\nparameters = "regfm_a1"', r'set "regfm_a1" has .*, which is no parameter of a GFL'),
-        ("[plant.inverter.inv1]\nT_p = 0.1", r'plant.inverter.inv1.T_p: unknown key; did you mean "T_p_s"'),
-        (
-            "[plant.inverter.inv1]\nP_min_pu = 1.1",
-            r"inv1.P_min_pu: 1.1 pu must be below P_max_pu = 1 pu; .*\[plant.gfm\]",
-        ),
-        ("[plant.inverter.inv1]\nP_max_pu = 0.5", r"0.647 pu is above P_max_pu of inv1 = 0.5 pu"),
-        (
-            "[plant.inverter.inv1]\nT_p_s = 0.005",
-            r"too long a step to resolve T_p_s = 0.005 s of \[plant.inverter.inv1\]",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("tables", "said"), [
+    ("[plant.inverter.inv1]\nS_max_pu = 1", r"plant.inverter.inv1.S_max_pu: a GFM has no such parameter"),
+    ('[plant.inverter.inv2]\nmodel = "regfm_a1"', r'inv2.model: a GFL has no model "regfm_a1"'),
+    ('[plant.inverter.inv1]\nparameters = "regfm_a"', r'no parameter set "regfm_a"; did you mean "regfm_a1"\?'),
+    ('[plant.inverter.inv2]\nparameters = "regfm_a1"', r'set "regfm_a1" has .*, which is no parameter of a GFL'),
+    ("[plant.inverter.inv1]\nT_p = 0.1", r'plant.inverter.inv1.T_p: unknown key; did you mean "T_p_s"'),
+    (
+        "[plant.inverter.inv1]\nP_min_pu = 1.1",
+        r"inv1.P_min_pu: 1.1 pu must be below P_max_pu = 1 pu; .*\[plant.gfm\]",
+    ),
+    ("[plant.inverter.inv1]\nP_max_pu = 0.5", r"0.647 pu is above P_max_pu of inv1 = 0.5 pu"),
+    (
+        "[plant.inverter.inv1]\nT_p_s = 0.005",
+        r"too long a step to resolve T_p_s = 0.005 s of \[plant.inverter.inv1\]",
+    ),
+])  # fmt: skip
 def test_parameters_that_an_inverter_cannot_have_are_problems(tmp_path: Path, tables: str, said: str) -> None:
     """Each problem names its key and inverter, before anything starts."""
     path = scenario_of(tmp_path, f"\n{tables}\n")

@@ -29,18 +29,15 @@ def plant(*events: SwitchEvent, load_set: str = "main", record: float = T_C, **s
 
 
 def opened(t: float, *switches: str) -> tuple[SwitchEvent, ...]:
-    """Open these switches at t."""
     return tuple(SwitchEvent(t=t, switch=name, action="open") for name in switches)
 
 
 def run(p: Plant, until: float) -> None:
-    """Advance to a time."""
     while p.tick * T_C < until - 1e-9:
         p.advance()
 
 
 def totals(p: Plant) -> tuple[float, float]:
-    """Give the inverters' total kW and kvar."""
     readings = p.measure().values()
     return sum(r.P for r in readings) / 1e3, sum(r.Q for r in readings) / 1e3
 
@@ -63,15 +60,12 @@ def test_the_feeder_rests(model: str) -> None:
         assert now.island == "grid"
 
 
-@pytest.mark.parametrize(
-    ("load_set", "switches", "f", "P", "Q"),
-    [
-        ("main", ("13-152",), 59.8640, 3407.4, 1162.6),
-        ("main", ("13-152", "60-160"), 60.0543, 2170.4, 498.7),
-        ("event2", ("13-152",), 59.864, 3409.0, None),
-        ("event2", ("13-152", "60-160"), 60.071, 2063.0, None),
-    ],
-)
+@pytest.mark.parametrize(("load_set", "switches", "f", "P", "Q"), [
+    ("main", ("13-152",), 59.8640, 3407.4, 1162.6),
+    ("main", ("13-152", "60-160"), 60.0543, 2170.4, 498.7),
+    ("event2", ("13-152",), 59.864, 3409.0, None),
+    ("event2", ("13-152", "60-160"), 60.071, 2063.0, None),
+])  # fmt: skip
 def test_droop_alone_settles_where_the_power_flow_says(
     load_set: str, switches: tuple[str, ...], f: float, P: float, Q: float | None
 ) -> None:

@@ -131,7 +131,6 @@ def test_no_schedule_of_switching_ends_the_plant(category: Literal["off", "III"]
 
 
 def inverter(name: str, bus: str) -> InverterRow:
-    """A GFM at a bus."""
     return InverterRow(name=name, kind="GFM", bus=bus, microgrid="MG1", P_rated=600e3, V_nom=2400.0, m_p=0.01, m_q=0.05)
 
 

@@ -65,19 +65,16 @@ def test_a_load_is_changed_once_and_restored_to_the_byte() -> None:
     np.testing.assert_array_equal(again.loads().law.I0, first.loads().law.I0)
 
 
-@pytest.mark.parametrize(
-    ("name", "setting", "said"),
-    [
-        ("1000", LoadSetting(factor=1.0), 'load "1000": no such load; did you mean "100"?'),
-        ("48", LoadSetting(factor=-1.0), "load 48: a factor on a load must not be negative, got -1"),
-        ("48", LoadSetting(factor=11.0), r"load 48: 11 is not plausible for a factor on a load \(0 to 10\)"),
-        ("48", LoadSetting(P=-1.0), "load 48: the real power of a load must not be negative, got -0.001 kW"),
-        ("48", LoadSetting(P=210e6), r"210000 kW is not plausible .*; did you mean 210 \(210000 W\)\?"),
-        ("48", LoadSetting(), "load 48: takes either a factor, or real or reactive power"),
-        ("48", LoadSetting(factor=1.0, P=1e3), "load 48: takes either a factor, or real or reactive power"),
-        ("48", LoadSetting(Q=-90e6), "-90000 kvar is not plausible for the reactive power of a load"),
-    ],
-)
+@pytest.mark.parametrize(("name", "setting", "said"), [
+    ("1000", LoadSetting(factor=1.0), 'load "1000": no such load; did you mean "100"?'),
+    ("48", LoadSetting(factor=-1.0), "load 48: a factor on a load must not be negative, got -1"),
+    ("48", LoadSetting(factor=11.0), r"load 48: 11 is not plausible for a factor on a load \(0 to 10\)"),
+    ("48", LoadSetting(P=-1.0), "load 48: the real power of a load must not be negative, got -0.001 kW"),
+    ("48", LoadSetting(P=210e6), r"210000 kW is not plausible .*; did you mean 210 \(210000 W\)\?"),
+    ("48", LoadSetting(), "load 48: takes either a factor, or real or reactive power"),
+    ("48", LoadSetting(factor=1.0, P=1e3), "load 48: takes either a factor, or real or reactive power"),
+    ("48", LoadSetting(Q=-90e6), "-90000 kvar is not plausible for the reactive power of a load"),
+])  # fmt: skip
 def test_an_invalid_setting_is_refused_and_changes_nothing(name: str, setting: LoadSetting, said: str) -> None:
     """The message says what would be right."""
     board = LoadBoard(Network(read_feeder("microgrid123")))
@@ -94,7 +91,6 @@ def every_load(t: float, factor: float) -> tuple[LoadEvent, ...]:
 
 
 def kinds(p: Plant) -> set[str]:
-    """Kinds of all events since the last call."""
     return {event.kind for event in p.take_events()}
 
 

@@ -66,7 +66,6 @@ KINDS = {
 
 
 def imported(folder: Path, street: str) -> tuple[gp.Feeder, str]:
-    """The feeder of a script, and the script."""
     script = SOURCE + street + "Set VoltageBases=[15 0.4]\nCalcVoltageBases\nSolve\n"
     (folder / "Master.dss").write_text(script)
     return gp.Feeder.read(folder / "Master.dss", switches=["Line.a1"]), script

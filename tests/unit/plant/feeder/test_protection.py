@@ -28,7 +28,6 @@ SETTINGS = [(category, name) for category in DEFAULTS for name in DEFAULTS[categ
 
 
 def row(value: float) -> NDArray[np.float64]:
-    """One step of one inverter."""
     return np.array([[value]])
 
 
@@ -116,22 +115,18 @@ def test_an_inverter_that_is_off_does_not_trip() -> None:
 def wait(
     recovery: Recovery, steps: int, *, f: float = 60.0, low: float = 1.0, high: float = 1.0, dead: bool = False
 ) -> None:
-    """Let steps go by."""
     trace = np.ones((steps, 1))
     recovery.watch(f * trace, low * trace, high * trace, np.array([dead]))
 
 
-@pytest.mark.parametrize(
-    ("seen", "enters"),
-    [
-        ({}, True),
-        ({"low": 0.917, "high": 1.05, "f": 60.1}, True),
-        ({"low": 0.916}, False),
-        ({"high": 1.051}, False),
-        ({"f": 59.49}, False),
-        ({"f": 60.11}, False),
-    ],
-)
+@pytest.mark.parametrize(("seen", "enters"), [
+    ({}, True),
+    ({"low": 0.917, "high": 1.05, "f": 60.1}, True),
+    ({"low": 0.916}, False),
+    ({"high": 1.051}, False),
+    ({"f": 59.49}, False),
+    ({"f": 60.11}, False),
+])  # fmt: skip
 def test_an_inverter_enters_service_after_the_delay_with_normal_voltage_and_frequency(
     seen: dict[str, float], enters: bool
 ) -> None:
@@ -194,7 +189,6 @@ def plant(protection: Protection, *events: SwitchEvent, limits: tuple[PowerLimit
 
 
 def trips(events: tuple[PlantEvent, ...]) -> list[PlantEvent]:
-    """Pick the events of protection."""
     return [event for event in events if event.kind == "trip"]
 
 

@@ -17,7 +17,6 @@ Z_SELF, Z_MUTUAL = 0.3 + 0.6j, 0.1 + 0.3j
 
 
 def unit(name: str, kind: str, bus: str, phases: str, P_rated: float) -> InverterRow:
-    """An inverter of the default droops."""
     return InverterRow(
         name=name,
         kind=kind,  # type: ignore[arg-type]

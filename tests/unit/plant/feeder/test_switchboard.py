@@ -25,7 +25,6 @@ H = 0.002
 
 
 def event(t: float, switch: str, action: str) -> SwitchEvent:
-    """An operation on schedule."""
     return SwitchEvent(t=t, switch=switch, action="open" if action == "open" else "close")
 
 
@@ -100,15 +99,12 @@ def scaled(folder: Path, connection: tuple[str, str], unit: str, factor: float) 
     return replace(feeder, load_parts=parts, inverters=(row,))
 
 
-@pytest.mark.parametrize(
-    ("connection", "unit", "name", "factor"),
-    [
-        (DELTA, GENERATOR, "generator.g", 1.0),
-        (DELTA, PV, "pvsystem.pv", 0.05),
-        (FLOATING, GENERATOR, "generator.g", 0.05),  # beside all of the load there is a point, though OpenDSS has none
-        (DELTA, HARDLY_GROUNDED, "generator.g", 0.05),
-    ],
-)
+@pytest.mark.parametrize(("connection", "unit", "name", "factor"), [
+    (DELTA, GENERATOR, "generator.g", 1.0),
+    (DELTA, PV, "pvsystem.pv", 0.05),
+    (FLOATING, GENERATOR, "generator.g", 0.05),  # beside all of the load there is a point, though OpenDSS has none
+    (DELTA, HARDLY_GROUNDED, "generator.g", 0.05),
+])  # fmt: skip
 def test_constant_power_that_nothing_grounds_is_named(
     tmp_path: Path, connection: tuple[str, str], unit: str, name: str, factor: float
 ) -> None:
@@ -185,14 +181,11 @@ def test_a_spell_of_limited_set_points_is_one_event_with_value_and_bound() -> No
     assert ["P_set 10000 kW" in event.text for event in p.take_events()] == [True]
 
 
-@pytest.mark.parametrize(
-    ("settings", "said"),
-    [
-        (PlantSettings(P_set0=1.1, gfl=Gfl(P_max=1.1)), r"inv1 needs P of \d+ kW; .*P_set0_pu"),
-        (PlantSettings(V_set0=1.2), r"inv1 needs an internal voltage of 1\.\d+ pu; .*E_max_pu.*V_set0_pu"),
-        (PlantSettings(gfm=GfmDroop(Q_max=0.01)), r"inv1 needs Q of \d+(\.\d+)? kvar; .*Q_max_pu.*V_set0_pu"),
-    ],
-)
+@pytest.mark.parametrize(("settings", "said"), [
+    (PlantSettings(P_set0=1.1, gfl=Gfl(P_max=1.1)), r"inv1 needs P of \d+ kW; .*P_set0_pu"),
+    (PlantSettings(V_set0=1.2), r"inv1 needs an internal voltage of 1\.\d+ pu; .*E_max_pu.*V_set0_pu"),
+    (PlantSettings(gfm=GfmDroop(Q_max=0.01)), r"inv1 needs Q of \d+(\.\d+)? kvar; .*Q_max_pu.*V_set0_pu"),
+])  # fmt: skip
 def test_a_start_beyond_the_limits_of_the_gfm_that_holds_an_island_up_is_refused(
     settings: PlantSettings, said: str
 ) -> None:

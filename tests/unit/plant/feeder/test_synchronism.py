@@ -34,7 +34,6 @@ def run(p: Plant, until: float) -> list[str]:
 
 
 def close(t: float, *, synchronised: bool) -> SwitchEvent:
-    """Close the switch to the grid."""
     return SwitchEvent(t=t, switch="13-152", action="close", synchronised=synchronised)
 
 
@@ -108,7 +107,6 @@ def test_a_switch_that_is_never_in_step_gives_up(network: Network) -> None:
 
 
 def test_opening_a_switch_ends_its_wait(network: Network) -> None:
-    """Opening a switch that waits to close ends its wait."""
     p = plant(network, close(2.5, synchronised=True), SwitchEvent(t=3.0, switch="13-152", action="open"), f=1.0)
     told = run(p, 12.0)
 

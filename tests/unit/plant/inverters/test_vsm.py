@@ -171,21 +171,18 @@ def test_a_wrong_model_is_a_problem_at_its_key(tmp_path: Path) -> None:
     assert "plant.inverter.inv4" in text
 
 
-@pytest.mark.parametrize(
-    ("right", "wrong", "words"),
-    [
-        ("/ g.T_q", "/ g.T_x", "its method advance fails (machine.py:23): AttributeError"),
-        ("x.q = gp", "x.z = gp", "its pass sets z, which its STATES do not name"),
-        ('("q",)', '("w", "q")', "its STATES must be a tuple of names, each one once and beside theta, w and f"),
-        ('("q",)', '"q"', "its STATES must be a tuple of names"),
-        ("x.q = gp", "if x.q > 9.0:\n            raise ValueError\n        x.q = gp", "its pass raises an error"),
-        ("holds_terminal = False", "admittance = lambda self, rating: 1j * float('nan')", "its admittance is (nan"),
-        ("holds_terminal = False", "response = lambda self: -0.1", "its response is -0.1; it must be None, or a"),
-        ("holds_terminal = False", "response = None", "its method response fails: TypeError"),
-        ("def rest(", "def begin(", "it has no static method rest"),
-        ("    @staticmethod\n    def rest(", "    def rest(", "it has no static method rest"),
-    ],
-)
+@pytest.mark.parametrize(("right", "wrong", "words"), [
+    ("/ g.T_q", "/ g.T_x", "its method advance fails (machine.py:23): AttributeError"),
+    ("x.q = gp", "x.z = gp", "its pass sets z, which its STATES do not name"),
+    ('("q",)', '("w", "q")', "its STATES must be a tuple of names, each one once and beside theta, w and f"),
+    ('("q",)', '"q"', "its STATES must be a tuple of names"),
+    ("x.q = gp", "if x.q > 9.0:\n            raise ValueError\n        x.q = gp", "its pass raises an error"),
+    ("holds_terminal = False", "admittance = lambda self, rating: 1j * float('nan')", "its admittance is (nan"),
+    ("holds_terminal = False", "response = lambda self: -0.1", "its response is -0.1; it must be None, or a"),
+    ("holds_terminal = False", "response = None", "its method response fails: TypeError"),
+    ("def rest(", "def begin(", "it has no static method rest"),
+    ("    @staticmethod\n    def rest(", "    def rest(", "it has no static method rest"),
+])  # fmt: skip
 def test_a_pass_with_a_mistake_is_refused_with_its_line(tmp_path: Path, right: str, wrong: str, words: str) -> None:
     """`check` runs the pass once as a function of Python, whose errors say more than the compiler's."""
     path = scenario(tmp_path / "own", "machine:Machine", "machine:Machine")

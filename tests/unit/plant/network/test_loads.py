@@ -165,7 +165,6 @@ def test_de_energised_buses_have_no_voltage() -> None:
 
 
 def test_a_load_beyond_the_lines_limit_is_an_error() -> None:
-    """The error names the load."""
     network = two_buses(5e6 + 0j)
 
     with pytest.raises(ArithmeticError, match=r"power flow has no solution; the network cannot feed .*at bus 3"):

@@ -25,7 +25,6 @@ def test_switch_is_found_by_every_name(network: Network, text: str) -> None:
 
 
 def test_an_unknown_switch_gets_the_nearest_name(network: Network) -> None:
-    """The error suggests the nearest switch."""
     with pytest.raises(ValueError, match=r'switch "13-125": no such switch in .*; did you mean "13-152"'):
         network.switch_name("13-125")
     with pytest.raises(
@@ -62,7 +61,6 @@ def test_open_switches_part_the_zones(network: Network, switches: tuple[str, ...
 
 
 def test_islands_are_ordered_by_their_first_bus(network: Network) -> None:
-    """Islands come in the order of their first bus in the table, whatever the switches."""
     order = [bus.name for bus in network.feeder.buses]
     islands = network.islands(opened(network, *PAPER_ISLANDS, "60-160"))
 
@@ -123,7 +121,6 @@ def test_closing_again_restores_exactly(network: Network) -> None:
 
 
 def test_matrix_is_symmetric_and_separates_islands(network: Network) -> None:
-    """The admittance matrix is symmetric and has no entry between two islands."""
     closed = opened(network, *PAPER_ISLANDS, "60-160")
     Y = network.admittance(closed)
     island_of = {bus: i for i, island in enumerate(network.islands(closed)) for bus in island}

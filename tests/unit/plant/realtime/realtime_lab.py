@@ -25,7 +25,6 @@ class Lab(PlantLab):
         )
 
     def leave(self, name: str, epoch: int = 1) -> None:
-        """An agent says that it leaves."""
         self.hear(KEYS.leave(name), Leave(sender=name, epoch=epoch, seq=0, t=0.0))
 
     def ask(self, verb: Any, argument: str | dict[str, Any] = "", **further: Any) -> Answer:
@@ -48,7 +47,6 @@ class Lab(PlantLab):
 
 
 def running(n: int = 3, **changes: Any) -> Lab:
-    """A plant that runs, with all its agents."""
     lab = Lab(n, **changes)
     lab.join(*lab.node.config.agents)
     assert lab.node.phase == "running"

@@ -47,12 +47,10 @@ class Link:
 
     @property
     def rows(self) -> list[float]:
-        """Times of the rows that came."""
         return [row[0] for message in self.got if isinstance(message, Telemetry) for row in message.rows]
 
 
 def report(number: int) -> LinkReport:
-    """Records of an agent's links."""
     return LinkReport(sender="inv1", epoch=1, seq=0, t=0.0, data=str(number).encode())
 
 

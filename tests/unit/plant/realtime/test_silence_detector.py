@@ -18,7 +18,6 @@ MAX_AGE = 0.25
 
 
 def status(name: str, ages: dict[str, float], seq: int = 0) -> AgentStatus:
-    """Status of an agent on its neighbours."""
     of_neighbours = {"phase": "running", "neighbours": tuple(ages), "ages": tuple(ages.values())}
     return AgentStatus(**STATUS | of_neighbours, sender=name, epoch=1, seq=seq, t=0.0)
 

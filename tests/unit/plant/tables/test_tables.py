@@ -31,7 +31,6 @@ def edit(folder: Path, file: str, row: int, **cells: str) -> None:
 
 
 def problems(folder: Path, load_set: str = "main") -> tuple[str, ...]:
-    """Problems of a broken feeder."""
     with pytest.raises(FeederError) as caught:
         read_feeder(str(folder), load_set)
     return caught.value.problems
@@ -154,7 +153,6 @@ def test_all_problems_come_at_once(folder: Path) -> None:
 
 
 def without(start: str) -> Callable[[str], str]:
-    """Drop the lines with this beginning."""
     return lambda text: "".join(line for line in text.splitlines(True) if not line.startswith(start))
 
 

@@ -66,26 +66,23 @@ def test_an_inverter_added_to_a_feeder_of_ours_is_saved(tmp_path: Path) -> None:
     assert len(Feeder.read(alone.save(tmp_path / "alone")).inverters) == 3
 
 
-@pytest.mark.parametrize(
-    ("wrong", "said"),
-    [
-        ({"kind": "gfm"}, 'inverter "inv11": kind "gfm": no such kind'),
-        ({"P_rated": -1.0, "m_p": 0.0}, "P_rated_kW: .* above 0.*; .*m_p_pu: .* above 0"),
-        ({"P_rated": 200.0}, "P_rated_kW: 0.2 kW is not plausible"),
-        ({"name": "a/b"}, "cannot be part of a Zenoh key"),
-        ({"bus": "96", "m_p": 0.0}, 'm_p_pu: .* above 0.*; .*bus "96" has no phase A, C; it has B'),
-        ({"bus": "96", "phases": "C"}, 'bus "96" has no phase C; it has B'),
-        ({"phases": "AB"}, 'phases "AB": must be "ABC" or "A" or "B" or "C"'),
-        ({"phases": 3}, 'phases "3": must be "ABC" or "A" or "B" or "C"'),
-        ({"P_rated": "much"}, "could not convert string to float"),
-        ({"m_p": None}, 'm_p_pu must be a number, got "None"'),
-        ({"name": None, "microgrid": None}, "name is empty; .*microgrid is empty; give a name"),
-        ({"name": 1, "kind": 2}, 'inverter "1": kind "2": no such kind'),
-        ({"params": "slow"}, 'parameters "slow": no such set'),
-        ({"bus": "610", "phases": "A"}, 'bus "610" is behind a delta winding without ground'),
-        ({"name": "inv1", "bus": "160", "phases": "B"}, 'must differ; .*has inverter "inv1" on phase B already'),
-    ],
-)
+@pytest.mark.parametrize(("wrong", "said"), [
+    ({"kind": "gfm"}, 'inverter "inv11": kind "gfm": no such kind'),
+    ({"P_rated": -1.0, "m_p": 0.0}, "P_rated_kW: .* above 0.*; .*m_p_pu: .* above 0"),
+    ({"P_rated": 200.0}, "P_rated_kW: 0.2 kW is not plausible"),
+    ({"name": "a/b"}, "cannot be part of a Zenoh key"),
+    ({"bus": "96", "m_p": 0.0}, 'm_p_pu: .* above 0.*; .*bus "96" has no phase A, C; it has B'),
+    ({"bus": "96", "phases": "C"}, 'bus "96" has no phase C; it has B'),
+    ({"phases": "AB"}, 'phases "AB": must be "ABC" or "A" or "B" or "C"'),
+    ({"phases": 3}, 'phases "3": must be "ABC" or "A" or "B" or "C"'),
+    ({"P_rated": "much"}, "could not convert string to float"),
+    ({"m_p": None}, 'm_p_pu must be a number, got "None"'),
+    ({"name": None, "microgrid": None}, "name is empty; .*microgrid is empty; give a name"),
+    ({"name": 1, "kind": 2}, 'inverter "1": kind "2": no such kind'),
+    ({"params": "slow"}, 'parameters "slow": no such set'),
+    ({"bus": "610", "phases": "A"}, 'bus "610" is behind a delta winding without ground'),
+    ({"name": "inv1", "bus": "160", "phases": "B"}, 'must differ; .*has inverter "inv1" on phase B already'),
+])  # fmt: skip
 def test_an_inverter_that_the_tables_would_refuse_is_not_added(wrong: dict[str, Any], said: str) -> None:
     """The error comes at the call, not from a row of a file that is written later."""
     with pytest.raises(ValueError, match=said):
@@ -95,7 +92,6 @@ def test_an_inverter_that_the_tables_would_refuse_is_not_added(wrong: dict[str, 
 
 
 def test_saving_a_feeder_removes_former_tables_of_its_folder(tmp_path: Path) -> None:
-    """Capacitors of the former feeder in the folder are gone."""
     feeder = Feeder.read("microgrid123")
     folder = feeder.save(tmp_path / "mine")
     (folder / "README.md").write_text("mine")

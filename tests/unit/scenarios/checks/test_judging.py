@@ -41,7 +41,6 @@ class Nadir:
 
 
 def judged(check: Callable[[Any], Any], monkeypatch: pytest.MonkeyPatch) -> CheckVerdict:
-    """The verdict of a function on a sound case."""
     monkeypatch.setitem(vars(CHECKS)["_added"], "mine", check)
     (found,) = judge_by({"mine": Plugin(use="mine")}, ran().checked_case)
     return found

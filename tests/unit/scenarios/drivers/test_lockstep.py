@@ -123,17 +123,14 @@ def test_an_agent_without_a_plant_says_so() -> None:
     assert agent.failed == "inv1: no sign of life from plant within 20 s; nothing was ever heard from plant"
 
 
-@pytest.mark.parametrize(
-    ("move", "said"),
-    [
-        ((0.2, "inv9", "leave"), 'schedule: no inverter "inv9"; inverters are inv1, inv2'),
-        (
-            (0.21, "inv2", "leave"),
-            "schedule: inv2 must leave at a positive multiple of the control period 0.02 s, got 0.21 s",
-        ),
-        (None, 'agents: no inverter "inv3"; inverters are inv1, inv2'),
-    ],
-)
+@pytest.mark.parametrize(("move", "said"), [
+    ((0.2, "inv9", "leave"), 'schedule: no inverter "inv9"; inverters are inv1, inv2'),
+    (
+        (0.21, "inv2", "leave"),
+        "schedule: inv2 must leave at a positive multiple of the control period 0.02 s, got 0.21 s",
+    ),
+    (None, 'agents: no inverter "inv3"; inverters are inv1, inv2'),
+])  # fmt: skip
 def test_what_cannot_be_is_refused_at_the_start(
     move: tuple[float, str, Literal["leave", "join"]] | None, said: str
 ) -> None:

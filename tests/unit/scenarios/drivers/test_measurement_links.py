@@ -70,8 +70,7 @@ def test_the_neighbours_of_a_standing_agent_do_not_use_what_it_says_for_the_lock
     assert rows_of(cut) == rows_of(cut, Fault(on="inv2 -> {inv1, inv3}", cut=True))
 
 
-LATE = emulated(Fault(on="inv2 -> plant", delay=0.3))
-"""States of inv2 take 0.3 s to the plant."""
+LATE = emulated(Fault(on="inv2 -> plant", delay=0.3))  # States of inv2 take 0.3 s to the plant
 
 
 class Holding(ToyPlant):

@@ -63,7 +63,6 @@ class Process:
             self.status = -number
 
     def join(self, until: float) -> bool:
-        """End, if it does at all."""
         if self._ends and self.status is None:
             self._said.append(f"{self.name} ends")
             self.status = 0

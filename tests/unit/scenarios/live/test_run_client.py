@@ -23,18 +23,15 @@ def test_a_run_name_that_zenoh_does_not_allow_is_refused(run: str) -> None:
         address_of(run, None)
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("192.168.1.10", "write PROTOCOL/HOST:PORT, e.g. tcp/192.168.1.10:7447"),
-        ("lab:7450", "e.g. tcp/lab:7450"),
-        ("", "e.g. tcp/127.0.0.1:7447"),
-        ("http/lab:7447", 'no protocol "http"; protocols are tcp, tls, quic, udp'),
-        ("tcp/lab:0", "a port is a number from 1 to 65535, got 0"),
-        ("tcp/lab:70000", "a port is a number from 1 to 65535, got 70000"),
-        ("tcp/a b:7447", "is no endpoint"),
-    ],
-)
+@pytest.mark.parametrize(("text", "said"), [
+    ("192.168.1.10", "write PROTOCOL/HOST:PORT, e.g. tcp/192.168.1.10:7447"),
+    ("lab:7450", "e.g. tcp/lab:7450"),
+    ("", "e.g. tcp/127.0.0.1:7447"),
+    ("http/lab:7447", 'no protocol "http"; protocols are tcp, tls, quic, udp'),
+    ("tcp/lab:0", "a port is a number from 1 to 65535, got 0"),
+    ("tcp/lab:70000", "a port is a number from 1 to 65535, got 70000"),
+    ("tcp/a b:7447", "is no endpoint"),
+])  # fmt: skip
 def test_what_is_no_endpoint_is_told_with_what_would_be(text: str, said: str) -> None:
     """The problem, the value, and the form that is right."""
     with pytest.raises(UsageError) as told:
@@ -44,29 +41,23 @@ def test_what_is_no_endpoint_is_told_with_what_would_be(text: str, said: str) ->
     assert said in str(told.value)
 
 
-@pytest.mark.parametrize(
-    ("connect", "listen"),
-    [
-        (("tcp/127.0.0.1:7447",), "tcp/127.0.0.1:0"),
-        (("tcp/localhost:7447", "tcp/[::1]:7447"), "tcp/127.0.0.1:0"),
-        (("tcp/127.0.0.1:7447", "tcp/10.0.0.1:7447"), "tcp/0.0.0.0:0"),
-        (("tcp/[fd00::1]:7447",), "tcp/[::]:0"),
-    ],
-)
+@pytest.mark.parametrize(("connect", "listen"), [
+    (("tcp/127.0.0.1:7447",), "tcp/127.0.0.1:0"),
+    (("tcp/localhost:7447", "tcp/[::1]:7447"), "tcp/127.0.0.1:0"),
+    (("tcp/127.0.0.1:7447", "tcp/10.0.0.1:7447"), "tcp/0.0.0.0:0"),
+    (("tcp/[fd00::1]:7447",), "tcp/[::]:0"),
+])  # fmt: skip
 def test_who_connects_to_another_host_can_be_reached_from_there(connect: tuple[str, ...], listen: str) -> None:
     """On the loopback as long as everything is on it, on every address otherwise."""
     assert return_path(connect) == (listen,)
 
 
-@pytest.mark.parametrize(
-    ("endpoint", "words"),
-    [
-        ("tls/127.0.0.1:7447", ["--keys", "lab"]),
-        ("tls/0.0.0.0:7500", ["--connect", "tls/127.0.0.1:7500", "--keys", "lab"]),
-        ("tls/[::]:7447", ["--connect", "tls/[::1]:7447", "--keys", "lab"]),
-        ("tls/10.0.0.1:7447", ["--connect", "tls/10.0.0.1:7447", "--keys", "lab"]),
-    ],
-)
+@pytest.mark.parametrize(("endpoint", "words"), [
+    ("tls/127.0.0.1:7447", ["--keys", "lab"]),
+    ("tls/0.0.0.0:7500", ["--connect", "tls/127.0.0.1:7500", "--keys", "lab"]),
+    ("tls/[::]:7447", ["--connect", "tls/[::1]:7447", "--keys", "lab"]),
+    ("tls/10.0.0.1:7447", ["--connect", "tls/10.0.0.1:7447", "--keys", "lab"]),
+])  # fmt: skip
 def test_the_options_that_find_a_run_say_what_is_not_the_default(endpoint: str, words: list[str]) -> None:
     """`up` names its commands with them; with certificates the default endpoint is tls."""
     address = RunAddress(run="gridpeers", connect=(endpoint,), access=Access(keys=Path("lab")))

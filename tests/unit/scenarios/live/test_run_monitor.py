@@ -45,7 +45,6 @@ class Line:
         self.subscribe = self.subscribed.append
 
     def take(self, count: int, seconds: float) -> list[Event]:
-        """All that is there."""
         events, self.events = self.events, []
         return [*events, *self.inbox.take(0, 0.0)]
 
@@ -60,14 +59,12 @@ class Line:
 
 @pytest.fixture
 def line(monkeypatch: pytest.MonkeyPatch) -> Line:
-    """The line of every client from now on."""
     made = Line()
     monkeypatch.setattr(client, "Session", lambda *_, **__: made)
     return made
 
 
 def telemetry(t: float, epoch: int = 7, inverters: tuple[str, ...] = NAMES) -> Telemetry:
-    """Valid telemetry of the plant."""
     row = (t, *(60.0, 5e4, 0.0, 277.0, 5e4, 277.0) * len(inverters))
     return Telemetry(
         sender="plant", epoch=epoch, seq=0, t=t, inverters=inverters, rows=(row,), events=(), final=False,
@@ -131,20 +128,16 @@ COUNTS = LinkCounts(sent=1, duplicated=0, delivered=1, dropped={}, corrupted=0, 
 
 
 def report(body: object, sender: str = "inv1") -> LinkReport:
-    """A report with this in it."""
     return LinkReport(sender=sender, epoch=1, seq=0, t=0.0, data=msgspec.msgpack.encode(body))
 
 
-@pytest.mark.parametrize(
-    "body",
-    [
-        {"traces": [["inv2", "inv1", [1, 2], [0.0], ["cut"]]]},
-        {"traces": [["inv2", "inv3", [1], [0.0], ["cut"]]]},
-        {"traces": [["inv2", "inv1", [-1], [0.0], ["cut"]]]},
-        {"counts": {"inv2": {**msgspec.to_builtins(COUNTS), "sent": -1}}},
-        7,
-    ],
-)
+@pytest.mark.parametrize("body", [
+    {"traces": [["inv2", "inv1", [1, 2], [0.0], ["cut"]]]},
+    {"traces": [["inv2", "inv3", [1], [0.0], ["cut"]]]},
+    {"traces": [["inv2", "inv1", [-1], [0.0], ["cut"]]]},
+    {"counts": {"inv2": {**msgspec.to_builtins(COUNTS), "sent": -1}}},
+    7,
+])  # fmt: skip
 def test_a_book_of_links_that_cannot_be_is_not_recorded(body: object) -> None:
     """Uneven rows, names that are none, links to somebody else: the rest of the record is as if it had not come."""
     record = LinkRecord()
@@ -167,12 +160,10 @@ def test_every_message_that_is_sent_can_be_read_by_a_visitor_of_that_plant(line:
 
 
 def take_all(at: RunClient) -> None:
-    """Let the client see all that has come."""
     assert list(at.take(0.0)) == []
 
 
 def strangers(names: int, instances: int) -> list[str]:
-    """Tokens of names that no run has."""
     return [KEYS.alive_agent(f"who{name}", f"a{one}") for one in range(instances) for name in range(names)]
 
 

@@ -47,7 +47,6 @@ class Lost:
         return self._lost < 0
 
     def publish(self, key: str, payload: bytes) -> None:
-        """Ask the plant."""
         command = decode(payload)
         assert isinstance(command, Command)
         data = {"phase": "running", "t": 1.0, "speed": 1.0, "pacing": PACING, "agents": ["inv1"], "absent": ["inv2"]}
@@ -57,12 +56,10 @@ class Lost:
             )
 
     def fetch(self, key: str) -> None:
-        """Ask for configurations."""
         if self._arrives():
             self._coming += [(KEYS.config(name), msgspec.json.encode(agent_config(name))) for name in ("inv1", "inv2")]
 
     def take(self, seconds: float) -> Iterator[tuple[str, bytes, float]]:
-        """Yield what comes, or wait."""
         if not self._coming:
             self.now += seconds
         elif isinstance(self._coming[0], Answer):
@@ -71,7 +68,6 @@ class Lost:
             yield (*self._coming.pop(0), self.now)
 
     def read(self, key: str, payload: bytes) -> AnyMessage | None:
-        """Return the answer that has come."""
         return cast(Answer, self._coming.pop(0)) if key == "answer" else None
 
 
@@ -154,12 +150,10 @@ class Client:
         ]
 
     def take(self, seconds: float) -> Iterator[tuple[str, bytes, float]]:
-        """Yield one message at a time, as they come."""
         if self._waiting:
             yield "", b"", 0.0
 
     def read(self, key: str, payload: bytes) -> AnyMessage:
-        """Return the next message."""
         return self._waiting.pop(0)
 
 
@@ -181,16 +175,13 @@ def test_an_answer_of_another_form_is_told_in_one_line() -> None:
             command_links(Client(number=number), LinkCommand(heal=Heal(on="*", from_s=0.0)))  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(
-    ("where", "typed"),
-    [
-        (RunAddress(run=RUN, connect=("tcp/127.0.0.1:7447",)), "gridpeers stop inv2"),
-        (
-            RunAddress(run="lab", connect=("tls/10.0.0.1:7447",), access=Access(keys=Path("site"))),
-            "gridpeers stop inv2 --run lab --connect tls/10.0.0.1:7447 --keys site",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("where", "typed"), [
+    (RunAddress(run=RUN, connect=("tcp/127.0.0.1:7447",)), "gridpeers stop inv2"),
+    (
+        RunAddress(run="lab", connect=("tls/10.0.0.1:7447",), access=Access(keys=Path("site"))),
+        "gridpeers stop inv2 --run lab --connect tls/10.0.0.1:7447 --keys site",
+    ),
+])  # fmt: skip
 def test_the_other_agent_of_a_name_is_stopped_where_it_is(
     where: RunAddress, typed: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -99,7 +99,6 @@ def test_a_run_that_has_not_begun_shows_who_waits() -> None:
 
 
 def numbers(line: InverterStatus) -> set[float | None]:
-    """Telemetry of an inverter."""
     return {line.f, line.P, line.P_set, line.P_share, line.Q, line.V, line.V_set}
 
 

@@ -24,8 +24,7 @@ PARTS = [msgspec.msgpack.encode(entry) for entry in ENTRIES]
 
 
 LATER = msgspec.msgpack.encode(["later", 1])
-LIST_AS_KEY = b"\x81\x91\x01\x01"
-"""A map that Python cannot have."""
+LIST_AS_KEY = b"\x81\x91\x01\x01"  # A map that Python cannot have
 
 
 def read(data: bytes) -> tuple[list[Entry], list[str]]:

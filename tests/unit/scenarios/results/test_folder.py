@@ -104,17 +104,14 @@ def test_a_text_that_names_a_folder_of_any_bytes_is_utf_8(tmp_path: Path) -> Non
     assert (tmp_path / "status.txt").read_text(encoding="utf-8") == "broken: runs\\udcff is gone\n"
 
 
-@pytest.mark.parametrize(
-    ("error", "told"),
-    [
-        (KeyboardInterrupt(), "interrupted from the keyboard"),
-        (TerminatedError(), "interrupted by SIGTERM"),
-        (ValueError("two\nlines"), "two lines"),
-        (ZeroDivisionError(), "ZeroDivisionError"),
-        (OSError(errno.ENOSPC, "No space left on device", "out/history.csv"), "out/history.csv: cannot be written: "),
-        (OutputLostError(READER_GONE, "nobody reads its output any more"), "nobody reads its output any more"),
-    ],
-)
+@pytest.mark.parametrize(("error", "told"), [
+    (KeyboardInterrupt(), "interrupted from the keyboard"),
+    (TerminatedError(), "interrupted by SIGTERM"),
+    (ValueError("two\nlines"), "two lines"),
+    (ZeroDivisionError(), "ZeroDivisionError"),
+    (OSError(errno.ENOSPC, "No space left on device", "out/history.csv"), "out/history.csv: cannot be written: "),
+    (OutputLostError(READER_GONE, "nobody reads its output any more"), "nobody reads its output any more"),
+])  # fmt: skip
 def test_the_status_says_why_a_run_ended_early(error: BaseException, told: str, tmp_path: Path) -> None:
     """In one line; the error goes on to whoever has asked for the run."""
     with pytest.raises(type(error)), broken_if_ended(tmp_path):

@@ -88,17 +88,14 @@ def test_a_steady_value_is_the_mean_of_the_last_fifth_of_a_second() -> None:
     assert measured(case, 1.0, 3.0).f_error_Hz == pytest.approx((0.1 + 0.2) / 2)
 
 
-@pytest.mark.parametrize(
-    ("f", "p", "expected"),
-    [
-        ([59.9, 60.0, 60.0, 60.0], [EQUAL] * 4, 0.2),
-        ([60.0, 59.9, 60.0, 60.0], [EQUAL] * 4, 0.3),
-        ([60.0, 60.0, 60.0, 60.0], [UNEQUAL, UNEQUAL, EQUAL, EQUAL], 0.3),
-        ([60.0, 60.0, 60.0, 59.98], [EQUAL] * 4, None),
-        ([60.0, 60.0, 60.0, 60.0], [EQUAL, EQUAL, EQUAL, UNEQUAL], None),
-        ([60.0, 60.0, 60.0, 60.0], [EQUAL] * 4, 0.1),
-    ],
-)
+@pytest.mark.parametrize(("f", "p", "expected"), [
+    ([59.9, 60.0, 60.0, 60.0], [EQUAL] * 4, 0.2),
+    ([60.0, 59.9, 60.0, 60.0], [EQUAL] * 4, 0.3),
+    ([60.0, 60.0, 60.0, 60.0], [UNEQUAL, UNEQUAL, EQUAL, EQUAL], 0.3),
+    ([60.0, 60.0, 60.0, 59.98], [EQUAL] * 4, None),
+    ([60.0, 60.0, 60.0, 60.0], [EQUAL, EQUAL, EQUAL, UNEQUAL], None),
+    ([60.0, 60.0, 60.0, 60.0], [EQUAL] * 4, 0.1),
+])  # fmt: skip
 def test_restored_means_frequency_and_sharing_both_and_for_good(
     f: list[float], p: list[list[float]], expected: float | None
 ) -> None:
@@ -183,15 +180,12 @@ def test_a_frequency_that_moves_or_swings_is_not_steady(f: Callable[[Floats], An
     assert measured(history(TIMES, f(TIMES)), 1.0, 3.0).reasons == ({"f_error_Hz": said} if said else {})
 
 
-@pytest.mark.parametrize(
-    ("end", "last", "said"),
-    [
-        (1.009, 3.1, "no samples: no row was recorded between 1.001 s and 1.009 s"),
-        (1.03, 3.1, "not steady: 2 rows (0.029 s) are too few to tell"),
-        (3.0, 2.9, "de-energised: no inverter is on the network in a part of the last 0.2 s"),
-        (3.0, 1.5, "de-energised: no inverter is on the network"),
-    ],
-)
+@pytest.mark.parametrize(("end", "last", "said"), [
+    (1.009, 3.1, "no samples: no row was recorded between 1.001 s and 1.009 s"),
+    (1.03, 3.1, "not steady: 2 rows (0.029 s) are too few to tell"),
+    (3.0, 2.9, "de-energised: no inverter is on the network in a part of the last 0.2 s"),
+    (3.0, 1.5, "de-energised: no inverter is on the network"),
+])  # fmt: skip
 def test_a_window_that_cannot_be_measured_says_why(end: float, last: float, said: str) -> None:
     """It has no rows, too few, or an island that dies."""
     found = measured(history(TIMES, p=np.where(last > TIMES, 0.6, 0.0)), 1.001, end).reasons

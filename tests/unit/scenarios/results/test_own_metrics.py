@@ -71,20 +71,17 @@ def test_a_metric_gets_the_windows_rows_as_arrays_and_as_a_table() -> None:
     assert of(lambda window: None) == ({"mine": None}, {})
 
 
-@pytest.mark.parametrize(
-    ("metric", "said"),
-    [
-        (
-            lambda window: window.history["inv9"]["f"].min(),
-            "failed: KeyError: 'inv9'; the inverters are inv1, inv2, their quantities f, P, Q, V, P_set, V_set",
-        ),
-        (lambda window: window.frequency.min(), "failed: AttributeError: 'WindowData' object has no attribute"),
-        (lambda window: float("nan"), "is no finite number: nan"),
-        (lambda window: window.f, "returned array("),
-        (lambda window: "59.5 Hz", "returned '59.5 Hz'; return a number, or numbers by name"),
-        (lambda window: 1 / 0, "failed: ZeroDivisionError: division by zero"),
-    ],
-)
+@pytest.mark.parametrize(("metric", "said"), [
+    (
+        lambda window: window.history["inv9"]["f"].min(),
+        "failed: KeyError: 'inv9'; the inverters are inv1, inv2, their quantities f, P, Q, V, P_set, V_set",
+    ),
+    (lambda window: window.frequency.min(), "failed: AttributeError: 'WindowData' object has no attribute"),
+    (lambda window: float("nan"), "is no finite number: nan"),
+    (lambda window: window.f, "returned array("),
+    (lambda window: "59.5 Hz", "returned '59.5 Hz'; return a number, or numbers by name"),
+    (lambda window: 1 / 0, "failed: ZeroDivisionError: division by zero"),
+])  # fmt: skip
 def test_a_metric_that_fails_is_null_and_says_why_in_one_line(metric: Callable[[Any], Any], said: str) -> None:
     """It harms no other metric and no run."""
     values, reasons = of(metric)
@@ -209,15 +206,12 @@ def test_a_users_benchmark_stands_beside_ours_and_judges(tmp_path: Path) -> None
     assert "1 of 1 claims of the paper hold\nnothing more to say\n" in text
 
 
-@pytest.mark.parametrize(
-    ("paper", "said"),
-    [
-        ("my_benchmark:MINES", 'my_benchmark:MINES: module my_benchmark has no "MINES"; did you mean "MINE"?'),
-        ("my_benchmark:OTHER", "my_benchmark:OTHER is no benchmark: it is no gridpeers.Benchmark"),
-        ("no_such_module:MINE", 'no_such_module:MINE: there is no module "no_such_module"'),
-        ("island", 'paper: there is no benchmark "island"; did you mean "islanding"?'),
-    ],
-)
+@pytest.mark.parametrize(("paper", "said"), [
+    ("my_benchmark:MINES", 'my_benchmark:MINES: module my_benchmark has no "MINES"; did you mean "MINE"?'),
+    ("my_benchmark:OTHER", "my_benchmark:OTHER is no benchmark: it is no gridpeers.Benchmark"),
+    ("no_such_module:MINE", 'no_such_module:MINE: there is no module "no_such_module"'),
+    ("island", 'paper: there is no benchmark "island"; did you mean "islanding"?'),
+])  # fmt: skip
 def test_a_benchmark_that_is_none_is_told_before_anything_runs(tmp_path: Path, paper: str, said: str) -> None:
     """One line with its key, what is wrong, and what would be right."""
     with pytest.raises(ScenarioError) as error:

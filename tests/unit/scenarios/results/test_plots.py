@@ -17,7 +17,6 @@ from gridpeers.scenarios.results.plots.style import GAP, LETTER, STYLES, Format,
 
 
 def drawing(*cases: str) -> Drawing:
-    """Made-up curves of all nine inverters."""
     nameplates = Nameplates.of(read_feeder("microgrid123").inverters)
     t = np.arange(0.0, 7.01, 0.05)
     level = np.where(t > 1.0, 0.87, 0.65)[:, None] * np.ones(9)

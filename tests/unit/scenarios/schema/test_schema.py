@@ -163,13 +163,10 @@ def test_factors_and_an_inverters_own_data_reach_the_plant_and_the_agents(tmp_pa
     assert load_scenario(written(tmp_path, to_toml(scenario, {}))) == (scenario, feeder)
 
 
-@pytest.mark.parametrize(
-    ("keys", "said"),
-    [
-        ("inverter.inv3 = {}", "plant.inverter.inv3: changes nothing; give it one of m_p_pu, m_q_pu, P_rated_kW"),
-        ("inverter = 3", "plant.inverter: must be written as tables [plant.inverter.NAME], got 3"),
-    ],
-)
+@pytest.mark.parametrize(("keys", "said"), [
+    ("inverter.inv3 = {}", "plant.inverter.inv3: changes nothing; give it one of m_p_pu, m_q_pu, P_rated_kW"),
+    ("inverter = 3", "plant.inverter: must be written as tables [plant.inverter.NAME], got 3"),
+])  # fmt: skip
 def test_implausible_data_are_a_problem_at_their_key(tmp_path: Path, keys: str, said: str) -> None:
     """It has the key, the value with its unit, and the right values."""
     found = problems(tmp_path, with_plant(keys))
@@ -187,31 +184,28 @@ def test_trip_settings_are_judged_at_the_nominal_frequency(tmp_path: Path) -> No
     assert load_scenario(written(tmp_path, with_plant(f"f_nom_Hz = 50.0{trips}")))[1].f_nom == 50.0
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "said"),
-    [
-        ('"all"', '["inv1", "inv44"]', 'case.IV.secondary: no inverter "inv44"; did you mean "inv4"?'),
-        ('"all"', '["inv1", "inv1"]', 'case.IV.secondary: "inv1" is named twice; name it once'),
-        ('"all"', "[]", 'case.IV.secondary: names no inverter; write secondary = "none"'),
-        ('"all"', '["inv1"]\nwithout_agent = ["inv1"]', "case.IV.secondary: inv1 has no agent to run the law"),
-        ('"all"', '"all"\nwithout_agent = ["inv0"]', 'case.IV.without_agent: no inverter "inv0"'),
-        (
-            '"all"',
-            '"all"\nwithout_agent = ["inv1","inv2","inv3","inv4","inv5","inv6","inv7","inv8","inv9"]',
-            "case.IV.without_agent: no inverter has an agent",
-        ),
-        (
-            '"all"',
-            '"all"\nwithout_agent = ["inv2"]\n[[case.IV.node]]\nname = "inv2"\nslow_s = 0.01',
-            "case.IV.without_agent: an entry [[node]] names inv2, so it must have an agent",
-        ),
-        (
-            '"all"',
-            '"all"\nwithout_agent = ["inv2"]\n[[event]]\nlabel = "e3"\nt_s = 5.0\nleave = ["inv2"]',
-            'case.IV.without_agent: event "e3" lets the agent of inv2 leave or join, so it must have one',
-        ),
-    ],
-)
+@pytest.mark.parametrize(("old", "new", "said"), [
+    ('"all"', '["inv1", "inv44"]', 'case.IV.secondary: no inverter "inv44"; did you mean "inv4"?'),
+    ('"all"', '["inv1", "inv1"]', 'case.IV.secondary: "inv1" is named twice; name it once'),
+    ('"all"', "[]", 'case.IV.secondary: names no inverter; write secondary = "none"'),
+    ('"all"', '["inv1"]\nwithout_agent = ["inv1"]', "case.IV.secondary: inv1 has no agent to run the law"),
+    ('"all"', '"all"\nwithout_agent = ["inv0"]', 'case.IV.without_agent: no inverter "inv0"'),
+    (
+        '"all"',
+        '"all"\nwithout_agent = ["inv1","inv2","inv3","inv4","inv5","inv6","inv7","inv8","inv9"]',
+        "case.IV.without_agent: no inverter has an agent",
+    ),
+    (
+        '"all"',
+        '"all"\nwithout_agent = ["inv2"]\n[[case.IV.node]]\nname = "inv2"\nslow_s = 0.01',
+        "case.IV.without_agent: an entry [[node]] names inv2, so it must have an agent",
+    ),
+    (
+        '"all"',
+        '"all"\nwithout_agent = ["inv2"]\n[[event]]\nlabel = "e3"\nt_s = 5.0\nleave = ["inv2"]',
+        'case.IV.without_agent: event "e3" lets the agent of inv2 leave or join, so it must have one',
+    ),
+])  # fmt: skip
 def test_impossible_names_without_an_agent_or_with_the_law_are_a_problem(
     tmp_path: Path, old: str, new: str, said: str
 ) -> None:
@@ -261,22 +255,19 @@ def test_in_a_live_run_people_move_the_agents(tmp_path: Path) -> None:
     assert [agent.name for agent in agents] == [f"inv{i}" for i in range(1, 11)]
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "said"),
-    [
-        (
-            'leave = ["inv2"]',
-            'leave = ["inv10", "inv2"]',
-            r'event\[1\].leave: "inv10" is not in the run at 2 s; leave it out',
-        ),
-        (
-            'join = ["inv2"]',
-            'leave = ["inv2"]',
-            r'event\[2\].leave: "inv2" is not in the run at 3 s; .* let it join before',
-        ),
-        ("t_s = 2.0", "t_s = 2.01", r"event\[1\].t_s: 2.01 s is not a multiple of T_c_s = 0.02 s, .* nearest is 2"),
-    ],
-)
+@pytest.mark.parametrize(("old", "new", "said"), [
+    (
+        'leave = ["inv2"]',
+        'leave = ["inv10", "inv2"]',
+        r'event\[1\].leave: "inv10" is not in the run at 2 s; leave it out',
+    ),
+    (
+        'join = ["inv2"]',
+        'leave = ["inv2"]',
+        r'event\[2\].leave: "inv2" is not in the run at 3 s; .* let it join before',
+    ),
+    ("t_s = 2.0", "t_s = 2.01", r"event\[1\].t_s: 2.01 s is not a multiple of T_c_s = 0.02 s, .* nearest is 2"),
+])  # fmt: skip
 def test_each_problem_has_its_place_and_a_remedy(tmp_path: Path, old: str, new: str, said: str) -> None:
     """A problem names the file, the line, the key, the value, and what to write instead."""
     assert PLUG.count(old) == 1

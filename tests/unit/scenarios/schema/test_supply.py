@@ -83,7 +83,6 @@ def folder(tmp_path: Path) -> Path:
 
 
 def replace(folder: Path, file: str, old: str, new: str) -> None:
-    """Change a table."""
     text = (folder / file).read_text()
     assert old in text
     (folder / file).write_text(text.replace(old, new))

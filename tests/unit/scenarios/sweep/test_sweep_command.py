@@ -78,5 +78,4 @@ def test_a_full_disk_ends_a_sweep_that_can_go_on(sweep_file: Write, tmp_path: Pa
 
 
 def full(_: int) -> None:
-    """Error of a disk without room."""
     raise OSError(errno.ENOSPC, "No space left on device")

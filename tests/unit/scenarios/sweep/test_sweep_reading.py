@@ -18,7 +18,6 @@ from tests.unit.scenarios.sweep.conftest import Write
 
 
 def problems_of(path: Path) -> list[str]:
-    """All problems of a sweep file."""
     with pytest.raises(ScenarioError) as caught:
         read_sweep(path)
     return list(caught.value.problems)

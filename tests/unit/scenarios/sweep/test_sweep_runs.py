@@ -30,8 +30,7 @@ from gridpeers.scenarios.sweep.sweep_reading import read_sweep
 from gridpeers.wire.messages import PlantEvent
 from tests.unit.scenarios.sweep.conftest import Write
 
-MANY = '[grid]\n"gains.k_p" = [0.0005, 0.0007]\n'
-"""With 5 seeds 10 runs: enough that a tenth of them is not the end."""
+MANY = '[grid]\n"gains.k_p" = [0.0005, 0.0007]\n'  # With 5 seeds 10 runs: enough that a tenth of them is not the end
 
 BREAKING = """
 [zip]
@@ -49,7 +48,6 @@ def done(path: Path, folder: Path, **how: object) -> Summary:
 
 
 def rows_of(table: Path) -> list[dict[str, str]]:
-    """Rows of a table, as written."""
     with table.open(newline="") as file:
         return list(csv.DictReader(file))
 

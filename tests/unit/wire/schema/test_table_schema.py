@@ -35,19 +35,16 @@ class Parameters:
     order: int
 
 
-@pytest.mark.parametrize(
-    "given",
-    [
-        {"order": 1, "gain": 500},
-        {"order": 1, "gain": "5 s"},
-        {"order": 1, "gain": 20.0},
-        {"order": 1, "step": 0.003},
-        {"order": 1, "step": 2.0},
-        {"order": 1.5},
-        {"order": True, "gain": float("nan")},
-        {},
-    ],
-)
+@pytest.mark.parametrize("given", [
+    {"order": 1, "gain": 500},
+    {"order": 1, "gain": "5 s"},
+    {"order": 1, "gain": 20.0},
+    {"order": 1, "step": 0.003},
+    {"order": 1, "step": 2.0},
+    {"order": 1.5},
+    {"order": True, "gain": float("nan")},
+    {},
+])  # fmt: skip
 def test_a_key_and_a_parameter_of_the_same_annotations_have_the_same_problems(given: dict[str, Any]) -> None:
     """Type, range, unit, relation and absence are one reader's business, whatever declares them."""
     of_table, of_parameters = read_table(Table, given)[1], read_parameters(Parameters, given)[1]

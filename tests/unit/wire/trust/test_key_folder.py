@@ -115,7 +115,6 @@ WRONG: dict[str, tuple[Callable[[Path], object], str]] = {
 
 @pytest.mark.parametrize("what", WRONG)
 def test_every_wrong_file_is_refused_in_one_line(lab: Path, what: str) -> None:
-    """The line names the file, what is wrong with it, and what to do."""
     change, pattern = WRONG[what]
     change(lab)
 
