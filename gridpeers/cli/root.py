@@ -34,7 +34,7 @@ _OWN: dict[str, tuple[tuple[str, str, str], ...]] = {
         ("reproduce", f"{_PAPER}.reproduce.reproduce_command:reproduce", "Reproduce the paper, and write one report."),
     ),
     "Live": (
-        ("up", "start_commands:up", "Run the plant and all its agents at once, in real time."),
+        ("up", "start_commands:up", "Run the plant and all its agents, in real time."),
         ("plant", "start_commands:plant", "Run the plant of a scenario in this terminal, in real time."),
         ("agent", "live_commands:agent", "Run the agent of an inverter, or of several, in this terminal."),
         ("link", "link:link", "Impair and heal links of a live run."),
@@ -146,8 +146,8 @@ def gridpeers(
 ) -> None:
     """Peer-to-peer consensus control of microgrid inverters: a plant process and one process per inverter, over Zenoh.
 
-    Exit codes: 0 success; 1 a claim, a law, a run of chaos, or a check with --require-checks failed, or a replay
-    differs; 2 bad usage, a bad file, or no run found; 3 a run broke, or no answer came; 130 Ctrl-C; 143 SIGTERM.
+    Exit codes: 0 success; 1 a claim, a law, a chaos run or a required check failed, or a replay differs; 2 wrong
+    options, a bad file, or no run found; 3 a run broke, or a process did not answer; 130 Ctrl-C; 143 SIGTERM.
 
     Example:  gridpeers run islanding
     """

@@ -196,7 +196,7 @@ def _in_one_line() -> Iterator[None]:
 
 
 def _line(error: Any) -> str:
-    """Return a problem in one line, in typer's words, with the command that shows what would be right."""
+    """Return a problem in one line, in typer's words, with the command that shows the help."""
     param = getattr(error, "param", None)
     if type(error).__name__ == "MissingParameter" and param is not None and param.metavar == "SCENARIO":
         return f"SCENARIO is missing: e.g. islanding, plug-n-play or partition; {command_line('list')} shows all"
@@ -205,4 +205,4 @@ def _line(error: Any) -> str:
     ctx = error.ctx
     while ctx is not None and ctx.parent is not None:
         words, ctx = [ctx.info_name, *words], ctx.parent
-    return f"{message[:1].lower()}{message[1:]}; {command_line(*words, '-h')} shows what can be given"
+    return f"{message[:1].lower()}{message[1:]}; see {command_line(*words, '-h')}"

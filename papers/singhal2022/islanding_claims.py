@@ -86,7 +86,7 @@ def IV_shares_vars(found: Findings) -> tuple[bool, str]:
 )
 def IV_5_times_below_II_and_III(found: Findings) -> tuple[bool, str]:
     least = min(min(_times_below(found, case, "MQSI").values()) for case in ("II", "III"))
-    return least >= FIVE_TIMES, f"least ratio {least:.1f}"
+    return least >= FIVE_TIMES, f"smallest ratio {least:.1f}"
 
 
 def _add_5_times_better_than_I(quantity: Quantity, known_miss: str = "") -> None:

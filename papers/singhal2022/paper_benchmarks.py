@@ -41,31 +41,31 @@ def headline(all_numbers: Sequence[ComparedNumber]) -> list[str]:
     near, judged = within(all_numbers, Cell.within)
     if judged:
         named = _tables(all_numbers)
-        lines.append(f"{near} of the {judged} numbers of {named} that have a tolerance are within it.")
+        lines.append(f"{near} of {judged} numbers of {named} are within their tolerance.")
     if left := [number for number in all_numbers if number.cell.tolerance.value is None]:
         near, _ = within(left, Cell.within_factor)
         times = [ours / cell.paper for cell, ours in left if not math.isnan(ours)]
         times_off = f"{min(times):.2g} to {max(times):.2g} times the paper's, " if times else ""
         far = _farthest(left, lambda cell, ours: abs(math.log(ours / cell.paper)) if ours > 0.0 else math.inf)
         lines.append(
-            f"The other {len(left)}, all MQSI of {_tables(left)}, have no tolerance: {times_off}"
+            f"{len(left)} numbers, all MQSI of {_tables(left)}, have no tolerance: {times_off}"
             f"{near} of {len(left)} within a factor of {MQSI_FACTOR:g}; largest difference: {far}."
         )
     if about := [number for number in all_numbers if number.cell.relative is not None]:
         near, judged = within(about, Cell.within_relative)
         far = _farthest(about, lambda cell, ours: abs(ours - cell.paper) / (cell.relative or math.nan))
         lines.append(
-            f"V_error in proportion: {near} of {judged} within {100 * V_RELATIVE:g} % of the paper's number or half of "
+            f"V_error: {near} of {judged} numbers within {100 * V_RELATIVE:g} % of the paper's, or half of "
             f"its last digit; largest difference: {far}."
         )
     return lines
 
 
 def _farthest(some: Sequence[ComparedNumber], off: Callable[[Cell, float], float]) -> str:
-    """Return the number with the largest difference, ours for the paper's; NaN comes before all others."""
+    """Return the number with the largest difference, and the paper's; NaN comes before all others."""
     cell, ours = max(some, key=lambda one: math.inf if math.isnan(one.ours) else off(*one))
     shown = "not steady" if math.isnan(ours) else f"{ours:.{cell.digits + 1}f}"
-    return f"{shown} for {cell.paper:.{cell.digits}f} (Table {cell.table}, {cell.where})"
+    return f"{shown}, paper {cell.paper:.{cell.digits}f} (Table {cell.table}, {cell.where})"
 
 
 def _tables(some: Iterable[ComparedNumber]) -> str:

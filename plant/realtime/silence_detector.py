@@ -119,4 +119,5 @@ class SilenceDetector:
             yield name, f"{name} hears {', '.join(back)} again"
         if news:
             others = ", ".join(news)
-            yield name, f"{name} does not hear {others}: no state for {self._max_age:g} s, though one came here"
+            them = "them" if len(news) > 1 else "it"
+            yield name, f"{name} does not hear {others}: no state for {self._max_age:g} s, but the plant hears {them}"

@@ -85,15 +85,19 @@ class CheckVerdict(msgspec.Struct, frozen=True, kw_only=True):
         return f"{self.check} {self.status}" + (f": {detail}" if detail else "")
 
 
-def summary(verdicts: tuple[CheckVerdict, ...]) -> str:
-    """Return the verdict of a case on one line: how many passed, each that is off, and each that failed."""
+def counts(verdicts: tuple[CheckVerdict, ...]) -> str:
+    """Return how many checks a case passed, how many were not judged, and the names of those that are off."""
     passed = sum(verdict.status == "passed" for verdict in verdicts)
-    failed = [verdict for verdict in verdicts if verdict.status == "failed"]
+    failed = sum(verdict.status == "failed" for verdict in verdicts)
     off = [verdict.check for verdict in verdicts if verdict.status == "off"]
-    idle = len(verdicts) - passed - len(failed) - len(off)
-    line = f"{passed} of {passed + len(failed)} checks passed" + (f", {idle} not judged" if idle else "")
-    line += f", {', '.join(off)} switched off" if off else ""
-    return "; ".join([line, *(verdict.sentence for verdict in failed)])
+    idle = len(verdicts) - passed - failed - len(off)
+    line = f"{passed} of {passed + failed} checks passed" + (f", {idle} not judged" if idle else "")
+    return line + (f", {', '.join(off)} switched off" if off else "")
+
+
+def summary(verdicts: tuple[CheckVerdict, ...]) -> str:
+    """Return the verdict of a case on one line: its counts, and each check that failed."""
+    return "; ".join([counts(verdicts), *(verdict.sentence for verdict in verdicts if verdict.status == "failed")])
 
 
 FILE = "checks.json"  # Name of the file in the run folder

@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.text import Text
 
 from gridpeers.scenarios.checks.check_registry import LAW_FAILED
-from gridpeers.scenarios.checks.check_verdict import CheckVerdict, summary
+from gridpeers.scenarios.checks.check_verdict import CheckVerdict, counts
 from gridpeers.scenarios.console import text_of
 from gridpeers.scenarios.results.claims import NO_BENCHMARK, Benchmark, Verdict
 from gridpeers.scenarios.results.findings import Findings
@@ -203,7 +203,7 @@ def show(report: RunReport, console: Console) -> None:
         [Text(f"FAILED  case {case}: {first_of(of)}", "bold red") for case, of in report.failures.items() if of],
         *_tables(report),
         [*_claims(report)],
-        [_checks(case, of) for case, of in report.checks.items()],
+        [line for case in report.checks for line in _checks(report, case)],
     ]
     blocks += [[Text.assemble(("NOTE", "yellow"), f"  {note}")] for note in report.notes]
     blocks += [[Text.assemble("Results: ", (report.folder, "bold"))]] if report.folder else []
@@ -226,9 +226,14 @@ def _claims(report: RunReport) -> Iterator[Text]:
     yield from map(Text, report.benchmark.lines(report.findings) if report.verdicts else ())
 
 
-def _checks(case: str, verdicts: tuple[CheckVerdict, ...]) -> Text:
-    failed = any(verdict.status == "failed" for verdict in verdicts)
-    return Text.assemble(("CHECKS", "yellow" if failed else "green"), f"  case {case}: {summary(verdicts)}")
+def _checks(report: RunReport, case: str) -> Iterator[Text]:
+    """Yield the counts of a case, and a line for each check that failed, as expected or not."""
+    verdicts, broken = report.checks[case], report.broken(case)
+    failed = [verdict for verdict in verdicts if verdict.status == "failed"]
+    yield Text.assemble(("CHECKS", "yellow" if failed else "green"), f"  case {case}: {counts(verdicts)}")
+    for it in failed:
+        said = it.sentence if it in broken else it.sentence.replace(" failed", " failed as expected", 1)
+        yield Text(f"{'':8}{said}")
 
 
 def _tables(report: RunReport) -> Iterator[list[Text]]:

@@ -92,7 +92,7 @@ def _start(start: Start, *, agents: bool) -> None:
         if agents:
             found_by = RunAddress(run=run, connect=(endpoint,), access=access).words
             watch, down = command_line("watch", *found_by), command_line("down", *found_by)
-            say(f"{watch}, in another terminal, shows it; Ctrl-C here, or {down} there, ends it")
+            say(f"to see it, type {watch} in another terminal; to end it, type {down} there, or Ctrl-C here")
             outcome = all_here(config, everyone, kept.logs, kept.record, info)
         else:
             outcome = plant_here(config, kept.record, info)
@@ -119,7 +119,7 @@ def plant(live: Start) -> None:
 
 @of_live_run
 def up(live: Start) -> None:
-    """Run the plant and all its agents at once, in real time.
+    """Run the plant and all its agents, in real time.
 
     It runs until `gridpeers down` or Ctrl-C.
 

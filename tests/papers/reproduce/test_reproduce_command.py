@@ -15,8 +15,8 @@ def test_one_part_from_end_to_end(tmp_path: Path) -> None:
 
     assert code == 0
     assert "microgrid-switching, case IV: 0 % done\n" in text
-    assert "12 of the 12 numbers of Table V that have a tolerance are within it." in text
-    assert "V_error in proportion: 0 of 3 within 25 %" in text
+    assert "12 of 12 numbers of Table V are within their tolerance." in text
+    assert "V_error: 0 of 3 numbers within 25 %" in text
     assert "6 of 7 claims hold, 1 known deviation, 0 failed." in text
     assert {path.name for path in out.iterdir()} == {
         "report.html",

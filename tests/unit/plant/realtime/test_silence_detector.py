@@ -95,7 +95,7 @@ def test_two_agents_that_do_not_hear_each_other_are_reported_though_the_plant_he
     all_tick(lab, 5)
 
     (t1, first), (t2, second), (_, third) = told(lab)
-    assert first.startswith("inv1 does not hear inv2: no state for 0.25 s, though one came here")
+    assert first.startswith("inv1 does not hear inv2: no state for 0.25 s, but the plant hears it")
     assert second.startswith("inv2 does not hear inv1")
     assert third.startswith("inv1 hears inv2 again")
     assert cut <= t1 == t2 <= cut + 0.2
