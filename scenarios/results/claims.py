@@ -81,6 +81,7 @@ class Benchmark:
             return [f"The benchmark's summary failed: {named(error)}"]
 
     def number(self, case: str, event: str, quantity: str, island: str = "") -> Published | None:
+        """Return the published number for a place in our results, or None."""
         place = (case, event, quantity, island)
         return next((one for one in self.numbers if (one.case, one.event, one.quantity, one.island) == place), None)
 
