@@ -81,7 +81,6 @@ def plain(snapshot: Snapshot) -> str:
 
 
 def table(snapshot: Snapshot, before_unit: str = "\n") -> Group:
-    """Return a line per agent below the head of a run, and its latest events."""
     grid = Table(box=None, padding=(0, 2, 0, 0), header_style="bold")
     columns = _columns(snapshot)
     for column in columns:

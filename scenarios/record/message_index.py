@@ -105,7 +105,6 @@ class MessageIndex:
         return _nearest((self.part(i).states.get((sender, number), ()) for i in self._about(t)), t, epoch)
 
     def measurement(self, to: str, number: int, t: float, epoch: int | None = None) -> Measurement | None:
-        """Return a measurement of about run time t (s), as `state` does."""
         return _nearest((self.part(i).measurements.get((to, number), ()) for i in self._about(t)), t, epoch)
 
     def named_by(self, entry: MessageReference, t: float) -> State | Measurement | None:

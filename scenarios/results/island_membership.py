@@ -66,8 +66,6 @@ Islands = Mapping[str, RecordedIsland]  # Islands by name: that of the first inv
 
 
 class IslandInterval(NamedTuple):
-    """A time during which no switch operates."""
-
     start: float
     """Time of the operations of switches that begin it (s); minus infinity for the start of the run."""
     end: float

@@ -66,7 +66,6 @@ class LinkRecord:
             write_whole(folder / "links.json", json.dumps(whole, indent=1, default=str) + "\n")
 
     def lines(self) -> Iterator[str]:
-        """Yield the lines for the report; none if no message was sent."""
         if not self.sent:
             return
         dropped: Counter[str] = Counter()

@@ -152,7 +152,6 @@ def samples(settings: Iterable[Sequence[Setting]]) -> Iterator[Setting]:
 
 
 def axis_of(values: Mapping[str, Sequence[Any]], origin: Mapping[str, str]) -> Axis:
-    """Return the axis of keys that go together, first values with first."""
     rows = [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=False)]
     return Axis(origin, [Setting(row, row) for row in rows])
 

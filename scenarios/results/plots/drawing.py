@@ -69,7 +69,6 @@ class Drawing:
 
 
 def drawing_of(scenario: ScenarioModel, cases: Mapping[str, CheckedCase]) -> Drawing:
-    """Return the data of the figures of some cases, which are all that their scenario has."""
     *_, last = cases.values()  # in real time each case has its own events
     came = [window for window in windows(scenario, last.events) if window.start < last.history.t[-1]]
     commands = [Mark("", event.t, event.subject) for event in last.events if event.kind == "command"]

@@ -76,7 +76,6 @@ def test_a_leaving_agent_gets_ready_for_no_roster() -> None:
     (4, {"inv1": "another", "inv2": "b"}, "unexpected"),
 ])  # fmt: skip
 def test_an_old_or_foreign_roster_changes_nothing(number: int, roster: dict[str, str], kind: str) -> None:
-    """An old roster, or a roster without this process."""
     lab = Lab()
     lab.meet("inv2")
     lab.prepare(3, "inv2")

@@ -201,7 +201,6 @@ def test_commands_are_done_and_answered() -> None:
     ("stop", "inv7", 'no agent "inv7" is running; running are: inv1, inv2, inv3'),
 ])  # fmt: skip
 def test_an_impossible_command_is_answered_with_the_choices(verb: str, argument: str, text: str) -> None:
-    """The answer is not ok."""
     answer = running().ask(verb, argument)
 
     assert (answer.ok, answer.text) == (False, text)

@@ -29,7 +29,6 @@ NOW = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
 
 
 def test_runs_get_folders_by_time_and_latest_is_the_last(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two runs within a second have two folders; `latest` leads to the second."""
     monkeypatch.chdir(tmp_path)
 
     first, second = new_folder(None, "islanding", NOW), new_folder(None, "islanding", NOW)

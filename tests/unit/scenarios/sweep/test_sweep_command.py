@@ -21,7 +21,6 @@ invoke = partial(command_line.invoke, "sweep")
 
 
 def test_a_dry_run_tells_the_size_and_writes_nothing(sweep_file: Write, tmp_path: Path) -> None:
-    """--dry-run checks all and starts nothing."""
     sweep_file("[graph]\nlinks = [8, 36]\nper_count = 3\n" + GRID)
 
     assert invoke("mine.toml", "--dry-run") == (
