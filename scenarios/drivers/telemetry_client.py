@@ -104,7 +104,6 @@ class TelemetryClient:
         return words
 
     def note_crash(self, agent: str, end: str) -> None:
-        """Report the crash of an agent's process as an event of its law; `end` describes the crash."""
         if self.latest is not None and not self.ended:
             event = PlantEvent(t=self.t, kind="law", subject=agent, text=f"{agent}: its process {end}")
             self._on_message(replace(self.latest, rows=(), events=(event,), awaited=(), quiet=(), others=0))

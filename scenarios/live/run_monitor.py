@@ -97,8 +97,6 @@ _PER_INVERTER = 6  # Values of one inverter in a row of telemetry
 
 @dataclass(frozen=True, kw_only=True)
 class InverterStatus:
-    """One inverter and its agent at one moment; None stands for an unknown value."""
-
     name: str
     island: str = ""
     """Name of its island: "grid", or the first inverter in it; "" if unknown."""

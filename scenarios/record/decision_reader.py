@@ -138,7 +138,6 @@ class DecisionReader:
                     yield self._decision(config, state, measured, entry)
 
     def _inputs(self, agent: str, form: Decision, tick: int, t: float) -> Iterator[NeighbourInput]:
-        """Yield what an agent had heard of each neighbour at a tick, at t (s of run time)."""
         for i, name in enumerate(form.neighbours):
             number, age = form.states[i], form.ages[i] if i < len(form.ages) else None
             at = t - (age or 0.0)

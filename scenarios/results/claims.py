@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Published:
+    """One published number."""
+
     source: str
     """Place in the publication, e.g. "Table I"."""
     case: str
