@@ -28,7 +28,7 @@ from gridpeers.scenarios.drivers.telemetry_stream import Recordable
 from gridpeers.scenarios.emulation.emulated_links import links_of
 from gridpeers.scenarios.live.run_address import RunAddress, UsageError, far_hosts, loopback_of, return_path
 from gridpeers.scenarios.live.run_client import RunClient
-from gridpeers.scenarios.live.run_monitor import line_of
+from gridpeers.scenarios.live.run_monitor import line_of, repeated
 from gridpeers.scenarios.live.run_requests import ANSWER, free_configurations, own_code
 from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.scenarios.results.record import Recorded, Recorder, RecordError
@@ -161,7 +161,9 @@ class LiveRecorder:
         for event in telemetry.events:
             if event.kind == "law":
                 self.failed_laws.setdefault(event.subject, event)
-            if event.kind not in self._silent and (line := self._limit.admit(line_of(event), monotonic())) is not None:
+            if event.kind in self._silent or repeated(event):
+                continue
+            if (line := self._limit.admit(line_of(event), monotonic())) is not None:
                 say(line)
         if telemetry.final:  # before the terminal says that the run has ended
             _say_all(self._limit.left_out())

@@ -136,7 +136,12 @@ class Snapshot:
 
 
 def line_of(event: PlantEvent) -> str:
-    return f"{event.t:8.2f} s  {re.sub(r', at t = [0-9.e+]+ s$', '', event.text)}"
+    return f"{event.t:8.2f} s  {re.sub(r',? at t = [0-9.e+]+ s$', '', event.text)}"
+
+
+def repeated(event: PlantEvent) -> bool:
+    """Return whether an event of the plant says the same as this command, which takes effect in the next step."""
+    return event.kind == "command" and re.match("(switch|load) (?!.*: close in step)", event.text) is not None
 
 
 class RunMonitor:
@@ -215,7 +220,7 @@ class RunMonitor:
             speed=1.0 if self._plant_status is None else self._plant_status.speed,
             impaired=self._impaired if current else (),
             inverters=tuple(self._inverter(name, name in present, current, now) for name in names),
-            events=tuple(map(line_of, self._events)),
+            events=tuple(line_of(event) for event in self._events if not repeated(event)),
         )
 
     def _inverter(self, name: str, present: bool, current: bool, now: float) -> InverterStatus:

@@ -49,7 +49,9 @@ def monitor() -> RunMonitor:
     seen = RunMonitor("lab")
     for name in ("inv1", "inv2"):
         seen.config(plate(name))
-    seen.telemetry(told(2.0, PlantEvent(t=1.0, kind="switch", subject="13-152", text="13-152 opened")), now=10.0)
+    opened = PlantEvent(t=1.0, kind="switch", subject="13-152", text="13-152 opened")
+    command = PlantEvent(t=1.0, kind="command", subject="13-152", text="switch 13-152: open at t = 1.00 s")
+    seen.telemetry(told(2.0, command, opened), now=10.0)  # of which one is shown
     seen.status(status("inv1", {"inv2": 1.4}, ()), now=10.0)
     return seen
 
