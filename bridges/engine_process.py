@@ -23,6 +23,7 @@ from typing import Any, NoReturn
 
 from gridpeers.plant.request_process import ProcessEndedError, RequestProcess, program
 from gridpeers.plant.tables.read import FeederError
+from gridpeers.wire.driver.command_line import pip_install
 
 RESULT, PLACE = "result.pickle", "place"  # Files in the folder of the process: its result, and what it is about to do
 
@@ -49,7 +50,7 @@ class EngineProcess:
 
     def __init__(self, module: str, package: str, name: str, files: str, extra: str) -> None:
         self._module, self._package, self._name = module, package, name
-        self._missing = f"reading {files} files needs {name}; install it: pip install 'gridpeers[{extra}]'"
+        self._missing = f"reading {files} files needs {name}; install it: {pip_install(extra)}"
         self._lock = threading.Lock()  # it reads one file at a time
         self._running: dict[int, tuple[RequestProcess, Path]] = {}
         """By the process that started it: a fork has not inherited the right to ask it."""

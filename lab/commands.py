@@ -108,7 +108,7 @@ def trace(
     Example:  gridpeers trace runs/islanding/latest/IV
     """
     require({"mcap": "the record of a run"})
-    require({"perfetto": "a Perfetto trace"}, "install it: pip install 'gridpeers[trace]'")
+    require({"perfetto": "a Perfetto trace"}, "trace")
 
     from gridpeers.lab.trace import write_perfetto_trace
     from gridpeers.output_folders import files_written, shown

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 
 import typer
 
-from gridpeers.cli.usage import BROKEN, exit_code, fail, flag, interruptible, option
+from gridpeers.cli.usage import BROKEN, exit_code, fail, flag, interruptible, option, require
 from gridpeers.viewer.page_server import listen, url_of
 
 SITE, CONFIG = Path(__file__).with_name("site"), Path(__file__).parents[2] / "mkdocs.yml"
@@ -38,7 +38,7 @@ def docs(
             if not (SITE / "index.html").is_file():
                 fail(f"{SITE} has no pages; install gridpeers from a wheel, which has them")
             url = url_of(listening, "127.0.0.1")
-            typer.echo(f"documentation: open {url} in a browser; Ctrl-C ends the command")
+            typer.echo(f"documentation: open {url} in a browser, or {url}learn/first-run.html; Ctrl-C ends the command")
             if not no_browser and (sys.platform != "linux" or {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys()):
                 webbrowser.open(url)  # without a display it would take the terminal
             server = ThreadingHTTPServer(
@@ -58,13 +58,9 @@ class _Quiet(SimpleHTTPRequestHandler):
 
 def _build() -> None:
     """Build the pages of a clone; those of an earlier build serve where mkdocs is not installed."""
-    if util.find_spec("material") is None:
-        if not (SITE / "index.html").is_file():
-            fail(
-                "mkdocs-material is not installed; it builds the pages of a clone",
-                "install it: pip install -e '.[docs]'",
-            )
+    if util.find_spec("material") is None and (SITE / "index.html").is_file():
         return
+    require({"material": "the pages of a clone"}, "docs")
     typer.echo("building the pages, which takes some seconds ...")
     words = [sys.executable, "-m", "mkdocs", "build", "--quiet", "--no-strict", "--config-file", str(CONFIG)]
     env = os.environ | {"NO_MKDOCS_2_WARNING": "1"}

@@ -54,7 +54,7 @@ def view(
     Example:  gridpeers view --control
     """
     modules = dict.fromkeys(("starlette", "uvicorn", "websockets"), "the page")
-    require(modules, "install it: pip install 'gridpeers[view]'")
+    require(modules, "view")
     if record is None:
         if case:
             fail("--case: goes with a RECORD; a live run has one case")

@@ -87,6 +87,7 @@ def is_no_path(text: str) -> bool:
 
 DISTRIBUTIONS = {
     "dss": "dss-python dss-python-backend",
+    "material": "mkdocs-material",
     "py_dss_interface": "py-dss-interface",
     "zenoh": "eclipse-zenoh",
 }

@@ -25,6 +25,7 @@ from gridpeers.agents.agent_config import LawChoice, SharedQuantity
 from gridpeers.agents.carriers.program import ProgramLaw
 from gridpeers.agents.laws.call import LawError, decide, start_law
 from gridpeers.agents.laws.law import LIMITS, NOTHING_SHARED, Law, Neighbour, Own, SetPoints, limits_in
+from gridpeers.wire.driver.command_line import pip_install
 from gridpeers.wire.messages import SHARED_LIMIT
 from gridpeers.wire.plugins.registry import ANYTHING, named
 from gridpeers.wire.schema.table_reading import read_parameters
@@ -45,7 +46,7 @@ def fmu_problems(path: Path, parameters: Mapping[str, Any]) -> list[tuple[str, s
     try:
         import fmpy
     except ModuleNotFoundError:
-        return [("fmu", "an FMU needs the package fmpy; install it: pip install 'gridpeers[fmu]'")]
+        return [("fmu", f"an FMU needs the package fmpy; install it: {pip_install('fmu')}")]
     try:
         description = fmpy.read_model_description(str(path))
         platforms = fmpy.supported_platforms(str(path))

@@ -15,6 +15,7 @@ from typing import Any, Literal, NamedTuple
 
 from gridpeers.bridges.helics.helics_simulator import HelicsSettings, endpoint
 from gridpeers.plant.request_process import ProcessEndedError, RequestProcess
+from gridpeers.wire.driver.command_line import pip_install
 from gridpeers.wire.wording import damaged
 
 ACT = 1e-6
@@ -91,7 +92,7 @@ class HelicsFederate:
         ready = self._take(IMPORT, f"its process did not start within {IMPORT:g} s")
         if "not_importable" in ready:
             self._process.close(FAREWELL)
-            missing = f"{USER} needs the package helics; install it: pip install 'gridpeers[helics]'"
+            missing = f"{USER} needs the package helics; install it: {pip_install('helics')}"
             raise HelicsError(damaged("helics", ready["not_importable"], USER) if ready["installed"] else missing)
         host, port = endpoint(settings.broker)
         request = {"do": "join", "name": settings.name, "host": host, "port": port}

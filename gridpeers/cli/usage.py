@@ -16,7 +16,7 @@ from typer import BadParameter
 from typer.core import TyperGroup
 
 from gridpeers.scenarios.console import terminal as terminal
-from gridpeers.wire.driver.command_line import command_line
+from gridpeers.wire.driver.command_line import command_line, pip_install
 from gridpeers.wire.driver.ending import stop_handler
 from gridpeers.wire.driver.machine import POSIX, too_few_files
 from gridpeers.wire.wording import DISTRIBUTIONS, InputError, damaged, printable, suggestion
@@ -87,20 +87,21 @@ def chosen(spec: ScenarioModel, case: str | None, seed: int | None) -> ScenarioM
     return spec if seed is None else replace(spec, seed=seed)
 
 
-def require(modules: Mapping[str, str], install: str = "") -> None:
-    """End with advice if a package of an extra is missing; `modules` says what each package is needed for.
+def require(modules: Mapping[str, str], extra: str = "") -> None:
+    """End with one line if packages of an extra are missing; `modules` says what each package is needed for.
 
     Packages of the core need no such check: `gridpeers.cli.app` ends any command with the name of a missing one.
     """
-    lacking = {DISTRIBUTIONS.get(name, name): use for name, use in modules.items() if util.find_spec(name) is None}
-    if lacking:
-        lines = [f"{name} is not installed; it is needed for {use}" for name, use in lacking.items()]
-        fail(*lines, install or f"install what is missing: pip install {' '.join(lacking)}")
+    if lacking := {DISTRIBUTIONS.get(name, name): use for name, use in modules.items() if util.find_spec(name) is None}:
+        are, them = ("is", "it") if len(lacking) == 1 else ("are", "them")
+        uses = " and ".join(dict.fromkeys(lacking.values()))
+        install = pip_install(extra) if extra else f"pip install {' '.join(lacking)}"
+        fail(f"{', '.join(lacking)} {are} not installed, and needed for {uses}; install {them}: {install}")
 
 
 def require_loadable(module: str, user: str) -> None:
     """End with a clear line if a package with a library of its own is missing or damaged; its extra has its name."""
-    require({module: user}, f"install it: pip install 'gridpeers[{module}]'")
+    require({module: user}, module)
     done = subprocess.run([sys.executable, "-P", "-c", f"import {module}"], capture_output=True, text=True, check=False)
     if done.returncode:
         reason = done.stderr.strip().rpartition("\n")[2] or f"exit status {done.returncode}"
@@ -197,9 +198,12 @@ def _in_one_line() -> Iterator[None]:
 
 def _line(error: Any) -> str:
     """Return a problem in one line, in typer's words, with the command that shows the help."""
-    param = getattr(error, "param", None)
+    param: Any = getattr(error, "param", None)
     if type(error).__name__ == "MissingParameter" and param is not None and param.metavar == "SCENARIO":
         return f"SCENARIO is missing: e.g. islanding, plug-n-play or partition; {command_line('list')} shows all"
+    if type(error).__name__ == "MissingParameter" and error.ctx.command.params[0].metavar == "RUN":
+        example = " ".join(error.ctx.command.help.partition("Example:")[2].split())
+        return f"{param.metavar} is missing; RUN comes first: {example}"
     message = " ".join(error.format_message().split()).rstrip(".").replace("Value error, ", "")
     words: list[str] = []
     ctx = error.ctx

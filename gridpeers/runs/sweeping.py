@@ -20,6 +20,7 @@ from gridpeers.scenarios.sweep.study import results_frame
 from gridpeers.scenarios.sweep.sweep_case import FATE, SweepRow, run_one
 from gridpeers.scenarios.sweep.sweep_reading import BaseScenario, Plan, plan_of
 from gridpeers.scenarios.sweep.workers import cores, on_workers
+from gridpeers.wire.driver.command_line import pip_install
 from gridpeers.wire.wording import suggestion
 
 Values = Mapping[str, Iterable[Any]]  # Values by the dotted path of a key
@@ -121,7 +122,7 @@ def _jobs(plan: Plan, jobs: int | None) -> int:
         return 1
     count = min(cores() if jobs is None else jobs, len(plan.runs))
     if lacking and count > 1:
-        raise ScenarioError(["jobs: more than one process needs joblib: pip install 'gridpeers[sweep]'"])
+        raise ScenarioError([f"jobs: more than one process needs joblib: {pip_install('sweep')}"])
     return count
 
 

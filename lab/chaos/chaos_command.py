@@ -61,7 +61,7 @@ def chaos(
         fail(f'{scenario}: plant.simulator = "{simulator}" lets no inverter leave or join; use "gridpeers"')
     if spec.security == "mtls" and driver == "processes":
         fail(f'{scenario}: security = "mtls" needs certificates, and chaos uses no certificates; remove it')
-    require(_PACKAGES, "install what chaos needs: pip install 'gridpeers[chaos]'")
+    require(_PACKAGES, "chaos")
     from datetime import datetime
 
     from gridpeers.cli.progress import remaining

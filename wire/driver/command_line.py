@@ -19,3 +19,9 @@ def command_line(*words: str, program: str = PROGRAM) -> str:
     found = shutil.which(program)
     here = called.name == PROGRAM and beside.is_file() and (found is None or Path(found).resolve() != beside.resolve())
     return shlex.join([str(beside) if here else program, *words])
+
+
+def pip_install(extra: str) -> str:
+    """Return the command that installs an extra: in a clone, or beside a wheel."""
+    clone = (Path(__file__).parents[3] / "pyproject.toml").is_file()
+    return f"pip install -e '.[{extra}]'" if clone else f"pip install 'gridpeers[{extra}]'"

@@ -27,7 +27,7 @@ app = typer.Typer(
 
 _Keys = Annotated[Path, option("DIR", "Folder of the site; the current one if left out.")]
 _Days = Annotated[float, option("N", "Life of the certificates (days).", min=0.01, max=3650.0)]
-_require_cryptography = partial(require, {"cryptography": "certificates"}, "install it: pip install 'gridpeers[keys]'")
+_require_cryptography = partial(require, {"cryptography": "certificates"}, "keys")
 
 
 @app.command()

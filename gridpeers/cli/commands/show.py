@@ -116,7 +116,7 @@ def export(
     from gridpeers.scenarios.record.record_reader import RunRecord
 
     if to in PACKAGES:
-        require({PACKAGES[to]: f"--to {to}"}, "install it: pip install 'gridpeers[export]'")
+        require({PACKAGES[to]: f"--to {to}"}, "export")
     files = records_in(run, case)
     with files_written(out or run):
         for file in files:

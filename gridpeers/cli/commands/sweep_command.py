@@ -69,7 +69,7 @@ def sweep(
 def read(file: str) -> Plan:
     """Return the plan of a sweep; end with what to install if its runs need more."""
     plan = read_sweep(file)
-    require({"joblib": "the runs over all cores"}, "install what sweeps need: pip install 'gridpeers[sweep]'")
+    require({"joblib": "the runs over all cores"}, "sweep")
     return plan
 
 

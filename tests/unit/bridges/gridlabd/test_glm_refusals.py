@@ -187,5 +187,5 @@ def test_a_missing_wheel_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setitem(sys.modules, "gridlabd", None)
 
     assert problems(write(tmp_path, HEAD + LOAD)) == (
-        "reading .glm files needs GridLAB-D; install it: pip install 'gridpeers[gridlabd]'",
+        "reading .glm files needs GridLAB-D; install it: pip install -e '.[gridlabd]'",
     )

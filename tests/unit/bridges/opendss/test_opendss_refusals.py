@@ -175,7 +175,7 @@ def test_a_missing_wheel_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setitem(sys.modules, "dss", None)
 
     assert problems(write(tmp_path, LINE)) == (
-        "reading .dss files needs the OpenDSS engine; install it: pip install 'gridpeers[opendss]'",
+        "reading .dss files needs the OpenDSS engine; install it: pip install -e '.[opendss]'",
     )
 
 

@@ -37,6 +37,7 @@ MISTYPED = [
     ("agent", "missing argument 'INVERTER'"),
 ]
 UNUSABLE = [
+    ("why inv4", "AGENT is missing; RUN comes first: gridpeers why runs/islanding/latest/IV inv4 4.3"),
     ("link zebra", 'no command "zebra"; the commands are set, cut, heal'),
     ("run islandin", 'no scenario "islandin"; did you mean "islanding"?'),
     ("run nowhere.toml", "nowhere.toml: there is no such file"),

@@ -51,8 +51,8 @@ def test_what_is_missing_is_told_with_what_to_install(monkeypatch: pytest.Monkey
 
     assert invoke("topology", "--dry-run") == (
         2,
-        "gridpeers: joblib is not installed; it is needed for the runs over all cores\n"
-        "gridpeers: install what sweeps need: pip install 'gridpeers[sweep]'\n",
+        "gridpeers: joblib is not installed, and needed for the runs over all cores; "
+        "install it: pip install -e '.[sweep]'\n",
     )
     assert invoke("topologi")[1].startswith('gridpeers: no sweep "topologi"; '), "nothing to install for a wrong name"
 
