@@ -105,7 +105,10 @@ class Scenario:
         problems = Problems(self._path.name if self._text else "Scenario(...)", self._text, changed=changed)
         for path, value in changes.items():
             try:
-                remove(tree, path) if value is None else put(tree, path, plain(value))
+                if value is None:
+                    remove(tree, path)
+                else:
+                    put(tree, path, plain(value))
             except (PathError, ValueError) as error:
                 problems.add(path, str(error))
         return self._of(tree, self._path, self._text, changed, problems)

@@ -85,7 +85,14 @@ def remaining(console: Console, total: float) -> Iterator[TellPart]:
 
 
 def _bars(console: Console) -> Progress:
-    times = TextColumn("left"), TimeRemainingColumn(), TextColumn("after"), TimeElapsedColumn()
-    columns = TextColumn("{task.description}", markup=False), BarColumn(bar_width=30), TaskProgressColumn(), *times
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(bar_width=30),
+        TaskProgressColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+        TextColumn("after"),
+        TimeElapsedColumn(),
+    )
     hidden = not console.is_terminal
     return Progress(*columns, console=console, transient=True, disable=hidden, speed_estimate_period=MEMORY)

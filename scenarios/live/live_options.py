@@ -28,7 +28,7 @@ from gridpeers.scenarios.live.run_client import RunClient
 from gridpeers.scenarios.record.record_info import LIVE, RecordInfo
 from gridpeers.scenarios.results.run_files import FolderError, new_folder, refusal, set_broken, write_whole
 from gridpeers.scenarios.run_request import SPEEDS
-from gridpeers.scenarios.schema.configs import as_in, configs, nameplate_keys
+from gridpeers.scenarios.schema.configs import as_in, configs
 from gridpeers.scenarios.schema.participants import netem_of, setup_of
 from gridpeers.scenarios.schema.scenario_model import NEEDS_KEYS, ScenarioModel
 from gridpeers.scenarios.schema.scenario_writing import to_toml
@@ -57,6 +57,7 @@ def check_alone(
 
 
 def chosen_case(scenario: ScenarioModel, case: str) -> str:
+    """Return the given case, or the last one; UsageError if there is no such case."""
     if case and case not in scenario.cases:
         raise UsageError(f'--case: no case "{case}"; {suggestion(case, scenario.cases, "cases")}')
     return case or list(scenario.cases)[-1]
@@ -102,7 +103,8 @@ def configure(
     level: RecordLevel = scenario.record if recorded else "physics"
     live = {"run": run, "clock": "realtime", "speed": speed, "links": links, "record": level}
     first = [replace(agent, **live, deadline=0.0) for agent in agents if agent.name in plant.agents]
-    spares = (replace(first[0], **nameplate_keys(row)) for row in feeder.spares)
+    nameplate = ("name", "kind", "microgrid", "P_rated", "V_nom", "m_p", "m_q")
+    spares = (replace(first[0], **{name: getattr(row, name) for name in nameplate}) for row in feeder.spares)
     everyone = (*first, *spares)
     end = None if duration is None else max(1, round(duration / plant.T_c)) * plant.T_c
     diagram = replace(feeder_map(as_in(scenario, feeder)), scenario=scenario.name, case=case)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -104,12 +104,22 @@ def find(cases: Mapping[str, CheckedCase]) -> Findings:
         own |= {name: {}} if metrics else {}
         for window in case.windows:
             parts = case.parts[window]
-            apart = parts if len(parts) > 1 else ()
-            several = {of.nameplates.names[0]: measure(of.history, of.nameplates, window, f_nom) for of in apart}
+            several = {
+                part.nameplates.names[0]: measure(part.history, part.nameplates, window, f_nom)
+                for part in parts
+                if len(parts) > 1
+            }
             islands[name] |= {window.label: several} if several else {}
-            facts: Any = {"case": name, "islands": several, "nameplates": case.nameplates, "f_nom": f_nom}
-            facts |= {"T_c": case.T_c, "messages_saved": case.messages_saved.get(window.label, 0.0)}
-            data = WindowData.cut(case.seen_by(window), window, **facts)
+            data = WindowData.cut(
+                case.seen_by(window),
+                window,
+                case=name,
+                islands=several,
+                nameplates=case.nameplates,
+                f_nom=f_nom,
+                T_c=case.T_c,
+                messages_saved=case.messages_saved.get(window.label, 0.0),
+            )
             results[name][window.label], settled[name][window.label] = data.steady, data.settled
             if metrics:
                 with np.errstate(all="ignore"):  # a value that is no number has its reason

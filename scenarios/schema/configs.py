@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from pathlib import Path
-from typing import Any
 
 import msgspec
 
 from gridpeers.agents.agent_config import MAX_AGE, AgentConfig, Control
-from gridpeers.plant.equipment import InverterRow, Tables
+from gridpeers.plant.equipment import Tables
 from gridpeers.plant.equipment.derived_feeders import changed
 from gridpeers.plant.inverters.inverter_registry import given
 from gridpeers.plant.plant_config import (
@@ -41,10 +40,16 @@ def configs(
     setup = participants.setup_of(netem, scenario, feeder, real_nodes=real_nodes)
     links = {} if participants.is_calm(netem) else setup.to_tree()
     rates = {node.name: node.skew.factor for node in netem.nodes if node.skew is not None}
-    of_rule: Any = {key: getattr(rule, key) for key in ("secondary", "links", "without", "gains")}
-    degraded = rule.degraded_communication
-    law = law_of(scenario, case)
-    control = Control(graph=graph, own_graph=own_graph, degraded_communication=degraded, law=law, **of_rule)
+    control = Control(
+        secondary=rule.secondary,
+        graph=graph,
+        own_graph=own_graph,
+        links=rule.links,
+        without=rule.without,
+        gains=rule.gains,
+        degraded_communication=rule.degraded_communication,
+        law=law_of(scenario, case),
+    )
     plant = PlantConfig(
         run=run,
         settings=PlantSettings(
@@ -74,19 +79,30 @@ def configs(
         deadline=scenario.processes.deadline_s,
         listen=endpoints,
         links=links,
-        max_age=degraded.max_age or MAX_AGE,
+        max_age=rule.degraded_communication.max_age or MAX_AGE,
         on_law_failure=scenario.on_law_failure,
     )
-    common: dict[str, Any] = {"run": run, "f_nom": feeder.f_nom, "T_c": time.T_c_s, "control": control, "links": links}
-    common |= {"deadline": scenario.processes.deadline_s, "connect": endpoints}
-    clock_rates = (rates.get(row.name, 1.0) for row in present)
-    own = zip(map(nameplate_keys, present), clock_rates, strict=True)
-    return plant, tuple(AgentConfig(**common, **keys, clock_rate=rate) for keys, rate in own)
-
-
-def nameplate_keys(row: InverterRow) -> dict[str, Any]:
-    """Return the keys of an agent's configuration that its inverter's row has too."""
-    return {key: getattr(row, key) for key in ("name", "kind", "microgrid", "P_rated", "V_nom", "m_p", "m_q")}
+    agents = tuple(
+        AgentConfig(
+            run=run,
+            name=row.name,
+            kind=row.kind,
+            microgrid=row.microgrid,
+            P_rated=row.P_rated,
+            V_nom=row.V_nom,
+            f_nom=feeder.f_nom,
+            m_p=row.m_p,
+            m_q=row.m_q,
+            T_c=time.T_c_s,
+            control=control,
+            deadline=scenario.processes.deadline_s,
+            connect=endpoints,
+            links=links,
+            clock_rate=rates.get(row.name, 1.0),
+        )
+        for row in present
+    )
+    return plant, agents
 
 
 def secured(

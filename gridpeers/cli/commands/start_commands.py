@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 from shutil import rmtree
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -54,6 +54,7 @@ class Start:
 
 
 def _start(start: Start, *, agents: bool) -> None:
+    """Run the plant, with its agents or without, until it ends; end with its exit code."""
     require_posix("a live run")
     from gridpeers.scenarios.live.live_options import check_alone, chosen_case, configure, folders, live_record
 
@@ -76,9 +77,20 @@ def _start(start: Start, *, agents: bool) -> None:
 
     spec, feeder = load(start.scenario)
     spec = chosen(spec, chosen_case(spec, start.case), None)
-    typed: dict[str, Any] = {name: getattr(start, name) for name in ("case", "speed", "wait", "duration", "strict")}
-    typed |= {"recorded": start.out is not None, "secured": start.keys is not None}
-    config, everyone = configure(spec, feeder, endpoint, beyond, run=run, **typed)
+    config, everyone = configure(
+        spec,
+        feeder,
+        endpoint,
+        beyond,
+        run=run,
+        case=start.case,
+        speed=start.speed,
+        wait=start.wait,
+        duration=start.duration,
+        strict=start.strict,
+        recorded=start.out is not None,
+        secured=start.keys is not None,
+    )
     inverters = tuple(row.name for row in (*feeder.inverters, *feeder.spares))
     if start.keys is not None:
         started = config.agents if agents else ()
@@ -97,8 +109,16 @@ def _start(start: Start, *, agents: bool) -> None:
         else:
             outcome = plant_here(config, kept.record, info)
         if kept.whole is not None:
-            how: dict[str, Any] = {"clock": "realtime", "speed": start.speed, "figures": start.figures}
-            outcome = conclude(outcome, Request(scenario=spec, feeder=feeder, driver=LIVE, folder=kept.whole, **how))
+            metrics = Request(
+                scenario=spec,
+                feeder=feeder,
+                driver=LIVE,
+                folder=kept.whole,
+                clock="realtime",
+                speed=start.speed,
+                figures=start.figures,
+            )
+            outcome = conclude(outcome, metrics)
         elif outcome.failed_laws:
             typer.secho(f"FAILED  {first_of(law_failures(outcome.failed_laws))}", fg="red", bold=True)
     if kept.whole is None and not (agents and outcome.broke):  # what broke it names a log

@@ -23,16 +23,35 @@ from gridpeers.scenarios.results.plots.drawing import Drawing, Mark
 
 Style = tuple[str, Any, float]  # Colour, dash pattern and line width (pt)
 
-_HUES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
-STYLES = tuple(zip(_HUES, ("-", "-", "--", "-.", "-", "--"), strict=True))
+STYLES: tuple[tuple[str, str], ...] = (
+    ("#0072b2", "-"),
+    ("#d55e00", "-"),
+    ("#009e73", "--"),
+    ("#cc79a7", "-."),
+    ("#e69f00", "-"),
+    ("#56b4e9", "--"),
+)
 """Colours and dash patterns of cases, and of inverters, in turn."""
 
 BLACK, GREY = "#000000", "#444444"
 """Colours of lines and words."""
 
-PAGE: Any = {"font.size": 8, "figure.dpi": 180, "savefig.dpi": 180, "legend.frameon": False, "legend.fontsize": 7.5}
-PAGE |= {"axes.titlesize": 9, "axes.titlepad": 14, "axes.labelsize": 8, "axes.axisbelow": True, "axes.grid": True}
-PAGE |= {"axes.spines.top": False, "axes.spines.right": False, "grid.color": "#e3e3e3", "grid.linewidth": 0.6}
+PAGE: Any = {
+    "font.size": 8,
+    "axes.titlesize": 9,
+    "axes.titlepad": 14,
+    "axes.labelsize": 8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#e3e3e3",
+    "grid.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "legend.frameon": False,
+    "legend.fontsize": 7.5,
+    "figure.dpi": 180,
+    "savefig.dpi": 180,
+}
 
 
 def stacked_styles(count: int) -> list[Style]:
@@ -43,6 +62,8 @@ def stacked_styles(count: int) -> list[Style]:
 
 
 class Bounds(NamedTuple):
+    """End of an axis that starts at 0."""
+
     least: float = 0.05
     """There or above, so that what is next to nothing looks like it."""
     shown: float = 0.995
@@ -60,9 +81,16 @@ def from_zero(axes: Axes, curves: Iterable[Floats], bounds: Bounds) -> None:
     peak = float(values.max())
     axes.set_ylim(0.0, top)
     if peak > top:
-        look: Any = {"ha": "right", "va": "top", "fontsize": 7, "color": GREY}
-        look["bbox"] = {"facecolor": "#ffffff", "edgecolor": "none", "pad": 1.0}
-        axes.annotate(f"up to {peak:.2g}", (0.995, 0.985), xycoords="axes fraction", **look)
+        axes.annotate(
+            f"up to {peak:.2g}",
+            (0.995, 0.985),
+            xycoords="axes fraction",
+            ha="right",
+            va="top",
+            fontsize=7,
+            color=GREY,
+            bbox={"facecolor": "#ffffff", "edgecolor": "none", "pad": 1.0},
+        )
 
 
 def legend_below(figure: Figure, axes: Axes, *, one_row: bool = False) -> None:
@@ -147,6 +175,7 @@ _UNDATED: Mapping[Format, dict[str, Any]] = {"png": {}, "pdf": {"CreationDate": 
 def save(
     figure: Figure, folder: Path, name: str, formats: Sequence[Format] = ("png",), dpi: float | None = None
 ) -> tuple[Path, ...]:
+    """Write a figure into a folder, which is made where there is none."""
     folder.mkdir(parents=True, exist_ok=True)
     if (layout := figure.get_layout_engine()) is not None:
         layout.execute(figure)  # once, as no file changes it; with the ticks that these sizes of text give
