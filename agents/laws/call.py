@@ -10,6 +10,7 @@ from typing import Any
 from gridpeers.agents.agent_config import SharedQuantity
 from gridpeers.agents.laws.law import NOTHING_SHARED, Law, Neighbour, Own, SetPoints, Terms
 from gridpeers.wire.messages import MOST_SHARED, SHARED_LIMIT
+from gridpeers.wire.plain_sum import plain_sum
 from gridpeers.wire.plugins.registry import ANYTHING, line_of, named
 from gridpeers.wire.schema.table_schema import Range
 from gridpeers.wire.wording import printable, suggestion
@@ -83,7 +84,7 @@ def failed_at(law: Law, error: LawError, folder: str) -> str:
 
 def _summed(terms: Terms, own: Own) -> SetPoints:
     P_set, V_set = (
-        before + sum(_number(f"term {_shown(term.name)}", term.value, own.t) for term in of)
+        before + plain_sum(_number(f"term {_shown(term.name)}", term.value, own.t) for term in of)
         for before, of in ((own.P_set, terms.P_set), (own.V_set, terms.V_set))
     )
     return SetPoints(P_set, V_set, terms.shared, terms.send, lambda: terms)

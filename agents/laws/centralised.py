@@ -23,6 +23,7 @@ from functools import partial
 from typing import Annotated, Any
 
 from gridpeers.agents.laws.law import Law, Neighbour, Own, SetPoints, Term, Terms
+from gridpeers.wire.plain_sum import plain_sum
 from gridpeers.wire.schema.table_schema import SHARED, Range, Unit
 
 _Step = tuple[float, float, float]  # A correction before, the change of its integral, the correction after (pu)
@@ -82,7 +83,7 @@ class Centralised(Law):
 
     def _mean_error(self, own: Own, neighbours: Sequence[Neighbour]) -> float:
         voltages = [own.V, *(other.shared["v"] for other in neighbours if "v" in other.shared)]
-        return 1.0 - sum(voltages) / len(voltages)
+        return 1.0 - plain_sum(voltages) / len(voltages)
 
 
 def _terms_of_correction(own: Own, P_set: float, V_set: float, centre: str) -> Terms:

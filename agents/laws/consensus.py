@@ -43,6 +43,7 @@ from typing import Annotated, Any
 
 from gridpeers.agents.agent_config import Gains
 from gridpeers.agents.laws.law import NOTHING_SHARED, Law, Neighbour, Own, SetPoints, Term, Terms
+from gridpeers.wire.plain_sum import plain_sum
 from gridpeers.wire.schema.table_schema import Range, Unit
 
 
@@ -162,7 +163,7 @@ class Consensus(Law):
 
     def _terms(self, own: Own, neighbours: Sequence[Neighbour], d: float, T: float, held: tuple[bool, bool]) -> Terms:
         """Split the changes of a step: each neighbour's in place of their mean, and what anti-windup takes back."""
-        weights = sum(n.weight for n in neighbours) or 1.0
+        weights = plain_sum(n.weight for n in neighbours) or 1.0
         m_p, (_, P_error), (_, V_error) = own.m_p, self._P_change(own, 0.0, d, T), self._V_change(own, 0.0, d, T)
         P, V = [], []
         for n in neighbours:
@@ -175,7 +176,7 @@ class Consensus(Law):
         if held[0] and own.leader:
             P.append(Term("anti-windup", -P_error / m_p))
         if held[1]:
-            V.append(Term("anti-windup", -sum(term.value for term in V)))
+            V.append(Term("anti-windup", -plain_sum(term.value for term in V)))
         return Terms(P, V)
 
     def _means(self, neighbours: Sequence[Neighbour]) -> tuple[float, float, float]:

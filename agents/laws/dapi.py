@@ -26,6 +26,7 @@ from functools import partial
 from typing import Annotated
 
 from gridpeers.agents.laws.law import NOTHING_SHARED, Law, Neighbour, Own, SetPoints, Term, Terms
+from gridpeers.wire.plain_sum import plain_sum
 from gridpeers.wire.schema.table_schema import Range, Unit
 
 
@@ -41,13 +42,13 @@ class Dapi(Law):
     b: Annotated[float, Range(0, 1e3), "Weight of each neighbour's vars; 0 regulates voltage exactly."] = 1.0
 
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
-        omega, z, weight = own.m_p * own.P_set, own.z, sum([other.weight for other in neighbours])
+        omega, z, weight = own.m_p * own.P_set, own.z, plain_sum(other.weight for other in neighbours)
         apart = [other.weight * (omega - other.m_p * other.P_set) for other in neighbours]
         unequal = [other.weight * (z - other.m_q * other.Q) for other in neighbours]
         averaging, sharing = _step(T * self.a / self.k, weight), _step(T * self.b / self.kappa, weight)
         f_error, V_error = T / self.k * own.e, T * self.beta / self.kappa * (own.V - 1.0)
-        omega -= f_error + averaging * sum(apart)
-        e = own.V_set - 1.0 - (V_error + sharing * sum(unequal))
+        omega -= f_error + averaging * plain_sum(apart)
+        e = own.V_set - 1.0 - (V_error + sharing * plain_sum(unequal))
         of_P, of_V = (averaging / own.m_p, apart, f_error / own.m_p), (sharing, unequal, V_error)
         return SetPoints(omega / own.m_p, 1.0 + e, NOTHING_SHARED, True, partial(_terms, neighbours, of_P, of_V))
 

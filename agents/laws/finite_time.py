@@ -28,6 +28,7 @@ from math import copysign
 from typing import Annotated
 
 from gridpeers.agents.laws.law import NOTHING_SHARED, Law, Neighbour, Own, SetPoints, Term, Terms
+from gridpeers.wire.plain_sum import plain_sum
 from gridpeers.wire.schema.table_schema import Range, Unit
 
 
@@ -48,7 +49,7 @@ class FiniteTime(Law):
         f_error = self._move(-own.e, T * self.c_P, 1.0) if own.leader else 0.0
         V_error = self._move(1.0 - own.V, T * self.c_V * self.alpha, 0.5) if own.leader else 0.0
 
-        P_set, V_set = (y + (sum(P) + f_error)) / own.m_p, own.V_set + (sum(V) + V_error)
+        P_set, V_set = (y + (plain_sum(P) + f_error)) / own.m_p, own.V_set + (plain_sum(V) + V_error)
         return SetPoints(P_set, V_set, NOTHING_SHARED, True, partial(_terms, own, neighbours, P, V, (f_error, V_error)))
 
     def _move(self, difference: float, gain: float, most: float) -> float:

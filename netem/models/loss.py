@@ -14,6 +14,7 @@ from typing import Annotated
 import msgspec
 
 from gridpeers.netem.draws import Chain, Stream
+from gridpeers.wire.plain_sum import plain_sum
 from gridpeers.wire.schema.table_schema import Below, Problem, probability
 
 Lost = Callable[[int], bool]
@@ -167,7 +168,7 @@ class Markov(LossModel, frozen=True, kw_only=True, tag="markov"):
     def stationary(self) -> tuple[float, ...]:
         burst = self.p13 / self.p31
         weights = (1.0, burst * self.p32 / self.p23, burst, self.p14)
-        return tuple(weight / sum(weights) for weight in weights)
+        return tuple(weight / plain_sum(weights) for weight in weights)
 
     @property
     def loss_in_state(self) -> tuple[float, ...]:

@@ -9,6 +9,7 @@ from msgspec.structs import replace
 
 from gridpeers.plant.equipment import Tables
 from gridpeers.wire.messages import LoadSetting
+from gridpeers.wire.plain_sum import plain_sum
 from gridpeers.wire.schema.table_schema import Plausible
 from gridpeers.wire.wording import first_of, suggestion
 
@@ -92,10 +93,10 @@ def _shared(branches: Sequence[complex], total: complex) -> list[complex]:
 
 
 def _scaled(values: Sequence[float], sizes: Sequence[float], total: float) -> list[float]:
-    before = sum(values)
+    before = plain_sum(values)
     if abs(before) > LEAST * sum(map(abs, values)):
         return [value * (total / before) for value in values]
-    whole = sum(sizes)
+    whole = plain_sum(sizes)
     return [
         value + (total - before) * size / whole if whole else value for value, size in zip(values, sizes, strict=True)
     ]

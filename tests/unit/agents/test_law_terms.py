@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from gridpeers.agents.carriers.law_registry import LAWS
 from gridpeers.agents.laws.call import LawError, decide
 from gridpeers.agents.laws.law import Law, Neighbour, Own, Term, Terms
+from gridpeers.wire.plain_sum import plain_sum
 
 NAMES = ("consensus", "dapi", "event-triggered", "finite-time", "centralised", "resilient")
 
@@ -85,6 +86,11 @@ class Summed(Law):
 
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> Terms:
         return Terms((Term("a", 0.1), Term("b", 0.2, "inv2")), (Term("c", 1),), {"x": 2.0}, send=False)
+
+
+def test_terms_add_up_alike_on_every_python() -> None:
+    """A compensated sum, as `sum` is since Python 3.12, gives 1."""
+    assert plain_sum([1e16, 1.0, -1e16]) == 0.0
 
 
 def test_terms_alone_are_a_step() -> None:
