@@ -53,8 +53,7 @@ def view(
 
     Example:  gridpeers view --control
     """
-    modules = dict.fromkeys(("starlette", "uvicorn", "websockets"), "the page")
-    require(modules, "view")
+    require(dict.fromkeys(("starlette", "uvicorn", "websockets"), "the page"), "view")
     if record is None:
         if case:
             fail("--case: goes with a RECORD; a live run has one case")

@@ -202,8 +202,7 @@ def _line(error: Any) -> str:
     if type(error).__name__ == "MissingParameter" and param is not None and param.metavar == "SCENARIO":
         return f"SCENARIO is missing: e.g. islanding, plug-n-play or partition; {command_line('list')} shows all"
     if type(error).__name__ == "MissingParameter" and error.ctx.command.params[0].metavar == "RUN":
-        example = " ".join(error.ctx.command.help.partition("Example:")[2].split())
-        return f"{param.metavar} is missing; RUN comes first: {example}"
+        return f"{param.metavar} is missing; RUN comes first: {error.ctx.command.help.partition('Example:')[2].strip()}"
     message = " ".join(error.format_message().split()).rstrip(".").replace("Value error, ", "")
     words: list[str] = []
     ctx = error.ctx

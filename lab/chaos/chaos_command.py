@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
     from gridpeers.lab.chaos.campaign import Campaign
 
-_PACKAGES = {"hypothesis": "the schedules", "joblib": "the runs over all cores"}
-
 
 def chaos(
     scenario: ScenarioName,
@@ -61,7 +59,7 @@ def chaos(
         fail(f'{scenario}: plant.simulator = "{simulator}" lets no inverter leave or join; use "gridpeers"')
     if spec.security == "mtls" and driver == "processes":
         fail(f'{scenario}: security = "mtls" needs certificates, and chaos uses no certificates; remove it')
-    require(_PACKAGES, "chaos")
+    require({"hypothesis": "the schedules", "joblib": "the runs over all cores"}, "chaos")
     from datetime import datetime
 
     from gridpeers.cli.progress import remaining
