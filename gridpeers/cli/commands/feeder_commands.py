@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from gridpeers.cli.usage import LeaveOut, Switches, argument, fail, option
+from gridpeers.cli.usage import Commands, LeaveOut, Switches, argument, fail, option
 from gridpeers.feeder import Feeder, is_foreign
 from gridpeers.output_folders import files_written, shown, whole_folder, write_whole
 from gridpeers.plant.equipment.connectivity import Connectivity
@@ -17,7 +17,7 @@ from gridpeers.plant.tables import FeederError, feeders
 from gridpeers.rooms import ROOMS
 from gridpeers.wire.wording import counted
 
-app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Import, check and solve feeders.")
+app = typer.Typer(cls=Commands, no_args_is_help=True, rich_markup_mode=None, help="Import, check and solve feeders.")
 
 FeederName = Annotated[
     str, argument("FEEDER", "A feeder that comes with gridpeers, a folder of tables, or a .dss or .glm file.")
