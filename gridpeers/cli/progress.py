@@ -19,7 +19,7 @@ TellPart = Callable[[str, float], None]
 
 PATIENCE = 4.0  # A start that takes longer than this (s) is explained; usually it takes about 1 s
 
-COMPILING = "starting ... (only the very first run compiles the plant, which takes about 20 s)"
+COMPILING = "starting ... (only the first run compiles the plant, which takes about 20 s)"
 TRYING = "checking the start of the plant ... (only the very first use compiles it, which takes about 20 s)"
 
 LONG = 30.0  # A case that takes longer than this (s) has a line in a log; so the output of most runs fits one screen
