@@ -29,7 +29,7 @@ def compare(a: RunSource, b: RunSource, *, names: tuple[str, str] = ("a", "b")) 
 
     Runs with several cases are compared in their common cases. Two single cases need no common name.
     """
-    if names[0] == names[1]:
+    if len(names) != 2 or names[0] == names[1]:
         raise ScenarioError([f'names: give two different words, such as ("before", "after"), got {names!r:.60}'])
     first, second = map(_cases_of, (a, b))
     if len(first) == len(second) == 1:
