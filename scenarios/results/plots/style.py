@@ -6,6 +6,7 @@ curves differ in a black-and-white print too.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import zip_longest
 from math import inf
@@ -20,6 +21,8 @@ from matplotlib.figure import Figure
 
 from gridpeers.scenarios.results.history import Floats
 from gridpeers.scenarios.results.plots.drawing import Drawing, Mark
+
+warnings.filterwarnings("ignore", "Glyph .* missing from font", module=r"gridpeers\.")  # a box stands in its place
 
 Style = tuple[str, Any, float]  # Colour, dash pattern and line width (pt)
 
