@@ -36,7 +36,7 @@ def docs(
             if CONFIG.is_file():
                 _build()
             if not (SITE / "index.html").is_file():
-                fail(f"{SITE} has no pages; install gridpeers from a wheel, which has them")
+                fail("this installation lacks the pages; a clone builds them: pip install -e '.[docs]'")
             url = url_of(listening, "127.0.0.1")
             typer.echo(f"documentation: open {url} in a browser, or {url}learn/first-run.html; Ctrl-C ends the command")
             if not no_browser and (sys.platform != "linux" or {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys()):
