@@ -9,6 +9,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 
+from rich.cells import cell_len, set_cell_size
 from rich.console import Console
 from rich.text import Text
 
@@ -92,12 +93,13 @@ def show_summary(report: RunReport, console: Console, after: str, figure: str = 
 
 
 def _failures(report: RunReport) -> Iterator[str]:
-    yield from (f"FAILED  case {case}: {first_of(of)}" for case, of in report.failures.items() if of)
+    when = r" at t = [\d.]+ s"  # the time is in the next command
+    yield from (f"FAILED  case {case}: {re.sub(when, '', first_of(of))}" for case, of in report.failures.items() if of)
     for case in report.checks:
         for verdict in report.broken(case):
             if verdict.check != LAW_FAILED or not report.failures.get(case):
-                said = re.sub(r" at t = [\d.]+ s", "", verdict.sentence.replace(" failed: ", ": ", 1), count=1)
-                yield f"FAILED  case {case}: {said}"  # the time is in the next command
+                said = re.sub(when, "", verdict.sentence.replace(" failed: ", ": ", 1), count=1)
+                yield f"FAILED  case {case}: {said}"
     yield from (f"FAILED  {it.claim.text}: {it.found}" for it in report.verdicts if it.status == "FAIL")
 
 
@@ -152,7 +154,7 @@ def _cases(report: RunReport, room: int) -> list[Text]:
     rows += [["", *(_worst(found, it, name) for name in columns), _STATES[_state(report, it)][2]] for it in shown]
     rest = sum(max(len(row[at]) for row in rows) + GAP for at in range(1, len(rows[0])))
     for row, case in zip(rows[1:], shown, strict=True):
-        row[0] = _cut(_case(report, case), max(COLUMNS - rest, len(case)))
+        row[0] = _cut(_case(report, case), COLUMNS - rest) if COLUMNS - rest > len(case) + GAP + 3 else case
     lines = _aligned(rows, left=(0, len(rows[0]) - 1))
     lines += [Text(f"and {len(cases) - len(shown)} more cases: see the report")] * (len(shown) < len(cases))
     words = "worst settled values of all events; uneven P, Q: MPSI, MQSI, 0 if shared equally"
@@ -195,7 +197,7 @@ def _next(report: RunReport, after: str) -> str:
 
 
 def _cut(text: str, width: int = COLUMNS) -> str:
-    return text if len(text) <= width else f"{text[: width - 3].rstrip()}..."
+    return text if cell_len(text) <= width else f"{set_cell_size(text, width - 3).rstrip()}..."
 
 
 def show(report: RunReport, console: Console) -> None:
@@ -251,10 +253,11 @@ def _titled(title: str, header: Sequence[str], rows: Sequence[Sequence[str]], le
 
 
 def _aligned(rows: Sequence[Sequence[str]], left: Collection[int]) -> list[Text]:
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    widths = [max(map(cell_len, column)) for column in zip(*rows, strict=True)]
     lines = []
     for row in rows:
-        cells = (f"{cell:{'<' if at in left else '>'}{widths[at]}}" for at, cell in enumerate(row))
+        blank = [" " * (width - cell_len(cell)) for cell, width in zip(row, widths, strict=True)]
+        cells = (cell + blank[at] if at in left else blank[at] + cell for at, cell in enumerate(row))
         lines.append(Text((" " * GAP).join(cells).rstrip()))
         lines[-1].highlight_regex(r"\S+ \| \S+ !|(broken|law failed)$", "red")
     return lines

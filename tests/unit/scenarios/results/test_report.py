@@ -4,6 +4,7 @@ import io
 from dataclasses import replace
 
 import pytest
+from rich.cells import cell_len
 
 from gridpeers.papers.singhal2022.paper_benchmarks import CLAIMS, ISLANDING
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict, Violation
@@ -68,7 +69,7 @@ def test_tables_of_many_events_fit_a_terminal() -> None:
     found = Findings(results={"IV": {f"event{i}": steady for i in range(1, 7)}}, P_set0=0.65, GFL=("inv2",))
     lines = plain(replace(few, findings=found, notes=[], folder="")).splitlines()
 
-    assert max(map(len, lines)) <= 80
+    assert max(map(cell_len, lines)) <= 80
     assert [line.split()[0] for line in lines if "0.80 s" in line] == [f"event{i}" for i in range(1, 7)]
 
 
@@ -140,7 +141,7 @@ def test_a_summary_fits_one_screen_whatever_the_run(measured: bool) -> None:
     cases = {f"case{i}": "frequency" if i % 3 else "" for i in range(30)}
     steady = report().findings.results["IV"]
     found = Findings(results=dict.fromkeys(cases, steady if measured else {}))
-    of = replace(report(), titles=dict.fromkeys(cases, "a long title " * 9), checks=verdicts(**cases), findings=found)
+    of = replace(report(), titles=dict.fromkeys(cases, "[red]微电网 " * 9), checks=verdicts(**cases), findings=found)
 
     lines = summary(of)
 
