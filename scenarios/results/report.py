@@ -181,7 +181,7 @@ def _worst(found: Findings, case: str, name: str) -> str:
 def _claims_that_hold(report: RunReport) -> list[Text]:
     of = Counter(verdict.status for verdict in report.verdicts)
     rest = f", {counted(of['MISS'], 'known deviation')}" if of["MISS"] else ""
-    rest += f", {of['NOT RUN']} not judged without other cases" if of["NOT RUN"] else ""
+    rest += f", {of['NOT RUN']} need other cases" if of["NOT RUN"] else ""
     paper = " of the paper" if report.benchmark.numbers else ""
     return [Text(f"{of['PASS']} of {of.total() - of['NOT RUN']} claims{paper} hold{rest}")] if report.verdicts else []
 
