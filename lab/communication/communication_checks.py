@@ -202,9 +202,9 @@ class LastWords(Check):
                     continue
                 later = [max(0.0, first - last) for first, then in epochs.values() if then > last]
                 yield Violation(
-                    text="its process ends, and no event says why; the next one sends after"
+                    text="its process ends, and nobody had asked for it; the next one sends after"
                     if later
-                    else "stops sending, and no event says why",
+                    else "stops sending, and nobody had asked for it",
                     agent=agent,
                     t=last,
                     value=min(later, default=end - last),

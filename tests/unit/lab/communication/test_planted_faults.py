@@ -109,7 +109,7 @@ def test_an_agent_whose_process_was_replaced_is_not_called_silent(sound: Checked
 
     assert (found.count, found.violations[0].value) == (1, pytest.approx(0.5, abs=0.03))
     assert found.violations[0].sentence == (
-        "its process ends, and no event says why; the next one sends after: inv7 0.5 s at t = 3.00 s"
+        "its process ends, and nobody had asked for it; the next one sends after: inv7 0.5 s at t = 3.00 s"
     )
 
 
