@@ -42,12 +42,11 @@ def command_line() -> Iterator[str]:
     """Yield every command with its arguments and options, in the groups of `gridpeers --help`."""
     group: Any = typer.main.get_command(app)
     context = group.make_context("gridpeers", [], resilient_parsing=True)
-    chapters: dict[str, list[tuple[Any, list[tuple[str, str]]]]] = {}
-    for line in group.get_help(context).splitlines():
-        if section := re.fullmatch(r"(?!Options)(\w[^:]*):", line):
-            chapters[section[1]] = []
-        elif (entry := re.match(r"  ([\w-]+)  +\w", line)) and (command := group.get_command(context, entry[1])):
-            list(chapters.values())[-1].extend(_commands(entry[1], command, context))
+    chapters: dict[str, list[tuple[Any, list[tuple[str, str]]]]] = {
+        title: [of for name in names for of in _commands(name, group.get_command(context, name), context)]
+        for title, names in group.groups(context).items()
+        if names
+    }
     counts = Counter(record for commands in chapters.values() for _, records in commands for record in records)
     common = [record for record, count in counts.items() if count >= OF_SEVERAL and record[0].startswith("-")]
     for title, commands in chapters.items():

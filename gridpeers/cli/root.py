@@ -90,11 +90,15 @@ class LazyCommands(Commands):
             self.commands[cmd_name] = _as_typer_has_it(cmd_name, found)
         return self.commands.get(cmd_name)
 
-    def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """Write the names and what each command does, in groups; commands that others bring come last."""
+    def groups(self, ctx: Any) -> dict[str, list[str]]:
+        """Return the names in the groups of the help; commands that others bring come last."""
         there = self.list_commands(ctx)
-        groups = {title: [name for name, *_ in of if name in there] for title, of in _OWN.items()}
-        for title, names in (groups | {"Plug-ins": [name for name in there if name not in SUMMARIES]}).items():
+        own = {title: [name for name, *_ in of if name in there] for title, of in _OWN.items()}
+        return own | {"Plug-ins": [name for name in there if name not in SUMMARIES]}
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the names and what each command does, in groups."""
+        for title, names in self.groups(ctx).items():
             if names:
                 texts = (SUMMARIES.get(name) or self.get_command(ctx, name).get_short_help_str(60) for name in names)
                 with formatter.section(title):
