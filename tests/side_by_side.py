@@ -1,26 +1,28 @@
-"""How `pytest -n` shares the tests out: those that keep real time have one worker and the right of way."""
+"""Which tests `pytest` leaves out as slow, and how `pytest -n` shares the others out.
+
+Those that keep real time have one worker and the right of way.
+"""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterable
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 
 import pytest
 from xdist.scheduler import LoadFileScheduling
 from xdist.workermanage import WorkerController
 
-REAL_TIME = ("tests/processes/realtime", "tests/schedules")
+ROOT = Path(__file__).parents[1]
+
+REAL_TIME = ("tests/processes/realtime",)
 """Folders of tests that keep real time: no two of them run at once, and what runs beside them gives way."""
 
 IN_PROCESS = ("tests/unit", "tests/golden", "tests/papers", "tests/fuzz")
 """Folders of tests that start hardly a process. They come last on the other workers, as each is short."""
 
-PAGES = ("tests/pages/test_pages.py",)
-
 ONE_RUN = ("tests/golden/catalogue", "tests/papers/singhal2022", "tests/conformance/test_islands.py")
 """Tests that look at the same runs of the catalogue: one worker has them all, and runs each case once."""
-
 
 EACH = ("tests/pages", "tests/validation")  # Tests that take seconds and share nothing: any worker has any of them
 
@@ -50,6 +52,9 @@ SLOW = {
 }
 """Tests that `pytest` leaves out unless they are named: `--all` runs them too, as .ci/run does."""
 
+_GONE = [each for each in (*REAL_TIME, *IN_PROCESS, *ONE_RUN, *EACH, *SLOW) if not (ROOT / each).exists()]
+assert not _GONE, f"no such tests: {_GONE}"
+
 
 def leave_out_slow(items: list[pytest.Item]) -> list[pytest.Item]:
     """Take the slow tests out of the list, and return them."""
@@ -66,8 +71,6 @@ class RealTimeApart(LoadFileScheduling):
     """
 
     def _split_scope(self, nodeid: str) -> str:
-        if _within(nodeid, PAGES):
-            return nodeid  # each page is a test of its own, of some seconds
         file = super()._split_scope(nodeid)
         if _within(file, EACH):
             return nodeid
