@@ -195,7 +195,10 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 def on_page_markdown(markdown: str, **_: Any) -> str:
     """Put generated parts in, show a file's name as the title of its block, and drop the comments for the tests."""
     markdown = markdown.replace("../CONTRIBUTING.md", "contributing.md")  # the file of the root, as a page
-    markdown = re.sub(r"^<!-- *generated: *(.*?) *-->$", lambda found: part(found[1]), markdown, flags=re.M)
+    # the line before the comment is for readers of the source
+    markdown = re.sub(
+        r"^(?:\(.*\)\n)?<!-- *generated: *(.*?) *-->$", lambda found: part(found[1]), markdown, flags=re.M
+    )
     markdown = re.sub(r"^( *)<!-- *file: *(.*?) *-->\n(\s*```\w+)", r'\3 title="\2"', markdown, flags=re.M)
     markdown = re.sub(r"^\|.*", lambda row: re.sub(r"`[^`]+`", _unescaped, row[0]), markdown, flags=re.M)
     return re.sub(r"^ *<!-- *(skip|exit|file):.*?-->\n", "", markdown, flags=re.M | re.S)
