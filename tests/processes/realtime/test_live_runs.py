@@ -236,7 +236,7 @@ def test_laws_that_fail_in_a_live_run_are_exit_code_1_and_named(desk: Desk) -> N
 
     assert desk.type("down")[0] == 0
     assert up.end() == 1
-    up.expect("FAILED  case IV: inv[123]: law mine:Mine")
+    up.expect("FAILED  case IV: inv[123]: ")
     assert re.match(
         r"FAILED  case IV: inv[123] at t = .* s: .* and 2 more\n", (desk.folder / "here" / "report.txt").read_text()
     )
