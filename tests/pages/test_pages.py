@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -29,6 +30,8 @@ def page_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[PageRu
 def test_a_page_is_shown_as_it_goes(page: str, page_run: PageRun) -> None:
     """Its blocks run in order, or say why they do not; each `gridpeers ...` in a sentence is a command."""
     text = (ROOT / page).read_text(encoding="utf-8")
+    comments = re.findall(r"<!-- *(.*?) *-->", text, re.S)
+    assert [it for it in comments if not re.match("(skip|exit|file|generated|begin):|end$", it)] == []  # misspelt
     for code in inline_code(text):
         for words in calls_of(code) if code.startswith(("gridpeers ", ".venv/bin/gridpeers ")) else ():
             parse(words, whole=False)
