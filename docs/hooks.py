@@ -35,7 +35,7 @@ _CHAPTERS = {
     r"wire": "Parameters",
     r"": "Errors, the catalogue and further modules",
 }
-"""Chapters of the reference of Python, by a pattern of the module that has a name."""
+"""Chapters of the reference of Python, by a pattern of the module of a name; `theory_parts` is a further module."""
 
 
 def command_line() -> Iterator[str]:
@@ -94,8 +94,8 @@ def _members(cls: type) -> Iterator[str]:
     for field, (_, text) in field_docs(cls).items():
         if text and not field.startswith("_"):
             yield f"- `{field}`: {_plain(text)}"
-    private = [base for base in cls.__mro__ if base is cls or base.__name__.startswith("_From")]
-    for name, member in (entry for base in reversed(private) for entry in vars(base).items()):
+    documented = [base for base in cls.__mro__ if base is cls or base.__name__.startswith("_From")]
+    for name, member in (entry for base in reversed(documented) for entry in vars(base).items()):
         it = getattr(member, "fget", None) or getattr(member, "func", None) or getattr(member, "__func__", member)
         text, _, rest = (inspect.getdoc(it) or "").partition("\n\n")
         if text and inspect.isfunction(it) and not name.startswith("_"):

@@ -142,6 +142,7 @@ def _answer(report: RunReport, failed: Sequence[str]) -> Text:
 
 
 _IN_SHORT = {"f_error_Hz": "f error", "MPSI": "uneven P", "MQSI": "uneven Q", "t_restore_s": "restored in"}
+"""Columns of the table of cases: fields of `Steady`, and headings that leave room in a line of `COLUMNS`."""
 
 
 def _cases(report: RunReport, room: int) -> list[Text]:
