@@ -2,7 +2,6 @@
 
 Real time: `python foreign_agent.py tcp/127.0.0.1:7447 lab inv2`, with endpoint, run and inverter.
 Simulated time: `python foreign_agent.py < inv2.json`, with the plant's configuration of the agent.
-
 It runs the paper's law with default options; in simulated time it gives the bytes of an agent of gridpeers. It sends no
 AgentStatus, so `gridpeers watch` shows only the plant's data.
 """
@@ -174,11 +173,8 @@ class ForeignAgent:
         k, speed, limit = (self.sent, c["speed"], c["max_age"]) if self.realtime else (m["seq"], 1.0, inf)
         for name in list(self.states) if self.realtime else [n for n in self.neighbours if n in self.members]:
             heard = [one for one in self.states.get(name, []) if self.realtime or one[1]["seq"] < k][-1:]
-            if (
-                not self.realtime
-                and (not heard or heard[0][1]["seq"] < k - 1)
-                and (name, self.members[name]) in self.alive
-            ):
+            late = not heard or heard[0][1]["seq"] < k - 1
+            if late and not self.realtime and (name, self.members[name]) in self.alive:
                 return
             for plate, state, came in heard:
                 here = state.get("island", "") in ("", m["island"], self.island or m["island"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import textwrap
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -77,8 +78,10 @@ def show_summary(report: RunReport, console: Console, after: str, figure: str = 
         tail += [Text.assemble(f"{'figure':8}", (f"{report.folder}plots/overview.{figure}", "bold"))]
         tail += [Text(f"{'report':8}{report.folder}report.txt{more}"), Text(f"{'next':8}{_next(report, after)}")]
     room = LINES - 4 - len(tail) - min(len(report.checks), 5)
-    shown = failed if len(failed) <= room else failed[: room - 1]
-    head = [_answer(report, failed), *(Text(_cut(line), "red") for line in shown)]
+    shown = [textwrap.wrap(line, COLUMNS, subsequent_indent=" " * 8) for line in failed]
+    if sum(map(len, shown)) > room:
+        shown = [[_cut(line)] for line in (failed if len(failed) <= room else failed[: room - 1])]
+    head = [_answer(report, failed), *(Text(line, "red") for lines in shown for line in lines)]
     if len(shown) < len(failed):
         head.append(Text(f"and {len(failed) - len(shown)} more failures: see the report", "red"))
     table = _cases(report, LINES - len(head) - len(tail))

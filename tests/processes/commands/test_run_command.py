@@ -14,7 +14,7 @@ import pytest
 import gridpeers as gp
 from gridpeers.scenarios.catalogue_files import CATALOGUE
 from tests.command_line import invoke
-from tests.processes.terminals import DEADLINE
+from tests.processes.terminals import DEADLINE, wait_for
 
 ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
 HEAD = ISLANDING.replace('paper = "islanding"', "").partition('[[event]]\nlabel = "event2"')[0]
@@ -56,8 +56,7 @@ def test_an_ended_command_ends_its_processes(tmp_path: Path) -> None:
         stderr=subprocess.PIPE,
         text=True,
     ) as running:
-        assert running.stdout is not None
-        assert any(line.startswith("case long: ") for line in running.stdout)  # the second case is on its way now
+        wait_for(tmp_path / "here" / "log" / "run.log", "case long: ")  # the second case is on its way now
         children = Path(f"/proc/{running.pid}/task/{running.pid}/children").read_text().split()
         running.send_signal(signal.SIGTERM)
         _, errors = running.communicate(timeout=60)
