@@ -8,12 +8,13 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from time import monotonic, sleep
 from types import TracebackType
 
 from tests.command_line import invoke
+from tests.toy.toy_runs import exists
 
 DEADLINE = 80.0  # Longest wait (s) for any line, of a command that runs; on an idle machine all come within 3 s
 
@@ -146,6 +147,14 @@ def wait_for(file: Path, text: str) -> None:
     end = monotonic() + DEADLINE
     while not (file.exists() and text in file.read_text()):
         assert monotonic() < end, f"{file} has no {text!r}"
+        sleep(0.02)
+
+
+def wait_for_the_end_of(pids: Iterable[int]) -> None:
+    """Wait until processes have ended; a fork server ends just after its command."""
+    end = monotonic() + DEADLINE
+    while left := [pid for pid in pids if exists(pid)]:
+        assert monotonic() < end, f"{left} still run"
         sleep(0.02)
 
 

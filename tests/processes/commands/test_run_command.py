@@ -14,7 +14,7 @@ import pytest
 import gridpeers as gp
 from gridpeers.scenarios.catalogue_files import CATALOGUE
 from tests.command_line import invoke
-from tests.processes.terminals import DEADLINE, wait_for
+from tests.processes.terminals import DEADLINE, children_of, wait_for, wait_for_the_end_of
 
 ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
 HEAD = ISLANDING.replace('paper = "islanding"', "").partition('[[event]]\nlabel = "event2"')[0]
@@ -57,16 +57,14 @@ def test_an_ended_command_ends_its_processes(tmp_path: Path) -> None:
         text=True,
     ) as running:
         wait_for(tmp_path / "here" / "log" / "run.log", "case long: ")  # the second case is on its way now
-        children = Path(f"/proc/{running.pid}/task/{running.pid}/children").read_text().split()
+        children = children_of(running.pid)
         running.send_signal(signal.SIGTERM)
         _, errors = running.communicate(timeout=60)
 
     assert running.returncode == 143, errors
     assert errors == "gridpeers: interrupted; what came until then is in here/\n"
     assert (tmp_path / "here" / "status.txt").read_text().startswith("broken: interrupted")
-    for child in children:
-        with pytest.raises(ProcessLookupError):
-            os.kill(int(child), 0)
+    wait_for_the_end_of(children)
 
 
 def test_a_command_that_nobody_reads_ends_without_a_word() -> None:

@@ -17,7 +17,7 @@ import pytest
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
 from tests.command_line import invoke
 from tests.processes.commands.test_run_command import command
-from tests.processes.terminals import DEADLINE, Desk, Terminal, children_of
+from tests.processes.terminals import DEADLINE, Desk, Terminal, children_of, wait_for_the_end_of
 
 EVENTS = """
 [time]
@@ -153,9 +153,7 @@ def test_up_stays_until_it_is_ended_and_leaves_no_process(desk: Desk) -> None:
 
     assert up.end() == 143
     up.expect(r"ended at t = .* steps")
-    for child in children:
-        with pytest.raises(ProcessLookupError):
-            os.kill(child, 0)
+    wait_for_the_end_of(children)
     up.expect(r"NOTE  case IV: ended at .* s of 3600 s; the measures end")
     here = desk.folder / "here"
     events = (here / "IV" / "events.csv").read_text()
