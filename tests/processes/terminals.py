@@ -14,7 +14,6 @@ from time import monotonic, sleep
 from types import TracebackType
 
 from tests.command_line import invoke
-from tests.toy.toy_runs import exists
 
 DEADLINE = 80.0  # Longest wait (s) for any line, of a command that runs; on an idle machine all come within 3 s
 
@@ -151,11 +150,18 @@ def wait_for(file: Path, text: str) -> None:
 
 
 def wait_for_the_end_of(pids: Iterable[int]) -> None:
-    """Wait until processes have ended; a fork server ends just after its command."""
+    """Wait until processes have ended; a fork server ends just after its command, and nobody may reap it."""
     end = monotonic() + DEADLINE
-    while left := [pid for pid in pids if exists(pid)]:
+    while left := [pid for pid in pids if _runs(pid)]:
         assert monotonic() < end, f"{left} still run"
         sleep(0.02)
+
+
+def _runs(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return False
 
 
 def children_of(pid: int) -> list[int]:
