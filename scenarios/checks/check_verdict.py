@@ -78,11 +78,15 @@ class CheckVerdict(msgspec.Struct, frozen=True, kw_only=True):
     """Number of violations."""
 
     @property
-    def sentence(self) -> str:
+    def detail(self) -> str:
+        """The first violation, how many more there are, and the reason; empty without any."""
         more = f", and {self.count - 1} more" if self.count > 1 else ""
         found = [self.violations[0].sentence + more] if self.violations else []
-        detail = "; ".join([*found, *filter(None, [self.reason])])
-        return f"{self.check} {self.status}" + (f": {detail}" if detail else "")
+        return "; ".join([*found, *filter(None, [self.reason])])
+
+    @property
+    def sentence(self) -> str:
+        return f"{self.check} {self.status}" + (f": {self.detail}" if self.detail else "")
 
 
 def counts(verdicts: tuple[CheckVerdict, ...]) -> str:

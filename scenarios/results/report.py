@@ -101,8 +101,7 @@ def _failures(report: RunReport) -> Iterator[str]:
     for case in report.checks:
         for verdict in report.broken(case):
             if verdict.check != LAW_FAILED or not report.failures.get(case):
-                said = re.sub(when, "", verdict.sentence.replace(" failed: ", ": ", 1), count=1)
-                yield f"FAILED  case {case}: {said}"
+                yield f"FAILED  case {case}: {verdict.check}: {re.sub(when, '', verdict.detail, count=1)}"
     yield from (f"FAILED  {it.claim.text}: {it.found}" for it in report.verdicts if it.status == "FAIL")
 
 
@@ -110,7 +109,7 @@ _STATES = {
     "law failed": ("run", "a law that failed", "law failed"),
     "broken": ("break", "limits", "broken"),
     "kept": ("keep", "all limits", "kept"),
-    "expected": ("break", "some as expected", "as expected"),
+    "expected": ("break", "limits as expected", "as expected"),
     "not judged": ("have", "no limit that was judged", "not judged"),
 }
 """Verb and object of a sentence about cases by their state, and its words in a table."""
@@ -126,19 +125,27 @@ def _state(report: RunReport, case: str) -> str:
 
 
 def _answer(report: RunReport, failed: Sequence[str]) -> Text:
+    """Say which cases are in which state; only the first states name their cases if there is no room for all names."""
     states = {case: _state(report, case) for case in report.checks}
+    groups = {state: [case for case in states if states[case] == state] for state in _STATES}
+    groups = {state: of for state, of in groups.items() if of}
     wrong = sum(verdict.status == "FAIL" for verdict in report.verdicts)
-    for named in (len(_STATES), 1, 0):  # the first clauses name their cases, as far as there is room
-        parts = [f"{counted(wrong, 'claim')} failed"] * bool(wrong)
-        for state, (verb, what, _) in _STATES.items():
-            of = [case for case in states if states[case] == state]
-            who = f"all {len(of)} cases" if len(of) == len(states) > 1 else counted(len(of), "case")
-            if len(parts) - bool(wrong) < named and who[:3] != "all":
-                who = f"case{'s' * (len(of) > 1)} {' and '.join(filter(None, (', '.join(of[:-1]), *of[-1:])))}"
-            verb = ("has" if verb == "have" else f"{verb}s") if len(of) == 1 else verb
-            parts += [f"{who} {verb} {what}"] if of else []
-        parts = parts if "kept" in states.values() else [part.replace(" some ", " limits ") for part in parts]
-        text = f"{report.scenario}: {'; '.join(parts)}"
+    text = ""
+    for named in (len(groups), 1, 0):
+        clauses = [f"{counted(wrong, 'claim')} failed"] if wrong else []
+        for at, (state, of) in enumerate(groups.items()):
+            verb, what, _ = _STATES[state]
+            if len(of) == 1:
+                verb = "has" if verb == "have" else f"{verb}s"
+            if state == "expected" and "kept" in groups:
+                what = "some as expected"  # "limits" are in the clause before
+            who = counted(len(of), "case")
+            if len(of) == len(states) > 1:
+                who = f"all {who}"
+            elif at < named:
+                who = f"case {of[0]}" if len(of) == 1 else f"cases {', '.join(of[:-1])} and {of[-1]}"
+            clauses.append(f"{who} {verb} {what}")
+        text = f"{report.scenario}: {'; '.join(clauses)}"
         if len(text) <= COLUMNS:
             break
     return Text(_cut(text), "bold red" if failed else "bold")
