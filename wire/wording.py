@@ -39,22 +39,25 @@ LONGEST_LIST = 30
 """Names that are listed at the most: all commands, or keys of a table of a scenario, but not all buses of a feeder."""
 
 
-def suggestion(wrong: str, known: Iterable[str], what: str, also: Iterable[str] = ()) -> str:
+def suggestion(wrong: str, known: Iterable[str], what: str, also: Iterable[str] = (), *, brief: bool = False) -> str:
     """Sentence that names what was probably meant and what there is.
 
-    Known names come in the order in which a reader wants them; `also` may be meant too, and are not listed.
+    Known names come in the order in which a reader wants them; `also` may be meant too, and are not listed. A `brief`
+    sentence lists the names only if none is near.
 
     Examples
     --------
     >>> suggestion("Inv22", ["inv1", "inv2"], "inverters")
     'did you mean "inv2"? The inverters are inv1, inv2'
+    >>> suggestion("Inv22", ["inv1", "inv2"], "inverters", brief=True)
+    'did you mean "inv2"?'
     >>> suggestion("zebra", map(str, range(1, 135)), "buses")  # doctest: +ELLIPSIS
     'the buses are 1, 2, 3, ..., 30 and 104 more'
     """
     names = list(known)
     near = _nearest(str(wrong), [*names, *also])
     beyond = len(names) - LONGEST_LIST
-    if near and beyond > 0:
+    if near and (brief or beyond > 0):
         return f'did you mean "{near}"?'
     there = f"he {what} are {first_of(names, LONGEST_LIST)}" if names else f"here are no {what}"
     return f'did you mean "{near}"? T{there}' if near else f"t{there}"

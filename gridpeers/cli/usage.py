@@ -177,8 +177,7 @@ class Commands(TyperGroup):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # noqa: D102
         if not args[0].startswith("-") and self.get_command(ctx, args[0]) is None:
-            near, found, _ = suggestion(args[0], self.list_commands(ctx), "commands").partition("? ")
-            fail(f'no command "{args[0]}"; {near}?' if found else f'no command "{args[0]}"; {near}')
+            fail(f'no command "{args[0]}"; {suggestion(args[0], self.list_commands(ctx), "commands", brief=True)}')
         return super().resolve_command(ctx, args)
 
 
