@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from gridpeers.plant.equipment import Tables
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.wire.messages import Journal, LinkReport, LinkRequest, Pacing, PlantEvent
+
+if TYPE_CHECKING:
+    from gridpeers.scenarios.results.plots.style import Format
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,6 +73,6 @@ class Request:
     """Number of processes that agents share; 0 gives each agent its own. It decides no number."""
     strict: bool = False
     """Real time: the run breaks when the plant cannot keep pace."""
-    figures: Literal["png", "pdf", "svg"] = "png"
+    figures: Format = "png"
     lasting: bool = True
     """The folder stays; one that goes with the results of a notebook has no figures, and is not named."""

@@ -49,7 +49,7 @@ class _FromFolder:
     """Scenario of the run, as typed values."""
     folder: Path
     """Folder with the files of the run (docs/reference/files-and-export.md)."""
-    _repr_html_ = lambda self: html(repr(self), self.plot(), self.metrics)  # noqa: E731  # in notebooks
+    _repr_html_ = lambda self: html(repr(self), self.plot(), self.metrics)  # noqa: E731  # for notebooks; the classes below have plot and metrics
 
     def __init__(self, folder: RunFolder, spec: model.ScenarioModel, feeder: Tables) -> None:
         self._folder, self._feeder = folder, feeder
