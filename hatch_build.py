@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import subprocess
 from pathlib import Path
-from tempfile import mkdtemp
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
@@ -20,6 +20,7 @@ class CommitHook(BuildHookInterface):  # type: ignore[type-arg]
         words = ["git", "describe", "--always", "--exclude=*", "--dirty=+"]
         done = subprocess.run(words, cwd=self.root, capture_output=True, text=True, check=False)
         if done.returncode == 0:
-            file = Path(mkdtemp()) / "commit.txt"
+            self._kept = TemporaryDirectory()  # until the file is built in
+            file = Path(self._kept.name) / "commit.txt"
             file.write_text(done.stdout)
             build_data["force_include"][str(file)] = "gridpeers/commit.txt"
