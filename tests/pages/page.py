@@ -20,7 +20,6 @@ from typing import Any, NamedTuple
 
 import typer
 
-from gridpeers.cli.progress import COMPILING
 from gridpeers.cli.root import app
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.scenarios.catalogue_files import CATALOGUE
@@ -185,7 +184,7 @@ class PageRun:
                 entry.split("=", 1) for entry in kept.read_text(encoding="utf-8").split("\0") if "=" in entry
             )
             output.seek(0)
-            return code, _SLOW.sub("", output.read()).removeprefix(f"{COMPILING}\n")  # shown where the machine is slow
+            return code, _SLOW.sub("", output.read())
 
     def _session(self, block: Block) -> None:
         test = doctest.DocTestParser().get_doctest(block.text, {}, "page", self.module.__file__, block.line)
